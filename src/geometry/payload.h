@@ -1,0 +1,28 @@
+/* The payload codec: a progressive mesh to bytes and back. docs/format.md, "Node payload", is normative.
+ * Lossless for all of strl_pm but the errors, which are rounded up to a logarithmic scale (the claim stays a bound). */
+#ifndef STRL_GEOMETRY_PAYLOAD_H
+#define STRL_GEOMETRY_PAYLOAD_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/cursor.h"
+#include "base/memory.h"
+#include "geometry/progressive.h"
+#include "stroll/error.h"
+
+/* Appends the payload of pm to writer. pm must satisfy the invariants of progressive.h; scratch is rewound on return. */
+strl_status strl_payload_encode(const strl_pm *pm, strl_arena *scratch, strl_writer *writer, strl_error *err);
+
+/* Sizes announced by a payload's head, checked against the limits of progressive.h and against `size`. */
+typedef struct strl_payload_sizes {
+    uint32_t vertex_count, triangle_count, step_count, palette_count;
+    uint32_t base_vertex_count, base_triangle_count;
+} strl_payload_sizes;
+strl_status strl_payload_peek(const void *data, size_t size, strl_payload_sizes *sizes, strl_error *err);
+
+/* Decodes a payload of exactly `size` bytes; the arrays of *pm live in `arena`. Hostile bytes fail with STRL_ERR_FORMAT; whatever is
+ * accepted satisfies every invariant of progressive.h. Thread-safe on different arenas. */
+strl_status strl_payload_decode(const void *data, size_t size, strl_arena *arena, strl_pm *pm, strl_error *err);
+
+#endif

@@ -1,0 +1,34 @@
+/* Threads, mutexes, conditions, clock, processor and memory facts. Thin, so that platform/web can answer too. */
+#ifndef STRL_PLATFORM_THREAD_H
+#define STRL_PLATFORM_THREAD_H
+
+#include <pthread.h>
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "stroll/error.h"
+
+typedef struct strl_thread strl_thread;
+typedef pthread_mutex_t strl_mutex;
+typedef pthread_cond_t strl_condition;
+
+strl_status strl_thread_start(strl_thread **thread, void (*run)(void *context), void *context, strl_error *err);
+void strl_thread_join(strl_thread *thread); /* waits and releases; NULL is legal */
+
+void strl_mutex_init(strl_mutex *mutex);
+void strl_mutex_deinit(strl_mutex *mutex);
+void strl_mutex_lock(strl_mutex *mutex);
+void strl_mutex_unlock(strl_mutex *mutex);
+void strl_condition_init(strl_condition *condition);
+void strl_condition_deinit(strl_condition *condition);
+void strl_condition_wait(strl_condition *condition, strl_mutex *mutex);
+void strl_condition_signal(strl_condition *condition);
+void strl_condition_broadcast(strl_condition *condition);
+
+uint64_t strl_clock_ns(void);     /* monotonic */
+uint64_t strl_clock_cpu_ns(void); /* processor time of this process, all threads */
+void strl_sleep_ns(uint64_t ns);
+unsigned strl_cpu_count(void);             /* processors this process may use, at least 1 */
+uint64_t strl_process_peak_rss_bytes(void); /* the operating system's peak resident set, children included */
+
+#endif

@@ -1,0 +1,75 @@
+/* Readers turn a mesh file into one stream of triangles with resolved corners, in file order, within a memory budget,
+ * whatever the size of the file. A stream can be rewound and read again: it then gives the same triangles.
+ *
+ * Call order: open -> (next)* until count 0 -> [rewind -> (next)*]* -> close. One thread at a time. */
+#ifndef STRL_READERS_READER_H
+#define STRL_READERS_READER_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "stroll/error.h"
+
+typedef struct strl_reader strl_reader;
+
+/* What was read but cannot become a triangle, counted apart by kind. Of one whole pass. */
+typedef struct strl_reader_drops {
+    uint64_t nonfinite; /* triangles with a corner that is not finite */
+    uint64_t degenerate_faces; /* faces with fewer than three corners */
+    uint64_t lines;     /* line elements */
+    uint64_t points;    /* point elements; not unused vertices */
+} strl_reader_drops;
+
+#define STRL_TRIANGLE_HAS_NORMAL 1u
+#define STRL_TRIANGLE_HAS_COLOUR 2u
+
+/* One triangle as read. 3 corners. */
+typedef struct strl_triangle {
+    double position[3][3];  /* model units, the file's own axes; finite */
+    float normal[3][3];     /* as read, not normalised; zero where absent; see flags */
+    uint32_t colour[3];     /* sRGB-encoded RGBA8, R in the lowest byte; 0xffffffff where absent */
+    uint32_t part;          /* index into the reader's parts */
+    uint32_t material;      /* index into the reader's materials */
+    uint32_t flags;         /* STRL_TRIANGLE_HAS_... : for all three corners */
+} strl_triangle;
+
+typedef struct strl_reader_desc {
+    const char *path;         /* UTF-8; borrowed during the call of open */
+    const char *scratch_dir;  /* an existing folder for spill files, which close removes; borrowed during open */
+    uint64_t memory_bytes;    /* budget of all the reader holds; 0 = 256 MiB; the least is 8 MiB */
+} strl_reader_desc;
+
+typedef enum strl_axis { STRL_AXIS_X, STRL_AXIS_Y, STRL_AXIS_Z } strl_axis;
+
+/* Facts known at opening. */
+typedef struct strl_reader_info {
+    const char *format;       /* "ply", "stl", "obj"; static */
+    strl_axis default_up;     /* y for OBJ, z for PLY and STL */
+    uint64_t triangles_hint;  /* a guess for progress bars (faces announced, or from the file's size); 0 = unknown */
+    uint64_t file_bytes;
+} strl_reader_info;
+
+/* Recognises the format by content, then by name. Fails with one sentence that names file, place, expected and found. */
+strl_status strl_reader_open(const strl_reader_desc *desc, strl_reader **reader, strl_error *err);
+void strl_reader_info_get(const strl_reader *reader, strl_reader_info *info);
+/* Up to `capacity` next triangles into `triangles`; *count 0 = the end. A broken file fails here: nothing after is read. */
+strl_status strl_reader_next(strl_reader *reader, strl_triangle *triangles, size_t capacity, size_t *count, strl_error *err);
+/* Back to the first triangle. Fails where the file has changed (size or time of change). */
+strl_status strl_reader_rewind(strl_reader *reader, strl_error *err);
+/* Of the pass so far; complete after the end was reached. */
+void strl_reader_drops_get(const strl_reader *reader, strl_reader_drops *drops);
+/* Bytes of the file consumed so far in this pass, for progress. */
+uint64_t strl_reader_bytes_done(const strl_reader *reader);
+
+/* Parts (OBJ o/g, STL solids; a file without any has one, unnamed) and materials (one default, white, where absent) as
+ * known after a whole pass; indices are stable over passes. Names are borrowed UTF-8 until close. */
+uint32_t strl_reader_part_count(const strl_reader *reader);
+const char *strl_reader_part_name(const strl_reader *reader, uint32_t part);
+uint32_t strl_reader_material_count(const strl_reader *reader);
+/* rgba: sRGB-encoded RGBA8, R in the lowest byte. */
+const char *strl_reader_material(const strl_reader *reader, uint32_t material, uint32_t *rgba);
+
+void strl_reader_close(strl_reader *reader); /* NULL is legal; removes its spill files */
+
+#endif
