@@ -42,7 +42,7 @@ bool strl_path_exists(const char *path);
 strl_status strl_path_rename(const char *from, const char *to, strl_error *err); /* replaces; then syncs the folder */
 strl_status strl_path_remove(const char *path, strl_error *err);                 /* a missing file is not an error */
 strl_status strl_path_make_directory(const char *path, strl_error *err);         /* existing is not an error */
-strl_status strl_path_remove_directory(const char *path, strl_error *err);       /* with the plain files in it */
+strl_status strl_path_remove_directory(const char *path, strl_error *err);       /* with the files in it, not folders; missing is fine */
 strl_status strl_path_free_bytes(const char *path, uint64_t *bytes, strl_error *err);
 /* dir + "/" + name, owned by the caller (strl__free); NULL without memory. */
 char *strl_path_join(const char *dir, const char *name);

@@ -1,0 +1,221 @@
+/* Open files. Positional calls only, so the kernel's file offset is never shared between threads. */
+#include "platform/file.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <inttypes.h>
+#include <stdatomic.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "platform/posix/facts.h"
+
+/* Linux moves at most 2 GiB - 4 KiB in one call; a round smaller step keeps 32-bit systems inside ssize_t too. */
+#define STEP_BYTES ((size_t)1 << 30)
+
+struct strl_file {
+    int descriptor;
+    _Atomic uint64_t bytes;
+    char *path; /* owned */
+};
+
+static _Atomic uint64_t reads_until_failure;  /* test hooks, see strl_file_fail_reads_after */
+static _Atomic uint64_t writes_until_failure;
+
+void strl_file_fail_reads_after(uint64_t n) { atomic_store(&reads_until_failure, n); }
+void strl_file_fail_writes_after(uint64_t n) { atomic_store(&writes_until_failure, n); }
+
+/* Counts down to 1 and stays there: the n-th call and all after it fail. */
+static bool injected_failure(_Atomic uint64_t *countdown)
+{
+    uint64_t left = atomic_load_explicit(countdown, memory_order_relaxed);
+    while (left > 1)
+        if (atomic_compare_exchange_weak(countdown, &left, left - 1))
+            return false;
+    return left == 1;
+}
+
+static int open_retrying(const char *path, int flags)
+{
+    int descriptor;
+    do
+        descriptor = open(path, flags | O_CLOEXEC, 0666);
+    while (descriptor < 0 && errno == EINTR);
+    return descriptor;
+}
+
+/* Takes the descriptor over: closed on failure. */
+static strl_status wrap(int descriptor, uint64_t bytes, const char *path, strl_file **file, strl_error *err)
+{
+    strl_file *made = strl__alloc_zero(1, sizeof *made);
+    char *copy = strl__strdup(path);
+    if (!made || !copy) {
+        strl__free(copy);
+        strl__free(made);
+        close(descriptor);
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory to open %s", strl__path_shown(path));
+    }
+    made->descriptor = descriptor;
+    atomic_init(&made->bytes, bytes);
+    made->path = copy;
+    *file = made;
+    return STRL_OK;
+}
+
+strl_status strl_file_open(const char *path, strl_file **file, strl_error *err)
+{
+    *file = NULL;
+    /* Without O_NONBLOCK a named pipe would wait for its writer before it could be refused. */
+    int descriptor = open_retrying(path, O_RDONLY | O_NONBLOCK | O_NOCTTY);
+    if (descriptor < 0)
+        return strl__fail_system(err, errno, "open", path);
+    struct stat facts;
+    if (fstat(descriptor, &facts) != 0) {
+        int code = errno;
+        close(descriptor);
+        return strl__fail_system(err, code, "examine", path);
+    }
+    if (!S_ISREG(facts.st_mode)) {
+        close(descriptor);
+        return strl__fail(err, STRL_ERR_IO, "cannot open %s: expected a file, found a %s", strl__path_shown(path),
+                          S_ISDIR(facts.st_mode) ? "folder" : "device or pipe");
+    }
+    return wrap(descriptor, (uint64_t)facts.st_size, path, file, err);
+}
+
+strl_status strl_file_create(const char *path, strl_file **file, strl_error *err)
+{
+    *file = NULL;
+    int descriptor = open_retrying(path, O_RDWR | O_CREAT | O_TRUNC | O_NOCTTY);
+    if (descriptor < 0)
+        return strl__fail_system(err, errno, "create", path);
+    return wrap(descriptor, 0, path, file, err);
+}
+
+strl_status strl_file_close(strl_file *file, strl_error *err)
+{
+    if (!file)
+        return STRL_OK;
+    strl_status status = STRL_OK;
+    /* After EINTR the descriptor is gone already (Linux): closing again could hit another thread's new file. */
+    if (close(file->descriptor) != 0 && errno != EINTR)
+        status = strl__fail_system(err, errno, "close", file->path);
+    strl__free(file->path);
+    strl__free(file);
+    return status;
+}
+
+const char *strl_file_path(const strl_file *file) { return file->path; }
+uint64_t strl_file_bytes(const strl_file *file) { return atomic_load(&file->bytes); }
+
+strl_status strl_file_stat(const strl_file *file, strl_file_info *info, strl_error *err)
+{
+    struct stat facts;
+    if (fstat(file->descriptor, &facts) != 0)
+        return strl__fail_system(err, errno, "examine", file->path);
+    strl__file_info_fill(info, &facts);
+    return STRL_OK;
+}
+
+/* One system call. *got is 0 at the end of the file, and for offsets that no file can have. */
+static strl_status read_step(strl_file *file, uint64_t offset, uint8_t *data, size_t size, size_t *got, strl_error *err)
+{
+    *got = 0;
+    if (offset > (uint64_t)INT64_MAX)
+        return STRL_OK;
+    uint64_t room = (uint64_t)INT64_MAX - offset;
+    if (size > room)
+        size = (size_t)room;
+    if (size > STEP_BYTES)
+        size = STEP_BYTES;
+    ssize_t moved = -1;
+    errno = EIO;
+    if (!injected_failure(&reads_until_failure))
+        do
+            moved = pread(file->descriptor, data, size, (off_t)offset);
+        while (moved < 0 && errno == EINTR);
+    if (moved < 0)
+        return strl__fail_system(err, errno, "read", file->path);
+    *got = (size_t)moved;
+    return STRL_OK;
+}
+
+strl_status strl_file_read_some(strl_file *file, uint64_t offset, void *data, size_t size, size_t *got, strl_error *err)
+{
+    *got = 0;
+    while (*got < size) {
+        size_t moved = 0;
+        strl_status status = read_step(file, offset + *got, (uint8_t *)data + *got, size - *got, &moved, err);
+        if (status != STRL_OK)
+            return status;
+        if (moved == 0)
+            break;
+        *got += moved;
+    }
+    return STRL_OK;
+}
+
+strl_status strl_file_read(strl_file *file, uint64_t offset, void *data, size_t size, strl_error *err)
+{
+    size_t got = 0;
+    strl_status status = strl_file_read_some(file, offset, data, size, &got, err);
+    if (status != STRL_OK || got == size)
+        return status;
+    struct stat facts;
+    uint64_t end = got ? offset + got : fstat(file->descriptor, &facts) == 0 ? (uint64_t)facts.st_size : 0;
+    return strl__fail(err, STRL_ERR_FORMAT, "%s ends at byte %" PRIu64 ", expected %zu bytes from byte %" PRIu64,
+                      strl__path_shown(file->path), end, size, offset);
+}
+
+static void raise_bytes(strl_file *file, uint64_t end)
+{
+    uint64_t bytes = atomic_load(&file->bytes);
+    while (bytes < end && !atomic_compare_exchange_weak(&file->bytes, &bytes, end))
+        ;
+}
+
+strl_status strl_file_write(strl_file *file, uint64_t offset, const void *data, size_t size, strl_error *err)
+{
+    if (offset > (uint64_t)INT64_MAX || size > (uint64_t)INT64_MAX - offset)
+        return strl__fail(err, STRL_ERR_LIMIT, "cannot write %s: %zu bytes at byte %" PRIu64 " pass the largest file size",
+                          strl__path_shown(file->path), size, offset);
+    size_t done = 0;
+    while (done < size) {
+        size_t step = size - done < STEP_BYTES ? size - done : STEP_BYTES;
+        ssize_t moved = -1;
+        errno = ENOSPC;
+        if (!injected_failure(&writes_until_failure))
+            moved = pwrite(file->descriptor, (const uint8_t *)data + done, step, (off_t)(offset + done));
+        if (moved < 0 && errno == EINTR)
+            continue;
+        if (moved <= 0) /* a device that takes nothing and names no reason is as good as full */
+            return strl__fail_system(err, moved < 0 ? errno : ENOSPC, "write", file->path);
+        done += (size_t)moved;
+        raise_bytes(file, offset + done);
+    }
+    return STRL_OK;
+}
+
+void strl_file_punch(strl_file *file, uint64_t offset, uint64_t size)
+{
+#ifdef FALLOC_FL_PUNCH_HOLE
+    if (size == 0 || offset > (uint64_t)INT64_MAX || size > (uint64_t)INT64_MAX - offset)
+        return;
+    while (fallocate(file->descriptor, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, (off_t)offset, (off_t)size) != 0 &&
+           errno == EINTR)
+        ;
+#else
+    (void)file, (void)offset, (void)size;
+#endif
+}
+
+strl_status strl_file_sync(strl_file *file, strl_error *err)
+{
+    int failed;
+    do
+        failed = fsync(file->descriptor);
+    while (failed && errno == EINTR);
+    return failed ? strl__fail_system(err, errno, "sync", file->path) : STRL_OK;
+}

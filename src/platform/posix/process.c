@@ -1,0 +1,72 @@
+/* Clock, processors and memory of this process. */
+#include <errno.h>
+#include <fcntl.h>
+#include <sched.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <time.h>
+#include <unistd.h>
+
+#include "platform/thread.h"
+
+#define NS_PER_S 1000000000u
+
+static uint64_t clock_now_ns(clockid_t clock)
+{
+    struct timespec now = {0};
+    clock_gettime(clock, &now);
+    return (uint64_t)now.tv_sec * NS_PER_S + (uint64_t)now.tv_nsec;
+}
+
+uint64_t strl_clock_ns(void) { return clock_now_ns(CLOCK_MONOTONIC); }
+uint64_t strl_clock_cpu_ns(void) { return clock_now_ns(CLOCK_PROCESS_CPUTIME_ID); }
+
+void strl_sleep_ns(uint64_t ns)
+{
+    struct timespec left = {.tv_sec = (time_t)(ns / NS_PER_S), .tv_nsec = (long)(ns % NS_PER_S)};
+    while (nanosleep(&left, &left) != 0 && errno == EINTR)
+        ;
+}
+
+unsigned strl_cpu_count(void)
+{
+    cpu_set_t set;
+    CPU_ZERO(&set);
+    if (sched_getaffinity(0, sizeof set, &set) == 0 && CPU_COUNT(&set) > 0)
+        return (unsigned)CPU_COUNT(&set);
+    long online = sysconf(_SC_NPROCESSORS_ONLN); /* more processors than the set can name */
+    return online > 0 ? (unsigned)online : 1;
+}
+
+/* The resident peak ("high water mark") of this program's own image; 0 where the system does not tell. ru_maxrss would
+ * also count what a parent held before it became this program. */
+static uint64_t high_water_mark_bytes(void)
+{
+    char text[4096];
+    int descriptor = open("/proc/self/status", O_RDONLY | O_CLOEXEC);
+    if (descriptor < 0)
+        return 0;
+    ssize_t got = read(descriptor, text, sizeof text - 1);
+    close(descriptor);
+    if (got <= 0)
+        return 0;
+    text[got] = 0;
+    const char *line = strstr(text, "\nVmHWM:");
+    return line ? (uint64_t)strtoull(line + strlen("\nVmHWM:"), NULL, 10) << 10 : 0;
+}
+
+static uint64_t usage_peak_bytes(int who)
+{
+    struct rusage usage;
+    return getrusage(who, &usage) == 0 && usage.ru_maxrss > 0 ? (uint64_t)usage.ru_maxrss << 10 : 0;
+}
+
+uint64_t strl_process_peak_rss_bytes(void)
+{
+    uint64_t own = high_water_mark_bytes();
+    if (own == 0)
+        own = usage_peak_bytes(RUSAGE_SELF);
+    uint64_t children = usage_peak_bytes(RUSAGE_CHILDREN);
+    return own > children ? own : children;
+}
