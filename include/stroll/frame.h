@@ -1,0 +1,57 @@
+/* What a walk and a renderer share: camera and draw list. Types only. */
+#ifndef STROLL_FRAME_H
+#define STROLL_FRAME_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* A pinhole camera (fov_y_deg > 0) or an orthographic one (fov_y_deg = 0, ortho_height > 0). World units. */
+typedef struct strl_camera {
+    double eye[3];
+    double target[3];     /* looked at; differs from eye */
+    double up[3];         /* not parallel to the view direction; need not be orthogonal or unit */
+    double fov_y_deg;     /* full vertical angle, below 180 */
+    double ortho_height;  /* world units over the height of the image */
+    uint32_t width, height; /* pixels of the output: what a pixel error counts in */
+} strl_camera;
+
+/* A vertex as the GPU reads it: 20 bytes. */
+typedef struct strl_vertex {
+    int32_t position[3]; /* lattice units from the item's anchor */
+    uint16_t normal[2];  /* octahedral, 0..1023 each */
+    uint8_t rgba[4];     /* vertex colour x material colour, sRGB-encoded */
+} strl_vertex;
+
+/* One active node of one placement. All pointers are borrowed from the walk until its next frame. */
+typedef struct strl_draw_item {
+    uint64_t key;          /* (placement, node, load): equal keys have equal vertices */
+    uint32_t placement, node, level, group;
+    uint32_t state;        /* refinement step; the indices are a function of (key, state) */
+    bool visible;          /* intersects the view frustum (and is not known to be hidden) */
+    const strl_vertex *vertices;
+    uint32_t vertex_count;
+    const uint16_t *indices; /* 3 * triangle_count, of this state */
+    uint32_t index_count;
+    uint32_t dirty_first, dirty_count; /* indices that differ from the last frame's, where key was drawn there */
+    int64_t anchor[3];     /* lattice */
+    int64_t box_min[3], box_max[3]; /* lattice */
+    double origin[3], step; /* lattice cell c is the model point origin + step * c */
+    double transform[12];  /* model to world, row-major 3x4 */
+    float error;           /* claimed error of this state, model units */
+    float error_px;        /* the same in pixels */
+} strl_draw_item;
+
+typedef struct strl_draw_list {
+    const strl_draw_item *items;
+    uint32_t count;
+    double near_distance, far_distance; /* of the visible boxes along the view direction; > 0 */
+} strl_draw_list;
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,39 @@
+/* Pieces of the format that the walk fetches itself: treelets (pages of node records) and payload pages. Pure functions on
+ * bytes; thread-safe. */
+#ifndef STRL_CONTAINER_TREELET_H
+#define STRL_CONTAINER_TREELET_H
+
+#include "container/container.h"
+
+/* Where a treelet lies. A treelet names the treelets that hold the children of its nodes; the header names the first. */
+typedef struct strl_treelet_ref {
+    uint64_t offset;
+    uint32_t bytes;
+    uint64_t checksum;
+} strl_treelet_ref;
+
+typedef struct strl_treelet {
+    uint32_t first_node;  /* id of nodes[0] */
+    uint32_t node_count;
+    strl_node nodes[STRL_TREELET_NODES];
+    uint32_t first_child_treelet; /* index of the treelet that child_refs[0] names; STRL_NONE where there is none */
+    uint32_t child_ref_count;
+    strl_treelet_ref *child_refs; /* owned (strl__free) */
+} strl_treelet;
+
+strl_status strl_container_root_treelet(const strl_container *container, uint32_t tree, strl_treelet_ref *ref, strl_error *err);
+/* Checks the checksum and every field (ids against tree, ranges, finite and ordered errors, boxes). treelet is the caller's. */
+strl_status strl_treelet_decode(const strl_container *container, uint32_t tree, uint32_t index, const strl_treelet_ref *ref,
+                                const void *data, size_t size, strl_treelet *treelet, strl_error *err);
+void strl_treelet_deinit(strl_treelet *treelet);
+
+/* Checks a page's bytes against its reference. */
+strl_status strl_page_check(const strl_page_ref *ref, const void *data, size_t size, strl_error *err);
+/* Decodes one node's mesh from its page (already checked) and checks it against the record (counts, box, errors). */
+strl_status strl_page_mesh(const strl_node *record, const void *page, size_t size, strl_arena *arena, strl_pm *mesh,
+                           strl_error *err);
+/* Bytes that the decoded mesh of a node takes in a walk: vertices (20 B), indices of the finest state, parents, steps and corner lists.
+ * A pure function of the record's counts, used for budgets before anything is fetched. */
+uint64_t strl_node_decoded_bytes(const strl_node *record);
+
+#endif
