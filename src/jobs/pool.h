@@ -41,7 +41,8 @@ unsigned strl_pool_window(const strl_pool *pool, unsigned window);
 
 /* Fire and forget: run(context) on some worker, in order of submission; with 0 threads it waits for strl_pool_pump. */
 strl_status strl_pool_submit(strl_pool *pool, void (*run)(void *context), void *context, strl_error *err);
-/* Runs submitted jobs on the calling thread until none is left or budget_ns has passed. Returns how many ran. */
+/* Runs submitted jobs on the calling thread until none is left or budget_ns has passed (one runs in any case). Returns
+ * how many ran. */
 uint64_t strl_pool_pump(strl_pool *pool, uint64_t budget_ns);
 
 #endif
