@@ -1,0 +1,98 @@
+#include "progress.h"
+
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <unistd.h>
+
+#include "platform/thread.h"
+
+enum { BAR_MOST = 30, LINE_BYTES = 256, REDRAW_NS = 100000000 };
+
+/* 1234567 as "1.23 M". */
+static void format_amount(char text[16], double amount)
+{
+    static const char *const scales[] = {"", " K", " M", " G", " T"};
+    unsigned scale = 0;
+    while (amount >= 1000 && scale < 4) {
+        amount /= 1000;
+        scale++;
+    }
+    int digits = scale == 0 || amount >= 100 ? 0 : amount >= 10 ? 1 : 2;
+    snprintf(text, 16, "%.*f%s", digits, amount > 99999 ? 99999 : amount, scales[scale]);
+}
+
+static void format_time(char text[24], double seconds)
+{
+    unsigned whole = seconds < 359999 ? (unsigned)(seconds + 0.5) : 359999;
+    if (whole >= 3600)
+        snprintf(text, 24, "%u:%02u:%02u", whole / 3600, whole / 60 % 60, whole % 60);
+    else
+        snprintf(text, 24, "%u:%02u", whole / 60, whole % 60);
+}
+
+void strl_cli_progress_format(char *text, unsigned size, const char *stage, uint64_t done, uint64_t total,
+                              const char *unit, double seconds, unsigned columns)
+{
+    char amount[16], rate[16], left[24] = "";
+    char bar[BAR_MOST + 1] = "";
+    format_amount(amount, (double)done);
+    format_amount(rate, seconds > 0 ? (double)done / seconds : 0);
+    if (total == 0) {
+        snprintf(text, size, "%s  %s %s  %s/s", stage, amount, unit, rate);
+    } else {
+        double share = done < total ? (double)done / (double)total : 1;
+        memset(bar, '-', BAR_MOST);
+        memset(bar, '#', (size_t)(share * BAR_MOST));
+        if (done > 0)
+            format_time(left, seconds * (1 - share) / share);
+        snprintf(text, size, "%-12s [%s] %3.0f %%  %s %s/s%s%s", stage, bar, share * 100, rate, unit,
+                 *left ? "  left " : "", left);
+    }
+    if (strlen(text) > columns)
+        text[columns] = '\0';
+}
+
+static unsigned terminal_columns(void)
+{
+    struct winsize window = {0};
+    bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &window) == 0 && window.ws_col > 1;
+    return known ? window.ws_col - 1u : 79u;
+}
+
+void strl_cli_progress_init(strl_cli_progress *progress, bool quiet)
+{
+    *progress = (strl_cli_progress){.shown = !quiet && isatty(STDERR_FILENO)};
+}
+
+void strl_cli_progress_update(strl_cli_progress *progress, const char *stage, uint64_t done, uint64_t total,
+                              const char *unit)
+{
+    if (!progress->shown)
+        return;
+    uint64_t now_ns = strl_clock_ns();
+    if (!progress->stage || strcmp(progress->stage, stage)) {
+        progress->stage = stage;
+        progress->unit = unit;
+        progress->start_ns = now_ns;
+        progress->last_ns = 0;
+    }
+    if (now_ns - progress->last_ns < REDRAW_NS)
+        return;
+    char line[LINE_BYTES];
+    double seconds = (double)(now_ns - progress->start_ns) * 1e-9;
+    strl_cli_progress_format(line, sizeof line, stage, done, total, unit, seconds, terminal_columns());
+    fprintf(stderr, "\r\033[K%s", line);
+    fflush(stderr);
+    progress->last_ns = now_ns;
+    progress->drawn = true;
+}
+
+void strl_cli_progress_end(strl_cli_progress *progress)
+{
+    if (progress->drawn)
+        fprintf(stderr, "\r\033[K");
+    progress->drawn = false;
+    progress->stage = NULL;
+}
