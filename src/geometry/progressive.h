@@ -9,7 +9,7 @@
  * `triangle` holds the corners of the finest state. A corner c in state s is
  *     resolve(c, s) = c < vertex_end[s] ? c : resolve(parent[c], s)
  * and parent[c] < the first vertex of c's step. In state s every triangle t < triangle_end[s] has three corners at
- * three different positions.
+ * three different positions, and each triangle of a step has a vertex of that step for a corner.
  *
  * Errors are lengths in lattice units, never increasing with s: geometric_error[s] bounds the two-sided distance between state
  * s and the input surface (quantisation included), appearance_error[s] how far a feature of colour or normal may have moved. */
@@ -18,10 +18,17 @@
 
 #include <stdint.h>
 
+#include "stroll/error.h"
+
 /* Most vertices of a node's finest state: indices are 16 bits on the GPU. */
 #define STRL_PM_MAX_VERTICES 65535u
 #define STRL_PM_MAX_TRIANGLES 131072u
 #define STRL_PM_MAX_PALETTE 65535u
+/* Largest error, in lattice units. */
+#define STRL_PM_MAX_ERROR 0x1p64f
+/* Limit of the work of refining: the sum, over all vertices that steps add, of the triangles at the parent just before. A step
+ * moves some of these corners; only a vertex shared by very many triangles comes near. */
+#define STRL_PM_MAX_MOVES (1u << 26)
 
 /* What a vertex's palette index stands for. */
 typedef struct strl_palette_entry {
@@ -47,5 +54,10 @@ typedef struct strl_pm {
     float *appearance_error; /* [step_count + 1], never increasing */
     strl_palette_entry *palette; /* [palette_count] */
 } strl_pm;
+
+/* Checks every invariant that this file states (of the limit of moves only the moved corners): counts, order, errors, indices,
+ * one position per step, no degenerate triangle in any state, each step's triangles hold one of its vertices. Allocates nothing.
+ * Time is bounded by the limits above. */
+strl_status strl_pm_check(const strl_pm *pm, strl_error *err);
 
 #endif
