@@ -21,10 +21,16 @@ typedef struct strl_camera {
 
 /* A vertex as the GPU reads it: 20 bytes. */
 typedef struct strl_vertex {
-    int32_t position[3]; /* lattice units from the item's anchor */
+    int32_t position[3]; /* lattice units from the item's anchor; see strl_positions */
     uint16_t normal[2];  /* octahedral, 0..1023 each */
     uint8_t rgba[4];     /* vertex colour x material colour, sRGB-encoded */
 } strl_vertex;
+
+/* What strl_vertex.position holds. A walk gives lattice positions only; floats are for triangles drawn as read. */
+typedef enum strl_positions {
+    STRL_POSITIONS_LATTICE = 0,
+    STRL_POSITIONS_FLOAT /* the bits of three floats, model units from the item's origin; anchor, box and step are unused */
+} strl_positions;
 
 /* One active node of one placement. All pointers are borrowed from the walk until its next frame. */
 typedef struct strl_draw_item {
@@ -36,7 +42,8 @@ typedef struct strl_draw_item {
     uint32_t vertex_count;
     const uint16_t *indices; /* 3 * triangle_count, of this state */
     uint32_t index_count;
-    uint32_t dirty_first, dirty_count; /* indices that differ from the last frame's, where key was drawn there */
+    uint32_t dirty_first, dirty_count; /* indices that may differ from the list of frame - 1, where key is in that one */
+    strl_positions positions;
     int64_t anchor[3];     /* lattice */
     int64_t box_min[3], box_max[3]; /* lattice */
     double origin[3], step; /* lattice cell c is the model point origin + step * c */
@@ -49,6 +56,7 @@ typedef struct strl_draw_list {
     const strl_draw_item *items;
     uint32_t count;
     double near_distance, far_distance; /* of the visible boxes along the view direction; > 0 */
+    uint64_t frame; /* counts the lists of one walk from 1; 0 = unknown: dirty ranges are then not used */
 } strl_draw_list;
 
 #ifdef __cplusplus
