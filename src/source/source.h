@@ -36,11 +36,13 @@ struct strl_source {
 };
 
 /* Queues a read of [offset, offset + size); higher urgency is served first. The answer comes from strl_source_poll, also
- * for a cancelled or failed read (status CANCELLED, IO, ...): exactly one answer per accepted submit. */
+ * for a cancelled or failed read (status CANCELLED, IO, ...): exactly one answer per accepted submit. A range outside the
+ * source is not accepted (STRL_ERR_FORMAT). */
 strl_status strl_source_submit(strl_source *source, uint64_t token, uint64_t offset, size_t size, float urgency,
                                strl_error *err);
 /* Takes one finished read, if there is one. Never waits. */
 bool strl_source_poll(strl_source *source, strl_source_result *result);
+/* Reads of this token that have not begun are answered as CANCELLED; one under way is answered as it ends. */
 void strl_source_cancel(strl_source *source, uint64_t token);
 /* Reads and waits: for opening a container and for tools, never for a frame. */
 strl_status strl_source_read(strl_source *source, uint64_t offset, void *data, size_t size, strl_error *err);
@@ -50,8 +52,9 @@ void strl_source_close(strl_source *source); /* NULL is legal; unanswered reads 
 strl_status strl_source_open_file(const char *path, unsigned threads, strl_source **source, strl_error *err);
 /* Bytes in memory, borrowed for the life of the source. Reads are answered by the next poll. */
 strl_status strl_source_open_memory(const void *data, size_t size, strl_source **source, strl_error *err);
-/* Wraps another source (owned from then on) and holds each answer back for delay_ns. strl_source_read is not delayed.
- * fail_every: every n-th answer is a failure (0 = none). For tests and for looking at latency by hand. */
+/* Wraps another source (owned from then on; still the caller's on failure) and holds each answer back until delay_ns after
+ * its submit. strl_source_read is not delayed. fail_every: every n-th answer is a failure (0 = none). For tests and for
+ * looking at latency by hand. */
 strl_status strl_source_open_delayed(strl_source *inner, uint64_t delay_ns, unsigned fail_every, strl_source **source,
                                      strl_error *err);
 

@@ -1,0 +1,42 @@
+/* The part all sources share: every range is checked here, once, so that a class never sees one outside the object. */
+#include "source/source.h"
+
+#include <inttypes.h>
+
+#include "base/fail.h"
+
+static strl_status check_range(const strl_source *source, uint64_t offset, size_t size, strl_error *err)
+{
+    if (offset <= source->bytes && size <= source->bytes - offset)
+        return STRL_OK;
+    return strl__fail(err, STRL_ERR_FORMAT,
+                      "%zu bytes at byte %" PRIu64 " lie past the end of the %s source (%" PRIu64 " bytes)", size, offset,
+                      source->klass->kind, source->bytes);
+}
+
+strl_status strl_source_submit(strl_source *source, uint64_t token, uint64_t offset, size_t size, float urgency,
+                               strl_error *err)
+{
+    strl_status status = check_range(source, offset, size, err);
+    return status == STRL_OK ? source->klass->submit(source, token, offset, size, urgency, err) : status;
+}
+
+bool strl_source_poll(strl_source *source, strl_source_result *result)
+{
+    *result = (strl_source_result){0};
+    return source->klass->poll(source, result);
+}
+
+void strl_source_cancel(strl_source *source, uint64_t token) { source->klass->cancel(source, token); }
+
+strl_status strl_source_read(strl_source *source, uint64_t offset, void *data, size_t size, strl_error *err)
+{
+    strl_status status = check_range(source, offset, size, err);
+    return status == STRL_OK ? source->klass->read(source, offset, data, size, err) : status;
+}
+
+void strl_source_close(strl_source *source)
+{
+    if (source)
+        source->klass->close(source);
+}
