@@ -1,0 +1,157 @@
+#!/usr/bin/env python3
+"""Runs the whole suite: what `make test` does once the packages are there.
+
+Four stages: the suite as gcc builds it with warnings as errors; the suite under AddressSanitizer and UBSan; the tests of
+threaded modules under ThreadSanitizer; a build by clang as a compile check. Every stage runs, whatever became of the one
+before it. The last line counts all of them: "N passed, N failed, N skipped".
+
+    tools/run_tests.py [STAGE...] [--jobs N] [--only REGEX]       stages: gcc asan tsan clang
+"""
+import argparse
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as ElementTree
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+BUILD = ROOT / "build"
+
+# Folders of tests/ whose modules start threads or are called from several; none of them needs a GL driver, whose own
+# threads ThreadSanitizer cannot see into.
+THREADED_AREAS = ("platform", "jobs", "store", "source", "container", "build", "walk", "verify")
+
+STAGES = {
+    "gcc": ("dev", "gcc", "g++", {}),
+    "asan": ("asan", "gcc", "g++", {"ASAN_OPTIONS": "allocator_may_return_null=1",
+                                    "UBSAN_OPTIONS": "print_stacktrace=1"}),
+    "tsan": ("tsan", "gcc", "g++", {"TSAN_OPTIONS": "halt_on_error=1:second_deadlock_stack=1"}),
+    "clang": ("dev", "clang", "clang++", {}),
+}
+FOLDERS = {"gcc": "test", "asan": "asan", "tsan": "tsan", "clang": "clang"}
+
+
+class Counts:
+    def __init__(self):
+        self.passed = self.failed = self.skipped = 0
+
+    def add(self, other):
+        self.passed += other.passed
+        self.failed += other.failed
+        self.skipped += other.skipped
+
+    def __str__(self):
+        return f"{self.passed} passed, {self.failed} failed, {self.skipped} skipped"
+
+
+def run(command, environment=None):
+    return subprocess.run(command, cwd=ROOT, env={**os.environ, **(environment or {})}).returncode == 0
+
+
+def threaded_tests():
+    return sorted(path.stem for area in THREADED_AREAS for path in (ROOT / "tests" / area).glob("test_*.c"))
+
+
+def without_address_randomisation():
+    """ThreadSanitizer of gcc 12 does not start where the kernel randomises more bits than it expects."""
+    command = ["setarch", "-R"]
+    try:
+        works = subprocess.run(command + ["true"], stderr=subprocess.DEVNULL).returncode == 0
+    except FileNotFoundError:
+        works = False
+    return command if works else []
+
+
+def build(stage, jobs, targets):
+    preset, c_compiler, cxx_compiler, _ = STAGES[stage]
+    folder = BUILD / FOLDERS[stage]
+    configure = ["cmake", "--preset", preset, "-B", str(folder), "--log-level=WARNING",
+                 f"-DCMAKE_C_COMPILER={c_compiler}", f"-DCMAKE_CXX_COMPILER={cxx_compiler}"]
+    command = ["cmake", "--build", str(folder), "-j", str(jobs)]
+    if targets:
+        command += ["--target", *targets]
+    return run(configure) and run(command)
+
+
+def count_case(case):
+    """One ctest entry is one program; a cmocka program says what became of each of its tests."""
+    counts = Counts()
+    status = case.get("status", "run")
+    output = case.findtext("system-out") or ""
+    failed = case.find("failure") is not None or status == "fail"
+    if status in ("notrun", "disabled") or case.find("skipped") is not None:
+        counts.skipped = 1
+        return counts
+    counts.passed = len(re.findall(r"^\[ +OK \]", output, re.M))
+    counts.failed = len(set(re.findall(r"^\[  (?:FAILED|ERROR)  *\] (?:--- )?(\w+)$", output, re.M)))
+    counts.skipped = len(set(re.findall(r"^\[  SKIPPED \] (\w+)$", output, re.M)))
+    if failed and counts.failed == 0:
+        counts.failed = 1
+    if not failed and counts.passed + counts.skipped == 0:
+        counts.passed = 1
+    return counts
+
+
+def test(stage, jobs, only):
+    folder = BUILD / FOLDERS[stage]
+    report = folder / "junit.xml"
+    report.unlink(missing_ok=True)
+    prefix = without_address_randomisation() if stage == "tsan" else []
+    command = prefix + ["ctest", "--test-dir", str(folder), "-j", str(jobs), "--output-on-failure", "--no-tests=error",
+                        "--test-output-size-passed", "4000000", "--test-output-size-failed", "4000000",
+                        "--output-junit", str(report)]
+    if only:
+        command += ["-R", only]
+    good = run(command, STAGES[stage][3])
+    counts = Counts()
+    if report.exists():
+        for case in ElementTree.parse(report).getroot().iter("testcase"):
+            counts.add(count_case(case))
+    if not good and counts.failed == 0:
+        counts.failed = 1
+    return counts
+
+
+def run_stage(stage, options):
+    targets, only = [], options.only
+    if stage == "tsan":
+        targets = threaded_tests()
+        if not targets:
+            return Counts()
+        only = only or "^(" + "|".join(targets) + ")$"
+    counts = Counts()
+    if not build(stage, options.jobs, targets):
+        print(f"run_tests: the build of stage {stage} failed", file=sys.stderr)
+        counts.failed = 1
+    elif stage == "clang":
+        counts.passed = 1
+    else:
+        counts = test(stage, options.jobs, only)
+    return counts
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Runs the whole suite.")
+    parser.add_argument("stages", nargs="*", metavar="STAGE", help="gcc, asan, tsan, clang; default: all")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--only", help="a regular expression on the tests' names")
+    options = parser.parse_args()
+    for stage in options.stages:
+        if stage not in STAGES:
+            parser.error(f"there is no stage {stage}")
+    total, lines = Counts(), []
+    for stage in options.stages or list(STAGES):
+        print(f"==== {stage}", flush=True)
+        start = time.monotonic()
+        counts = run_stage(stage, options)
+        total.add(counts)
+        lines.append(f"{stage:6} {counts}  ({time.monotonic() - start:.0f} s)")
+    print("\n".join(["====", *lines]))
+    print(total)
+    return 1 if total.failed or total.passed == 0 else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
