@@ -1,0 +1,315 @@
+#include "geometry/simplify.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "geometry/octahedral.h"
+#include "geometry/simplify_plan.h"
+
+static void heap_place(simplifier *s, uint32_t at, uint32_t point)
+{
+    s->heap[at] = point;
+    s->heap_at[point] = at;
+}
+
+/* Ties are broken by index, so that the order does not depend on the heap's history. */
+static bool before(const simplifier *s, uint32_t a, uint32_t b)
+{
+    return s->key[a] < s->key[b] || (s->key[a] == s->key[b] && a < b);
+}
+
+static void heap_up(simplifier *s, uint32_t at)
+{
+    uint32_t point = s->heap[at];
+    while (at > 0 && before(s, point, s->heap[(at - 1) / 2])) {
+        heap_place(s, at, s->heap[(at - 1) / 2]);
+        at = (at - 1) / 2;
+    }
+    heap_place(s, at, point);
+}
+
+static void heap_down(simplifier *s, uint32_t at)
+{
+    uint32_t point = s->heap[at];
+    for (;;) {
+        uint32_t child = 2 * at + 1;
+        if (child >= s->heap_count)
+            break;
+        if (child + 1 < s->heap_count && before(s, s->heap[child + 1], s->heap[child]))
+            child++;
+        if (!before(s, s->heap[child], point))
+            break;
+        heap_place(s, at, s->heap[child]);
+        at = child;
+    }
+    heap_place(s, at, point);
+}
+
+static void heap_push(simplifier *s, uint32_t point, float key)
+{
+    s->key[point] = key;
+    s->heap[s->heap_count] = point;
+    heap_up(s, s->heap_count++);
+}
+
+static void heap_remove(simplifier *s, uint32_t point)
+{
+    uint32_t at = s->heap_at[point];
+    if (at == NO_INDEX)
+        return;
+    s->heap_at[point] = NO_INDEX;
+    uint32_t last = s->heap[--s->heap_count];
+    if (last == point)
+        return;
+    heap_place(s, at, last);
+    heap_up(s, at);
+    heap_down(s, s->heap_at[last]);
+}
+
+/* Face planes weighted by area, and for every edge of odd use a plane across it, so that rims keep their shape. */
+static void add_triangle_quadrics(simplifier *s, uint32_t t)
+{
+    uint32_t point[3];
+    double e[3][3], n[3];
+    for (unsigned c = 0; c < 3; c++)
+        point[c] = strl__corner_point(s, t, c);
+    for (unsigned c = 0; c < 3; c++)
+        for (int k = 0; k < 3; k++)
+            e[c][k] = s->position[point[(c + 1) % 3]][k] - s->position[point[c]][k];
+    n[0] = e[0][1] * e[1][2] - e[0][2] * e[1][1];
+    n[1] = e[0][2] * e[1][0] - e[0][0] * e[1][2];
+    n[2] = e[0][0] * e[1][1] - e[0][1] * e[1][0];
+    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    if (!(length > 0))
+        return;
+    for (int k = 0; k < 3; k++)
+        n[k] /= length;
+    for (unsigned c = 0; c < 3; c++)
+        strl__quadric_add_plane(&s->quadrics[point[c]], n, s->position[point[c]], length * 0.5);
+}
+
+static void add_rim_quadrics(simplifier *s, uint32_t point)
+{
+    strl_star star;
+    if ((s->mesh->flags[point] & STRL_POINT_KEPT) || !strl__star_gather(s, point, &star) || !star.on_boundary)
+        return;
+    for (uint32_t i = 0; i < star.count; i++)
+        for (int side = 0; side < 2; side++) {
+            uint32_t other = side ? star.previous[i] : star.next[i], third = side ? star.next[i] : star.previous[i];
+            if (!(strl__star_uses(&star, other) & 1))
+                continue;
+            const double *u = s->position[point], *v = s->position[other], *w = s->position[third];
+            double edge[3], to_third[3], along = 0, length2 = 0, across2 = 0;
+            for (int k = 0; k < 3; k++) {
+                edge[k] = v[k] - u[k];
+                to_third[k] = w[k] - u[k];
+                length2 += edge[k] * edge[k];
+                along += edge[k] * to_third[k];
+            }
+            for (int k = 0; k < 3; k++) {
+                to_third[k] -= edge[k] * along / length2;
+                across2 += to_third[k] * to_third[k];
+            }
+            if (!(across2 > 0))
+                continue;
+            for (int k = 0; k < 3; k++)
+                to_third[k] /= sqrt(across2);
+            strl__quadric_add_plane(&s->quadrics[point], to_third, u, length2);
+        }
+}
+
+static bool allocate(simplifier *s, const strl_mesh *mesh, strl_arena *arena)
+{
+    uint32_t points = mesh->point_count, triangles = mesh->triangle_count;
+    s->position = strl_arena_alloc(arena, points, sizeof *s->position);
+    s->normal = strl_arena_alloc(arena, mesh->wedge_count, sizeof *s->normal);
+    s->colour = strl_arena_alloc(arena, mesh->wedge_count, sizeof *s->colour);
+    s->quadrics = strl_arena_alloc_zero(arena, points, sizeof *s->quadrics);
+    s->corner_next = strl_arena_alloc(arena, (size_t)triangles * 3, sizeof *s->corner_next);
+    s->head = strl_arena_alloc(arena, points, sizeof *s->head);
+    s->tail = strl_arena_alloc(arena, points, sizeof *s->tail);
+    s->dead = strl_arena_alloc_zero(arena, triangles, sizeof *s->dead);
+    s->stamp = strl_arena_alloc_zero(arena, points, sizeof *s->stamp);
+    s->heap = strl_arena_alloc(arena, points, sizeof *s->heap);
+    s->heap_at = strl_arena_alloc(arena, points, sizeof *s->heap_at);
+    s->key = strl_arena_alloc(arena, points, sizeof *s->key);
+    s->target = strl_arena_alloc(arena, points, sizeof *s->target);
+    s->stale = strl_arena_alloc_zero(arena, points, sizeof *s->stale);
+    return s->position && s->normal && s->colour && s->quadrics && s->corner_next && s->head && s->tail && s->dead &&
+           s->stamp && s->heap && s->heap_at && s->key && s->target && s->stale;
+}
+
+static bool allocate_result(simplifier *s, strl_simplified *result, strl_arena *arena)
+{
+    const strl_mesh *mesh = s->mesh;
+    uint32_t triangles = mesh->triangle_count;
+    result->collapses = strl_arena_alloc(arena, mesh->point_count, sizeof *result->collapses);
+    result->wedge_parent = strl_arena_alloc(arena, mesh->wedge_count, sizeof *result->wedge_parent);
+    result->removed_at = strl_arena_alloc(arena, triangles, sizeof *result->removed_at);
+    result->corner = s->corner = strl_arena_alloc(arena, triangles, sizeof *s->corner);
+    result->error = s->error = strl_arena_alloc(arena, triangles, sizeof *s->error);
+    result->deviation = s->deviation = strl_arena_alloc(arena, triangles, sizeof *s->deviation);
+    result->shift = s->shift = strl_arena_alloc(arena, triangles, sizeof *s->shift);
+    return result->collapses && result->wedge_parent && result->removed_at && s->corner && s->error && s->deviation &&
+           s->shift;
+}
+
+static void load(simplifier *s, strl_simplified *result)
+{
+    const strl_mesh *mesh = s->mesh;
+    for (uint32_t p = 0; p < mesh->point_count; p++) {
+        for (int k = 0; k < 3; k++)
+            s->position[p][k] = mesh->position[p][k];
+        s->head[p] = s->tail[p] = s->heap_at[p] = NO_INDEX;
+    }
+    for (uint32_t w = 0; w < mesh->wedge_count; w++) {
+        strl_oct_decode(mesh->wedge[w].normal, s->normal[w]);
+        for (int k = 0; k < 3; k++)
+            s->colour[w][k] = (float)(mesh->wedge[w].colour >> (8 * k) & 255) / 255.f;
+        result->wedge_parent[w] = w;
+    }
+    for (uint32_t t = 0; t < mesh->triangle_count; t++) {
+        for (unsigned c = 0; c < 3; c++) {
+            s->corner[t][c] = mesh->triangle[t][c];
+            uint32_t p = mesh->wedge[mesh->triangle[t][c]].point, corner = 3 * t + c;
+            s->corner_next[corner] = NO_INDEX;
+            if (s->head[p] == NO_INDEX)
+                s->head[p] = corner;
+            else
+                s->corner_next[s->tail[p]] = corner;
+            s->tail[p] = corner;
+        }
+        s->error[t] = mesh->error[t];
+        s->deviation[t] = mesh->deviation[t];
+        s->shift[t] = mesh->shift[t];
+        result->removed_at[t] = UINT32_MAX;
+        result->geometric = fmaxf(result->geometric, mesh->error[t]);
+        result->appearance = fmaxf(result->appearance, mesh->shift[t]);
+    }
+    s->triangles_left = mesh->triangle_count;
+    for (uint32_t t = 0; t < mesh->triangle_count; t++)
+        add_triangle_quadrics(s, t);
+    for (uint32_t p = 0; p < mesh->point_count; p++)
+        add_rim_quadrics(s, p);
+}
+
+/* Where every wedge of u goes. At most STAR_MAX of them. */
+static void map_wedges(simplifier *s, const strl_star *star, uint32_t to, strl_simplified *result)
+{
+    strl_star *v_star = NULL, storage;
+    for (uint32_t i = 0; i < star->count; i++) {
+        uint32_t wedge = s->corner[star->triangle[i]][star->corner[i]];
+        if (result->wedge_parent[wedge] != wedge)
+            continue;
+        bool exact;
+        uint32_t target = strl__wedge_target(s, star, NULL, to, wedge, &exact);
+        if (!exact) {
+            if (!v_star && strl__star_gather(s, to, &storage))
+                v_star = &storage;
+            target = strl__wedge_target(s, star, v_star, to, wedge, &exact);
+        }
+        result->wedge_parent[wedge] = target;
+    }
+}
+
+void strl__apply_collapse(simplifier *s, const strl_star *star, const collapse_plan *plan, strl_simplified *result)
+{
+    uint32_t u = star->point, v = plan->to;
+    map_wedges(s, star, v, result);
+    for (uint32_t i = 0; i < star->count; i++) {
+        uint32_t t = star->triangle[i];
+        if (star->next[i] == v || star->previous[i] == v) {
+            s->dead[t] = true;
+            result->removed_at[t] = result->collapse_count;
+            s->triangles_left--;
+            continue;
+        }
+        s->corner[t][star->corner[i]] = result->wedge_parent[s->corner[t][star->corner[i]]];
+        s->error[t] = plan->geometric;
+        s->deviation[t] = plan->deviation;
+        s->shift[t] = plan->shift;
+    }
+    if (s->head[u] != NO_INDEX) {
+        if (s->head[v] == NO_INDEX)
+            s->head[v] = s->head[u];
+        else
+            s->corner_next[s->tail[v]] = s->head[u];
+        s->tail[v] = s->tail[u];
+        s->head[u] = s->tail[u] = NO_INDEX;
+    }
+    strl__quadric_add(&s->quadrics[v], &s->quadrics[u]);
+    result->geometric = fmaxf(result->geometric, plan->geometric);
+    result->appearance = fmaxf(result->appearance, plan->shift);
+    result->collapses[result->collapse_count++] =
+        (strl_collapse){u, v, s->triangles_left, result->geometric, result->appearance};
+    if (s->rung > result->rung)
+        result->rung = s->rung;
+}
+
+/* The patch round v looks different now: its points are planned again when they come up. */
+static void mark_stale(simplifier *s, uint32_t point, float key)
+{
+    if (s->mesh->flags[point] & STRL_POINT_KEPT)
+        return;
+    s->stale[point] = true;
+    if (s->heap_at[point] == NO_INDEX)
+        heap_push(s, point, key);
+}
+
+static void plan_and_push(simplifier *s, uint32_t point)
+{
+    collapse_plan plan;
+    s->stale[point] = false;
+    if (!strl__plan_best(s, point, &plan))
+        return;
+    s->target[point] = plan.to;
+    heap_push(s, point, plan.key);
+}
+
+static void run_rung(simplifier *s, strl_simplified *result)
+{
+    for (uint32_t p = 0; p < s->mesh->point_count; p++)
+        if (!(s->mesh->flags[p] & STRL_POINT_KEPT) && s->head[p] != NO_INDEX && s->heap_at[p] == NO_INDEX)
+            plan_and_push(s, p);
+    while (s->heap_count && s->triangles_left > s->desc->target_triangles) {
+        uint32_t point = s->heap[0];
+        if (s->key[point] > s->desc->error_limit)
+            break;
+        heap_remove(s, point);
+        if (s->stale[point]) {
+            plan_and_push(s, point);
+            continue;
+        }
+        strl_star star;
+        collapse_plan plan;
+        if (!strl__star_gather(s, point, &star) || star.count == 0)
+            continue;
+        strl__plan_collapse(s, &star, s->target[point], &plan);
+        strl__apply_collapse(s, &star, &plan, result);
+        for (uint32_t i = 0; i < star.neighbour_count; i++)
+            mark_stale(s, star.neighbour[i], plan.key);
+    }
+    while (s->heap_count)
+        heap_remove(s, s->heap[s->heap_count - 1]);
+}
+
+strl_status strl_simplify(const strl_mesh *mesh, const strl_simplify_desc *desc, strl_arena *arena,
+                          strl_simplified *result, strl_error *err)
+{
+    simplifier s = {.mesh = mesh, .desc = desc};
+    *result = (strl_simplified){0};
+    if (!allocate_result(&s, result, arena) || !allocate(&s, mesh, arena))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory to simplify %u triangles", mesh->triangle_count);
+    load(&s, result);
+    for (int rung = STRL_SIMPLIFY_TOPOLOGY; rung <= (int)desc->last_rung && rung <= STRL_SIMPLIFY_SEAMS; rung++) {
+        s.rung = (strl_simplify_rung)rung;
+        if (s.triangles_left > desc->target_triangles)
+            run_rung(&s, result);
+    }
+    if (s.triangles_left > desc->target_triangles && desc->last_rung >= STRL_SIMPLIFY_DISJOINT)
+        if (!strl__simplify_clustering(&s, arena, result))
+            return strl__fail(err, STRL_ERR_MEMORY, "no memory to simplify %u triangles", mesh->triangle_count);
+    result->triangles_left = s.triangles_left;
+    return STRL_OK;
+}

@@ -1,0 +1,55 @@
+/* Half-edge collapses in the order of the error that they would make claimable (Garland and Heckbert 1997 for the choice of
+ * the target vertex; Cohen, Manocha and Olano 1997, successive mappings, for the bound).
+ *
+ * Every collapse u -> v carries a local bound of the two-sided distance between the patch before and after. Where both
+ * patches are height fields over one polygon along the patch's normal, the bound is their largest difference in height, which
+ * is attained at u or where an old spoke crosses a new one; everywhere, |u - v| is a bound too, because moving u linearly
+ * onto v maps the old patch onto the new one. A triangle's error is the largest error of the triangles it replaces plus the bound,
+ * so it bounds the distance to the surface that the errors at the start referred to. */
+#ifndef STRL_GEOMETRY_SIMPLIFY_H
+#define STRL_GEOMETRY_SIMPLIFY_H
+
+#include "base/memory.h"
+#include "geometry/mesh.h"
+#include "stroll/error.h"
+
+/* The ladder: what a collapse may do. Each rung allows all that those before it allow. */
+typedef enum strl_simplify_rung {
+    STRL_SIMPLIFY_TOPOLOGY,   /* manifold stays manifold, seams collapse only along themselves */
+    STRL_SIMPLIFY_SEAMS,      /* seams may end, non-manifold fans may collapse */
+    STRL_SIMPLIFY_DISJOINT,   /* points of different components may merge without an edge between them */
+    STRL_SIMPLIFY_CLUSTERING  /* any two points of one cell of a growing grid may merge */
+} strl_simplify_rung;
+
+typedef struct strl_simplify_desc {
+    uint32_t target_triangles;  /* stop at this many or fewer */
+    float error_limit;          /* stop before a collapse whose error would pass this; lattice units; INFINITY = none */
+    strl_simplify_rung last_rung; /* go no further down the ladder */
+    float normal_weight;        /* attribute deviation of a normal that turned by one radian */
+    float colour_weight;        /* the same of black to white */
+} strl_simplify_desc;
+
+typedef struct strl_collapse {
+    uint32_t from, to;      /* points */
+    uint32_t triangles_left; /* after this collapse */
+    float geometric, appearance; /* largest error of any triangle so far, never decreasing; lattice units */
+} strl_collapse;
+
+/* What simplification did. Arrays live in the arena given. */
+typedef struct strl_simplified {
+    uint32_t collapse_count;
+    strl_collapse *collapses;    /* [collapse_count] in order */
+    uint32_t *wedge_parent;      /* [wedge_count] the wedge that a removed one fell onto; itself where it was kept */
+    uint32_t *removed_at;        /* [triangle_count] index of the collapse that removed it; UINT32_MAX = still there */
+    uint32_t (*corner)[3];       /* [triangle_count] current wedges of the triangles still there */
+    float *error, *deviation, *shift; /* [triangle_count] of the triangles still there, as in strl_mesh */
+    uint32_t triangles_left;
+    float geometric, appearance; /* largest over the triangles, at the end; at the start where nothing collapsed */
+    strl_simplify_rung rung;     /* the furthest rung a collapse needed */
+} strl_simplified;
+
+/* Collapses points of `mesh` that are not STRL_POINT_KEPT. Deterministic. The mesh itself is not changed; results are allocated from `arena`. */
+strl_status strl_simplify(const strl_mesh *mesh, const strl_simplify_desc *desc, strl_arena *arena, strl_simplified *result,
+                          strl_error *err);
+
+#endif

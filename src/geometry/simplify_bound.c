@@ -1,0 +1,236 @@
+/* The bound of one collapse (geometry/simplify.h says why it is one). All in double: lattice offsets of a node are below 2^31,
+ * so products of two are exact to a relative 2^-52. */
+#include <math.h>
+
+#include "geometry/simplify_star.h"
+
+/* A point of the patch, relative to v: two coordinates across the normal, one along it. */
+typedef struct flat {
+    double s, t, h;
+} flat;
+
+static double cross2(double as, double at, double bs, double bt)
+{
+    return as * bt - at * bs;
+}
+
+static double distance(const double a[3], const double b[3])
+{
+    double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return sqrt(x * x + y * y + z * z);
+}
+
+/* The closed polygon round u: x[0..count), where count = triangles for a closed fan, triangles + 1 for an open one. */
+typedef struct polygon {
+    uint32_t count;
+    uint32_t v_at;               /* index of v in the polygon */
+    flat x[STAR_MAX + 1];
+    flat u;                      /* u, or its nearest point on the new boundary edge */
+    double moved;                /* |u - that point|; 0 for a closed fan */
+} polygon;
+
+static bool frame_of(const simplifier *s, const uint32_t *ring, uint32_t count, const double *v,
+                     double axis[3][3])
+{
+    double n[3] = {0, 0, 0};
+    for (uint32_t i = 0; i < count; i++) {
+        const double *a = s->position[ring[i]], *b = s->position[ring[i + 1 == count ? 0 : i + 1]];
+        double ax = a[0] - v[0], ay = a[1] - v[1], az = a[2] - v[2];
+        double bx = b[0] - v[0], by = b[1] - v[1], bz = b[2] - v[2];
+        n[0] += ay * bz - az * by;
+        n[1] += az * bx - ax * bz;
+        n[2] += ax * by - ay * bx;
+    }
+    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    if (!(length > 0))
+        return false;
+    for (int i = 0; i < 3; i++)
+        axis[2][i] = n[i] / length;
+    int least = fabs(n[0]) < fabs(n[1]) ? (fabs(n[0]) < fabs(n[2]) ? 0 : 2) : (fabs(n[1]) < fabs(n[2]) ? 1 : 2);
+    double e[3] = {0, 0, 0};
+    e[least] = 1;
+    const double *w = axis[2];
+    double p[3] = {w[1] * e[2] - w[2] * e[1], w[2] * e[0] - w[0] * e[2], w[0] * e[1] - w[1] * e[0]};
+    double scale = 1 / sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);
+    for (int i = 0; i < 3; i++)
+        axis[0][i] = p[i] * scale;
+    axis[1][0] = w[1] * axis[0][2] - w[2] * axis[0][1];
+    axis[1][1] = w[2] * axis[0][0] - w[0] * axis[0][2];
+    axis[1][2] = w[0] * axis[0][1] - w[1] * axis[0][0];
+    return true;
+}
+
+static flat flatten(const double p[3], const double v[3], double axis[3][3])
+{
+    double d[3] = {p[0] - v[0], p[1] - v[1], p[2] - v[2]};
+    return (flat){d[0] * axis[0][0] + d[1] * axis[0][1] + d[2] * axis[0][2],
+                  d[0] * axis[1][0] + d[1] * axis[1][1] + d[2] * axis[1][2],
+                  d[0] * axis[2][0] + d[1] * axis[2][1] + d[2] * axis[2][2]};
+}
+
+static bool build_patch(const simplifier *s, const strl_star *star, uint32_t to, polygon *patch)
+{
+    uint32_t ring[STAR_MAX + 1];
+    uint32_t count = star->count;
+    for (uint32_t i = 0; i < star->count; i++)
+        ring[i] = star->next[star->order[i]];
+    if (!star->closed)
+        ring[count++] = star->previous[star->order[star->count - 1]];
+    patch->count = count;
+    patch->v_at = NO_INDEX;
+    for (uint32_t i = 0; i < count; i++)
+        if (ring[i] == to)
+            patch->v_at = i;
+    if (patch->v_at == NO_INDEX || (!star->closed && patch->v_at != 0 && patch->v_at != count - 1))
+        return false;
+    const double *v = s->position[to], *u = s->position[star->point];
+    double axis[3][3], on_edge[3] = {u[0], u[1], u[2]};
+    if (!frame_of(s, ring, count, v, axis))
+        return false;
+    patch->moved = 0;
+    if (!star->closed) { /* u slides to the new boundary edge first */
+        const double *a = s->position[ring[patch->v_at == 0 ? count - 1 : 0]];
+        double d[3] = {a[0] - v[0], a[1] - v[1], a[2] - v[2]};
+        double along = ((u[0] - v[0]) * d[0] + (u[1] - v[1]) * d[1] + (u[2] - v[2]) * d[2]) /
+                       (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+        along = along < 0 ? 0 : along > 1 ? 1 : along;
+        for (int i = 0; i < 3; i++)
+            on_edge[i] = v[i] + along * d[i];
+        patch->moved = distance(u, on_edge);
+    }
+    for (uint32_t i = 0; i < count; i++)
+        patch->x[i] = flatten(s->position[ring[i]], v, axis);
+    patch->u = flatten(on_edge, v, axis);
+    return true;
+}
+
+/* Both fans must be unfolded over the polygon: every triangle turns the same way, and the ring goes round u once. */
+static bool is_height_field(const polygon *patch, bool closed)
+{
+    uint32_t last = closed ? patch->count : patch->count - 1;
+    unsigned crossings = 0;
+    for (uint32_t i = 0; i < last; i++) {
+        const flat *a = &patch->x[i], *b = &patch->x[i + 1 == patch->count ? 0 : i + 1];
+        double as = a->s - patch->u.s, at = a->t - patch->u.t, bs = b->s - patch->u.s, bt = b->t - patch->u.t;
+        double old_area = cross2(as, at, bs, bt);
+        bool touches_v = i == patch->v_at || (i + 1 == patch->count ? 0 : i + 1) == patch->v_at;
+        if (closed ? old_area <= 0 : old_area < 0)
+            return false;
+        if (!touches_v && cross2(a->s, a->t, b->s, b->t) <= 0)
+            return false;
+        crossings += at < 0 && bt >= 0;
+    }
+    return !closed || crossings == 1;
+}
+
+/* Height of the new fan's triangle (v, a, b) at a point of the plane, with the weights of its corners. */
+static double height_in(const flat *a, const flat *b, double s, double t, double weights[3])
+{
+    double area = cross2(a->s, a->t, b->s, b->t);
+    weights[1] = cross2(s, t, b->s, b->t) / area;
+    weights[2] = cross2(a->s, a->t, s, t) / area;
+    weights[0] = 1 - weights[1] - weights[2];
+    return weights[1] * a->h + weights[2] * b->h;
+}
+
+/* Height difference at u; image: fan index of the triangle that holds it. */
+static double gap_at_u(const polygon *patch, uint32_t last, uint32_t *image, double weights[3])
+{
+    double best = -INFINITY, gap = 0;
+    for (uint32_t i = 0; i < last; i++) {
+        uint32_t j = i + 1 == patch->count ? 0 : i + 1;
+        if (i == patch->v_at || j == patch->v_at)
+            continue;
+        double w[3];
+        double height = height_in(&patch->x[i], &patch->x[j], patch->u.s, patch->u.t, w);
+        double inside = fmin(w[0], fmin(w[1], w[2])); /* the triangle that u is most inside of; rounding may put it outside of all */
+        if (inside > best) {
+            best = inside;
+            gap = fabs(height - patch->u.h);
+            *image = i;
+            for (int k = 0; k < 3; k++)
+                weights[k] = w[k];
+        }
+    }
+    return gap;
+}
+
+/* Largest height difference where an old spoke u-x[i] crosses a new one v-x[j]. */
+static double gap_at_crossings(const polygon *patch)
+{
+    double gap = 0;
+    uint32_t n = patch->count;
+    for (uint32_t j = 0; j < n; j++) {
+        if (j == patch->v_at || (j + 1) % n == patch->v_at || (patch->v_at + 1) % n == j)
+            continue;
+        const flat *d = &patch->x[j];
+        double side_u = cross2(d->s, d->t, patch->u.s, patch->u.t);
+        for (uint32_t i = 0; i < n; i++) {
+            if (i == j || i == patch->v_at)
+                continue;
+            const flat *x = &patch->x[i];
+            double side_x = cross2(d->s, d->t, x->s, x->t);
+            if ((side_u > 0) == (side_x > 0) || side_u == side_x)
+                continue;
+            double along = side_u / (side_u - side_x); /* on the old spoke, from u */
+            double s = patch->u.s + along * (x->s - patch->u.s), t = patch->u.t + along * (x->t - patch->u.t);
+            double on_new = (s * d->s + t * d->t) / (d->s * d->s + d->t * d->t);
+            if (on_new < 0 || on_new > 1)
+                continue;
+            double difference = fabs(patch->u.h + along * (x->h - patch->u.h) - on_new * d->h);
+            gap = fmax(gap, difference);
+        }
+    }
+    return gap;
+}
+
+/* A vanishing triangle (u, v, x) falls onto the edge v-x. Where no other triangle keeps that edge, its points are
+ * still within |v - x| of what stays. */
+static double lost_edge_length(const simplifier *s, const strl_star *star, uint32_t to)
+{
+    double most = 0;
+    for (uint32_t i = 0; i < star->count; i++) {
+        if (star->next[i] != to && star->previous[i] != to)
+            continue;
+        uint32_t x = star->next[i] == to ? star->previous[i] : star->next[i];
+        bool kept = false;
+        for (uint32_t k = 0; k < star->count && !kept; k++)
+            kept = star->next[k] != to && star->previous[k] != to && (star->next[k] == x || star->previous[k] == x);
+        for (uint32_t corner = s->head[to]; corner != NO_INDEX && !kept; corner = s->corner_next[corner]) {
+            uint32_t triangle = corner / 3;
+            if (s->dead[triangle])
+                continue;
+            bool has_u = false, has_x = false;
+            for (unsigned c = 0; c < 3; c++) {
+                has_u |= strl__corner_point(s, triangle, c) == star->point;
+                has_x |= strl__corner_point(s, triangle, c) == x;
+            }
+            kept = has_x && !has_u;
+        }
+        if (!kept)
+            most = fmax(most, distance(s->position[to], s->position[x]));
+    }
+    return most;
+}
+
+double strl__collapse_bound(const simplifier *s, const strl_star *star, uint32_t to, uint32_t *image, double weights[3])
+{
+    double straight = distance(s->position[star->point], s->position[to]);
+    *image = NO_INDEX;
+    weights[0] = 1, weights[1] = weights[2] = 0;
+    polygon patch;
+    if (!star->manifold || !build_patch(s, star, to, &patch))
+        return straight + lost_edge_length(s, star, to);
+    uint32_t last = star->closed ? patch.count : patch.count - 1;
+    uint32_t lost_from = star->closed ? 0 : 1; /* a manifold fan of two or more triangles keeps all its edges */
+    double lost = star->count <= 2 + lost_from ? lost_edge_length(s, star, to) : 0;
+    if (!is_height_field(&patch, star->closed))
+        return straight + lost;
+    uint32_t fan_index = NO_INDEX;
+    double gap = gap_at_u(&patch, last, &fan_index, weights);
+    if (fan_index == NO_INDEX)
+        return straight + lost;
+    *image = star->order[fan_index];
+    gap = fmax(gap, gap_at_crossings(&patch));
+    return fmin(straight, gap + patch.moved) + lost;
+}

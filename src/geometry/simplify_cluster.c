@@ -1,0 +1,145 @@
+/* The last two rungs of the ladder: points that share a cell of a grid merge, the grid growing until the target is met. Points of
+ * different components merge first of all (rung DISJOINT); points of one component only where CLUSTERING is allowed.
+ * The error of such a merge is the full way that the point goes, so the claim stays a bound. */
+#include <math.h>
+
+#include "base/hash.h"
+#include "geometry/simplify_plan.h"
+
+typedef struct cell_slot {
+    int64_t cell[3];
+    uint32_t point; /* the cell's representative; NO_INDEX = free slot */
+} cell_slot;
+
+typedef struct clustering {
+    simplifier *s;
+    uint32_t *component; /* per point: union-find */
+    cell_slot *slots;
+    uint32_t mask;
+} clustering;
+
+static uint32_t find_root(uint32_t *component, uint32_t p)
+{
+    while (component[p] != p) {
+        component[p] = component[component[p]];
+        p = component[p];
+    }
+    return p;
+}
+
+static void unite(uint32_t *component, uint32_t a, uint32_t b)
+{
+    a = find_root(component, a), b = find_root(component, b);
+    if (a < b)
+        component[b] = a;
+    else
+        component[a] = b;
+}
+
+static cell_slot *find_cell(clustering *c, const double p[3], double size)
+{
+    int64_t cell[3];
+    uint64_t hash = 0;
+    for (int k = 0; k < 3; k++) {
+        cell[k] = (int64_t)floor(p[k] / size);
+        hash = strl__mix64(hash ^ (uint64_t)cell[k]);
+    }
+    uint32_t at = (uint32_t)hash & c->mask;
+    while (c->slots[at].point != NO_INDEX &&
+           (c->slots[at].cell[0] != cell[0] || c->slots[at].cell[1] != cell[1] || c->slots[at].cell[2] != cell[2]))
+        at = (at + 1) & c->mask;
+    for (int k = 0; k < 3; k++)
+        c->slots[at].cell[k] = cell[k];
+    return &c->slots[at];
+}
+
+static bool prepare(clustering *c, simplifier *s, strl_arena *arena)
+{
+    uint32_t points = s->mesh->point_count, size = 16;
+    while (size < 2 * points)
+        size *= 2;
+    c->s = s;
+    c->mask = size - 1;
+    c->component = strl_arena_alloc(arena, points, sizeof *c->component);
+    c->slots = strl_arena_alloc(arena, size, sizeof *c->slots);
+    if (!c->component || !c->slots)
+        return false;
+    for (uint32_t p = 0; p < points; p++)
+        c->component[p] = p;
+    for (uint32_t t = 0; t < s->mesh->triangle_count; t++)
+        for (unsigned k = 1; k < 3 && !s->dead[t]; k++)
+            unite(c->component, strl__corner_point(s, t, 0), strl__corner_point(s, t, k));
+    return true;
+}
+
+static double first_cell_size(const simplifier *s)
+{
+    double sum = 0;
+    uint32_t count = 0;
+    for (uint32_t t = 0; t < s->mesh->triangle_count; t++) {
+        if (s->dead[t])
+            continue;
+        const double *a = s->position[strl__corner_point(s, t, 0)], *b = s->position[strl__corner_point(s, t, 1)];
+        double length2 = 0;
+        for (int k = 0; k < 3; k++)
+            length2 += (a[k] - b[k]) * (a[k] - b[k]);
+        sum += sqrt(length2);
+        count++;
+    }
+    return count && sum > 0 ? sum / count : 1;
+}
+
+/* Kept points first: they cannot move, so they represent their cells. */
+static void choose_representatives(clustering *c, double size)
+{
+    for (uint32_t i = 0; i <= c->mask; i++)
+        c->slots[i].point = NO_INDEX;
+    for (int kept = 1; kept >= 0; kept--)
+        for (uint32_t p = 0; p < c->s->mesh->point_count; p++) {
+            if (((c->s->mesh->flags[p] & STRL_POINT_KEPT) != 0) != (kept != 0) || c->s->head[p] == NO_INDEX)
+                continue;
+            cell_slot *slot = find_cell(c, c->s->position[p], size);
+            if (slot->point == NO_INDEX)
+                slot->point = p;
+        }
+}
+
+static void merge_cells(clustering *c, double size, bool disjoint_only, strl_simplified *result)
+{
+    simplifier *s = c->s;
+    choose_representatives(c, size);
+    for (uint32_t p = 0; p < s->mesh->point_count && s->triangles_left > s->desc->target_triangles; p++) {
+        strl_star star;
+        collapse_plan plan;
+        uint32_t to = find_cell(c, s->position[p], size)->point;
+        if ((s->mesh->flags[p] & STRL_POINT_KEPT) || to == p || to == NO_INDEX || s->head[p] == NO_INDEX ||
+            s->head[to] == NO_INDEX)
+            continue;
+        bool same = find_root(c->component, p) == find_root(c->component, to);
+        if ((same && disjoint_only) || !strl__star_gather(s, p, &star) || star.count == 0)
+            continue;
+        s->rung = same ? STRL_SIMPLIFY_CLUSTERING : STRL_SIMPLIFY_DISJOINT;
+        if (!strl__leaves_surface_at(s, &star, to))
+            continue;
+        strl__plan_collapse(s, &star, to, &plan);
+        if (plan.key > s->desc->error_limit)
+            continue;
+        strl__apply_collapse(s, &star, &plan, result);
+        unite(c->component, p, to);
+    }
+}
+
+bool strl__simplify_clustering(simplifier *s, strl_arena *arena, strl_simplified *result)
+{
+    clustering c;
+    if (!prepare(&c, s, arena))
+        return false;
+    double size = first_cell_size(s);
+    for (int step = 0; step < 48 && s->triangles_left > s->desc->target_triangles && size < s->desc->error_limit; step++) {
+        merge_cells(&c, size, true, result);
+        if (s->desc->last_rung >= STRL_SIMPLIFY_CLUSTERING)
+            merge_cells(&c, size, false, result);
+        size *= 1.41421356;
+    }
+    return true;
+}

@@ -1,0 +1,82 @@
+/* Internal to simplify*.c: the state of a simplification and the star of a point. */
+#ifndef STRL_GEOMETRY_SIMPLIFY_STAR_H
+#define STRL_GEOMETRY_SIMPLIFY_STAR_H
+
+#include "geometry/simplify.h"
+
+#define STAR_MAX 64u /* triangles; a point with more is left alone */
+#define NO_INDEX UINT32_MAX
+
+typedef struct quadric {
+    double xx, xy, xz, yy, yz, zz, x, y, z, c; /* v'Av + 2 b'v + c */
+} quadric;
+
+/* The live triangles round one point. */
+typedef struct strl_star {
+    uint32_t point;
+    uint32_t count;               /* triangles */
+    uint32_t triangle[STAR_MAX];
+    uint8_t corner[STAR_MAX];     /* which corner of the triangle is the point */
+    uint32_t next[STAR_MAX];      /* the other two points, counter-clockwise: point, next, previous */
+    uint32_t previous[STAR_MAX];
+    uint32_t neighbour_count;
+    uint32_t neighbour[2 * STAR_MAX]; /* different ones, in order of first appearance */
+    uint8_t uses[2 * STAR_MAX];   /* triangles that hold the edge to that neighbour */
+    bool on_boundary;             /* some edge is used by an odd number of triangles */
+    bool manifold;                /* one closed or open fan */
+    bool closed;                  /* the fan is closed */
+    uint8_t order[STAR_MAX];      /* fan order of the triangles where manifold: next[order[i + 1]] == previous[order[i]] */
+} strl_star;
+
+typedef struct simplifier {
+    const strl_mesh *mesh;
+    const strl_simplify_desc *desc;
+    double (*position)[3];
+    float (*normal)[3];     /* per wedge, decoded */
+    float (*colour)[3];     /* per wedge, 0..1 */
+    quadric *quadrics;      /* per point */
+    uint32_t (*corner)[3];  /* current wedges */
+    uint32_t *corner_next;  /* [3 * triangle_count] next corner at the same point */
+    uint32_t *head, *tail;  /* per point, corners */
+    bool *dead;             /* per triangle */
+    float *error, *deviation, *shift; /* per triangle */
+    uint32_t *stamp;        /* per point, against `tick` */
+    uint32_t tick;
+    uint32_t triangles_left;
+    strl_simplify_rung rung;
+    /* candidates: a binary heap of points by key */
+    uint32_t *heap, heap_count;
+    uint32_t *heap_at;      /* per point, NO_INDEX = not in the heap */
+    float *key;             /* per point */
+    uint32_t *target;       /* per point: best v */
+    bool *stale;            /* per point: the neighbourhood changed since key was computed */
+} simplifier;
+
+/* What a collapse would do. */
+typedef struct collapse_plan {
+    uint32_t to;
+    float bound;      /* distance moved, lattice units */
+    float geometric;  /* the error of the new patch */
+    float deviation;  /* the same of attributes */
+    float shift;      /* appearance error of the new patch */
+    float key;
+} collapse_plan;
+
+static inline uint32_t strl__corner_point(const simplifier *s, uint32_t triangle, unsigned corner)
+{
+    return s->mesh->wedge[s->corner[triangle][corner]].point;
+}
+
+/* Gathers the star of a point; dead corners met on the way are unlinked. False where it has more than STAR_MAX triangles. */
+bool strl__star_gather(simplifier *s, uint32_t point, strl_star *star);
+/* How many triangles hold the edge to `point` (0 = no neighbour). */
+unsigned strl__star_uses(const strl_star *star, uint32_t point);
+/* The wedge of v that a wedge of u falls onto; NO_INDEX where none of the same palette exists. *exact: a triangle of the
+ * edge says so. v_star may be NULL: then only exact ones are found. */
+uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, const strl_star *v_star, uint32_t to, uint32_t wedge,
+                            bool *exact);
+/* Bound of the two-sided distance between the patch before and after u -> v (never above |u - v| plus what lost edges cost).
+ * *image: index in the star of the triangle whose image holds u's, weights of (v, next, previous) there; NO_INDEX = v itself. */
+double strl__collapse_bound(const simplifier *s, const strl_star *star, uint32_t to, uint32_t *image, double weights[3]);
+
+#endif
