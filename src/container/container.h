@@ -80,6 +80,7 @@ typedef struct strl_container_info {
     char unit[16];        /* "m", "mm", ..., "" = unknown */
     uint32_t up_axis;     /* 0 x, 1 y, 2 z */
     bool has_colour;      /* some vertex or material is not white */
+    double bounds[6];     /* of all placements, world units: min xyz, max xyz; filled in by the writer */
     uint32_t tree_count, part_count, material_count;
     uint64_t placement_count;
     uint64_t triangles_in;            /* triangles that the readers announced */
