@@ -33,8 +33,8 @@ strl_status strl_file_read(strl_file *file, uint64_t offset, void *data, size_t 
 strl_status strl_file_read_some(strl_file *file, uint64_t offset, void *data, size_t size, size_t *got, strl_error *err);
 /* STRL_ERR_DISK_FULL where there is no room. */
 strl_status strl_file_write(strl_file *file, uint64_t offset, const void *data, size_t size, strl_error *err);
-/* Gives the range's blocks back to the file system where it can; reads of it then return zeros. Never fails loudly. */
-void strl_file_punch(strl_file *file, uint64_t offset, uint64_t size);
+/* Gives the range's blocks back to the file system where it can; reads of it then return zeros. Returns whether it could. */
+bool strl_file_punch(strl_file *file, uint64_t offset, uint64_t size);
 strl_status strl_file_sync(strl_file *file, strl_error *err);
 
 strl_status strl_path_stat(const char *path, strl_file_info *info, strl_error *err);
@@ -42,7 +42,8 @@ bool strl_path_exists(const char *path);
 strl_status strl_path_rename(const char *from, const char *to, strl_error *err); /* replaces; then syncs the folder */
 strl_status strl_path_remove(const char *path, strl_error *err);                 /* a missing file is not an error */
 strl_status strl_path_make_directory(const char *path, strl_error *err);         /* existing is not an error */
-strl_status strl_path_remove_directory(const char *path, strl_error *err);       /* with the files in it, not folders; missing is fine */
+/* With the files in it; a folder in it is a failure. A missing folder is not an error. */
+strl_status strl_path_remove_directory(const char *path, strl_error *err);
 strl_status strl_path_free_bytes(const char *path, uint64_t *bytes, strl_error *err);
 /* dir + "/" + name, owned by the caller (strl__free); NULL without memory. */
 char *strl_path_join(const char *dir, const char *name);

@@ -198,16 +198,19 @@ strl_status strl_file_write(strl_file *file, uint64_t offset, const void *data, 
     return STRL_OK;
 }
 
-void strl_file_punch(strl_file *file, uint64_t offset, uint64_t size)
+bool strl_file_punch(strl_file *file, uint64_t offset, uint64_t size)
 {
 #ifdef FALLOC_FL_PUNCH_HOLE
-    if (size == 0 || offset > (uint64_t)INT64_MAX || size > (uint64_t)INT64_MAX - offset)
-        return;
-    while (fallocate(file->descriptor, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, (off_t)offset, (off_t)size) != 0 &&
-           errno == EINTR)
-        ;
+    if (offset > (uint64_t)INT64_MAX || size > (uint64_t)INT64_MAX - offset)
+        return false;
+    int failed;
+    do
+        failed = fallocate(file->descriptor, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, (off_t)offset, (off_t)size);
+    while (failed && errno == EINTR);
+    return !failed;
 #else
     (void)file, (void)offset, (void)size;
+    return false;
 #endif
 }
 

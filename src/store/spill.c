@@ -1,0 +1,354 @@
+#include "store/spill.h"
+
+#include <inttypes.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "platform/file.h"
+#include "platform/thread.h"
+
+#define DEFAULT_BUFFER_BYTES ((size_t)256 << 10)
+/* A multiple of every common block size, and large enough to keep punching off the profile. */
+#define DROP_STEP_BYTES ((uint64_t)64 << 10)
+
+struct strl_spill_set {
+    char *directory; /* owned */
+    uint64_t limit_bytes;
+
+    strl_mutex mutex; /* guards all below */
+    strl_spill *open; /* list of open streams; owned */
+    uint64_t bytes;
+    uint64_t peak_bytes;
+};
+
+struct strl_spill {
+    strl_spill_set *set;
+    strl_spill *next; /* in the set's list, under its mutex */
+    char *name;       /* owned */
+    strl_file *file;  /* owned; NULL until created */
+    bool kept;        /* from an earlier run: not appended to */
+    uint8_t *buffer;  /* owned; NULL between flush and append */
+    size_t buffer_bytes;
+    size_t buffered;
+    _Atomic uint64_t flushed; /* bytes that may be read */
+    _Atomic uint64_t dropped; /* bytes that may not be read any more */
+    uint64_t given_back;      /* of the dropped bytes, those off the count; under the set's mutex */
+};
+
+strl_status strl_spill_set_create(const char *directory, uint64_t limit_bytes, strl_spill_set **set, strl_error *err)
+{
+    *set = NULL;
+    strl_file_info info;
+    strl_status status = strl_path_stat(directory, &info, err);
+    if (status != STRL_OK)
+        return status;
+    if (!info.is_directory)
+        return strl__fail(err, STRL_ERR_IO, "scratch: expected a folder, found the file %.300s", directory);
+    strl_spill_set *made = strl__alloc_zero(1, sizeof *made);
+    char *copy = strl__strdup(directory);
+    if (!made || !copy) {
+        strl__free(copy);
+        strl__free(made);
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for the scratch folder %.300s", directory);
+    }
+    made->directory = copy;
+    made->limit_bytes = limit_bytes;
+    strl_mutex_init(&made->mutex);
+    *set = made;
+    return STRL_OK;
+}
+
+static void release(strl_spill *spill)
+{
+    strl_file_close(spill->file, NULL); /* a late write error concerns bytes nobody will read */
+    strl__free(spill->buffer);
+    strl__free(spill->name);
+    strl__free(spill);
+}
+
+void strl_spill_set_destroy(strl_spill_set *set)
+{
+    if (!set)
+        return;
+    while (set->open) {
+        strl_spill *next = set->open->next;
+        release(set->open);
+        set->open = next;
+    }
+    strl_mutex_deinit(&set->mutex);
+    strl__free(set->directory);
+    strl__free(set);
+}
+
+uint64_t strl_spill_set_bytes(strl_spill_set *set)
+{
+    strl_mutex_lock(&set->mutex);
+    uint64_t bytes = set->bytes;
+    strl_mutex_unlock(&set->mutex);
+    return bytes;
+}
+
+uint64_t strl_spill_set_peak_bytes(strl_spill_set *set)
+{
+    strl_mutex_lock(&set->mutex);
+    uint64_t bytes = set->peak_bytes;
+    strl_mutex_unlock(&set->mutex);
+    return bytes;
+}
+
+/* Before the bytes are written, so that streams of several threads cannot pass the limit together. */
+static strl_status reserve(strl_spill_set *set, uint64_t size, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    strl_mutex_lock(&set->mutex);
+    if (set->limit_bytes && (set->bytes > set->limit_bytes || size > set->limit_bytes - set->bytes))
+        status = strl__fail(err, STRL_ERR_LIMIT,
+                            "scratch in %.300s holds %" PRIu64 " bytes, %" PRIu64 " more would pass its limit of %" PRIu64,
+                            set->directory, set->bytes, size, set->limit_bytes);
+    else
+        set->bytes += size;
+    strl_mutex_unlock(&set->mutex);
+    return status;
+}
+
+static void settle(strl_spill_set *set, uint64_t size, bool written)
+{
+    strl_mutex_lock(&set->mutex);
+    if (!written)
+        set->bytes -= size;
+    else if (set->peak_bytes < set->bytes)
+        set->peak_bytes = set->bytes;
+    strl_mutex_unlock(&set->mutex);
+}
+
+static bool link_stream(strl_spill_set *set, strl_spill *spill)
+{
+    strl_mutex_lock(&set->mutex);
+    const strl_spill *same = set->open;
+    while (same && strcmp(same->name, spill->name) != 0)
+        same = same->next;
+    if (!same) {
+        spill->next = set->open;
+        set->open = spill;
+    }
+    strl_mutex_unlock(&set->mutex);
+    return !same;
+}
+
+static void unlink_stream(strl_spill_set *set, const strl_spill *spill)
+{
+    strl_mutex_lock(&set->mutex);
+    strl_spill **at = &set->open;
+    while (*at != spill)
+        at = &(*at)->next;
+    *at = spill->next;
+    strl_mutex_unlock(&set->mutex);
+}
+
+/* A linked stream without a file yet; its name is taken from then on. */
+static strl_status new_stream(strl_spill_set *set, const char *name, strl_spill **spill, strl_error *err)
+{
+    if (!*name || strchr(name, '/') || name[0] == '.')
+        return strl__fail(err, STRL_ERR_ARGUMENT, "\"%.300s\" is no name for a scratch file", name);
+    strl_spill *made = strl__alloc_zero(1, sizeof *made);
+    char *copy = strl__strdup(name);
+    strl_status status = STRL_OK;
+    if (!made || !copy) {
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the scratch file %.300s", name);
+    } else {
+        made->set = set;
+        made->name = copy;
+        if (!link_stream(set, made))
+            status = strl__fail(err, STRL_ERR_ARGUMENT, "the scratch file %.300s is open already", name);
+    }
+    if (status != STRL_OK) {
+        strl__free(copy);
+        strl__free(made);
+        return status;
+    }
+    *spill = made;
+    return STRL_OK;
+}
+
+static strl_status with_path(strl_spill *spill, strl_status (*call)(strl_spill *spill, const char *path, strl_error *err),
+                             strl_error *err)
+{
+    char *path = strl_path_join(spill->set->directory, spill->name);
+    strl_status status = path ? call(spill, path, err)
+                              : strl__fail(err, STRL_ERR_MEMORY, "no memory for the scratch file %.300s", spill->name);
+    strl__free(path);
+    return status;
+}
+
+static strl_status create_file(strl_spill *spill, const char *path, strl_error *err)
+{
+    return strl_file_create(path, &spill->file, err);
+}
+
+static strl_status open_file(strl_spill *spill, const char *path, strl_error *err)
+{
+    return strl_file_open(path, &spill->file, err);
+}
+
+strl_status strl_spill_open(strl_spill_set *set, const char *name, size_t buffer_bytes, strl_spill **spill,
+                            strl_error *err)
+{
+    *spill = NULL;
+    strl_spill *made = NULL;
+    strl_status status = new_stream(set, name, &made, err);
+    if (status != STRL_OK)
+        return status;
+    made->buffer_bytes = buffer_bytes ? buffer_bytes : DEFAULT_BUFFER_BYTES;
+    status = with_path(made, create_file, err);
+    if (status != STRL_OK) {
+        unlink_stream(set, made);
+        release(made);
+        return status;
+    }
+    *spill = made;
+    return STRL_OK;
+}
+
+static strl_status adopt(strl_spill *spill, uint64_t bytes, strl_error *err)
+{
+    strl_status status = with_path(spill, open_file, err);
+    if (status != STRL_OK)
+        return status;
+    uint64_t found = strl_file_bytes(spill->file);
+    if (found != bytes)
+        return strl__fail(err, STRL_ERR_FORMAT, "the scratch file %.300s has %" PRIu64 " bytes, expected %" PRIu64,
+                          strl_file_path(spill->file), found, bytes);
+    status = reserve(spill->set, bytes, err);
+    if (status == STRL_OK) {
+        settle(spill->set, bytes, true);
+        atomic_store(&spill->flushed, bytes);
+    }
+    return status;
+}
+
+strl_status strl_spill_open_kept(strl_spill_set *set, const char *name, uint64_t bytes, strl_spill **spill,
+                                 strl_error *err)
+{
+    *spill = NULL;
+    strl_spill *made = NULL;
+    strl_status status = new_stream(set, name, &made, err);
+    if (status != STRL_OK)
+        return status;
+    made->kept = true;
+    status = adopt(made, bytes, err);
+    if (status != STRL_OK) {
+        unlink_stream(set, made);
+        release(made);
+        return status;
+    }
+    *spill = made;
+    return STRL_OK;
+}
+
+static strl_status write_at_end(strl_spill *spill, const void *data, size_t size, strl_error *err)
+{
+    uint64_t end = atomic_load(&spill->flushed);
+    strl_status status = reserve(spill->set, size, err);
+    if (status != STRL_OK)
+        return status;
+    status = strl_file_write(spill->file, end, data, size, err);
+    settle(spill->set, size, status == STRL_OK);
+    if (status == STRL_OK)
+        atomic_store(&spill->flushed, end + size);
+    return status;
+}
+
+static strl_status write_buffer(strl_spill *spill, strl_error *err)
+{
+    if (spill->buffered == 0)
+        return STRL_OK;
+    strl_status status = write_at_end(spill, spill->buffer, spill->buffered, err);
+    if (status == STRL_OK)
+        spill->buffered = 0;
+    return status;
+}
+
+strl_status strl_spill_append(strl_spill *spill, const void *data, size_t size, strl_error *err)
+{
+    if (spill->kept)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "the scratch file %.300s was kept to be read, not written", spill->name);
+    if (size == 0)
+        return STRL_OK;
+    if (size > spill->buffer_bytes - spill->buffered) {
+        strl_status status = write_buffer(spill, err);
+        if (status != STRL_OK)
+            return status;
+        if (size >= spill->buffer_bytes)
+            return write_at_end(spill, data, size, err);
+    }
+    if (!spill->buffer && !(spill->buffer = strl__alloc(spill->buffer_bytes, 1)))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu bytes of buffer before the scratch file %.300s",
+                          spill->buffer_bytes, spill->name);
+    memcpy(spill->buffer + spill->buffered, data, size);
+    spill->buffered += size;
+    return STRL_OK;
+}
+
+strl_status strl_spill_flush(strl_spill *spill, strl_error *err)
+{
+    strl_status status = write_buffer(spill, err);
+    if (status == STRL_OK) {
+        strl__free(spill->buffer);
+        spill->buffer = NULL;
+    }
+    return status;
+}
+
+uint64_t strl_spill_bytes(const strl_spill *spill)
+{
+    return atomic_load(&spill->flushed) + spill->buffered;
+}
+
+strl_status strl_spill_read(strl_spill *spill, uint64_t offset, void *data, size_t size, strl_error *err)
+{
+    uint64_t first = atomic_load(&spill->dropped), end = atomic_load(&spill->flushed);
+    if (offset < first || offset > end || size > end - offset)
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "read of %zu bytes at byte %" PRIu64 " of the scratch file %.200s, which has bytes %" PRIu64
+                          " to %" PRIu64, size, offset, spill->name, first, end);
+    return strl_file_read(spill->file, offset, data, size, err);
+}
+
+void strl_spill_drop_before(strl_spill *spill, uint64_t offset)
+{
+    uint64_t end = atomic_load(&spill->flushed);
+    offset = offset < end ? offset : end;
+    uint64_t before = atomic_load(&spill->dropped);
+    if (offset <= before)
+        return;
+    atomic_store(&spill->dropped, offset);
+    uint64_t from = before - before % DROP_STEP_BYTES, to = offset - offset % DROP_STEP_BYTES;
+    if (to == from || !strl_file_punch(spill->file, from, to - from))
+        return;
+    strl_mutex_lock(&spill->set->mutex);
+    spill->given_back += to - from;
+    spill->set->bytes -= to - from;
+    strl_mutex_unlock(&spill->set->mutex);
+}
+
+static strl_status remove_file(strl_spill *spill, const char *path, strl_error *err)
+{
+    (void)spill;
+    return strl_path_remove(path, err);
+}
+
+strl_status strl_spill_close_and_delete(strl_spill *spill, strl_error *err)
+{
+    if (!spill)
+        return STRL_OK;
+    strl_spill_set *set = spill->set;
+    strl_status status = with_path(spill, remove_file, err);
+    if (status == STRL_OK)
+        settle(set, atomic_load(&spill->flushed) - spill->given_back, false);
+    unlink_stream(set, spill);
+    release(spill);
+    return status;
+}

@@ -1,0 +1,48 @@
+/* Spill streams: append-only files in a scratch folder, for what does not fit into a build's memory. A set counts the bytes
+ * its streams hold on disk, now and at most, and keeps them under a limit.
+ *
+ * One thread at a time appends to a stream and closes it; any number may read flushed bytes meanwhile. Different streams of
+ * one set may be used by different threads. A stream holds one file descriptor as long as it is open. */
+#ifndef STRL_STORE_SPILL_H
+#define STRL_STORE_SPILL_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "stroll/error.h"
+
+typedef struct strl_spill_set strl_spill_set;
+typedef struct strl_spill strl_spill;
+
+/* directory: an existing folder, left to its owner to lock and remove. limit_bytes: on disk at once; 0 = no limit. */
+strl_status strl_spill_set_create(const char *directory, uint64_t limit_bytes, strl_spill_set **set, strl_error *err);
+/* Closes streams that are still open, without flushing, and leaves the files. NULL is legal. */
+void strl_spill_set_destroy(strl_spill_set *set);
+uint64_t strl_spill_set_bytes(strl_spill_set *set);      /* on disk now, over all streams */
+uint64_t strl_spill_set_peak_bytes(strl_spill_set *set); /* the most there ever were */
+
+/* An empty stream in the file `name` of the set's folder; a file left there by an earlier run is overwritten, a name that is
+ * open in this set is refused. buffer_bytes: 0 = 256 KiB; the buffer exists from the first append to the next flush. */
+strl_status strl_spill_open(strl_spill_set *set, const char *name, size_t buffer_bytes, strl_spill **spill,
+                            strl_error *err);
+/* A stream that an earlier run flushed and left with exactly `bytes` bytes: to be read and deleted, not appended to. */
+strl_status strl_spill_open_kept(strl_spill_set *set, const char *name, uint64_t bytes, strl_spill **spill,
+                                 strl_error *err);
+
+/* On failure nothing has been appended, and the stream can be used on: STRL_ERR_DISK_FULL where the disk is full,
+ * STRL_ERR_LIMIT where the set's limit would be passed. A failure of bytes still in the buffer shows at a later call. */
+strl_status strl_spill_append(strl_spill *spill, const void *data, size_t size, strl_error *err);
+/* Writes what is buffered and releases the buffer. */
+strl_status strl_spill_flush(strl_spill *spill, strl_error *err);
+uint64_t strl_spill_bytes(const strl_spill *spill); /* appended so far, buffered bytes included; for the appending thread */
+
+/* Exactly size bytes at offset, all of them flushed and not dropped, or failure. */
+strl_status strl_spill_read(strl_spill *spill, uint64_t offset, void *data, size_t size, strl_error *err);
+/* Promises that no byte before offset will be read again: whole 64 KiB steps of them are given back to the disk, and to the
+ * count, where the file system can do that. An offset behind an earlier one changes nothing. One thread at a time. */
+void strl_spill_drop_before(strl_spill *spill, uint64_t offset);
+
+/* The stream is closed in any case; failure means that its file is still there, and counted. NULL is legal. */
+strl_status strl_spill_close_and_delete(strl_spill *spill, strl_error *err);
+
+#endif
