@@ -1,5 +1,5 @@
-/* strl_pool_for. Items are claimed in index order and a claimed item always runs, so every item below a failed one has run
- * too: which failure is the lowest does not depend on the threads. */
+/* strl_pool_for. Items are claimed in index order and a claimed item always runs, so every item below a failed one
+ * has run too: which failure is the lowest does not depend on the threads. */
 #include <stdbool.h>
 
 #include "base/fail.h"

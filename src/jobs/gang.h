@@ -1,5 +1,5 @@
-/* A gang: one call that wants help from a pool's threads until it returns. Lives on its caller's stack. The caller works
- * too and withdraws offers nobody took, so a gang never waits for a busy pool and calls may nest. */
+/* A gang: one call that wants help from a pool's threads until it returns. Lives on its caller's stack. The caller
+ * works too and withdraws offers nobody took, so a gang never waits for a busy pool and calls may nest. */
 #ifndef STRL_JOBS_GANG_H
 #define STRL_JOBS_GANG_H
 

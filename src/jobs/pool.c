@@ -113,7 +113,8 @@ strl_status strl_pool_create(unsigned threads, strl_pool **pool, strl_error *err
 {
     *pool = NULL;
     if (threads > MOST_THREADS)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "a pool has at most %u threads, %u were asked for", MOST_THREADS, threads);
+        return strl__fail(err, STRL_ERR_ARGUMENT, "a pool has at most %u threads, %u were asked for", MOST_THREADS,
+                          threads);
     strl_pool *made = strl__alloc_zero(1, sizeof *made);
     worker *workers = strl__alloc_zero(threads, sizeof *workers);
     if (!made || !workers) {
@@ -153,8 +154,15 @@ void strl_pool_destroy(strl_pool *pool)
     strl__free(pool);
 }
 
-unsigned strl_pool_threads(const strl_pool *pool) { return pool->threads; }
-unsigned strl_pool_workers(const strl_pool *pool) { return pool->threads + 1; }
+unsigned strl_pool_threads(const strl_pool *pool)
+{
+    return pool->threads;
+}
+
+unsigned strl_pool_workers(const strl_pool *pool)
+{
+    return pool->threads + 1;
+}
 
 void strl__gang_enlist(strl_pool *pool, strl__gang *gang, unsigned helpers)
 {

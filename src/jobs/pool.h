@@ -1,5 +1,5 @@
-/* An explicit pool of worker threads. There is no global pool. Results are written by index and reduced in order, so that
- * output never depends on the number of threads. A pool of 0 threads runs everything on the caller's thread. */
+/* An explicit pool of worker threads. There is no global pool. Results are written by index and reduced in order, so
+ * that output never depends on the number of threads. A pool of 0 threads runs everything on the caller's thread. */
 #ifndef STRL_JOBS_POOL_H
 #define STRL_JOBS_POOL_H
 
@@ -25,14 +25,14 @@ typedef struct strl_cancel {
 /* One item. `worker` < strl_pool_workers() names the thread's slot for scratch. */
 typedef strl_status (*strl_job_fn)(void *context, uint64_t index, unsigned worker, strl_error *err);
 
-/* Runs job(index) for every index in [0, count), the caller's thread included, and waits. After a failure no further item
- * starts; returns the failure of the lowest index that failed. Checks cancel (may be NULL) before each item. */
+/* Runs job(index) for every index in [0, count), the caller's thread included, and waits. After a failure no further
+ * item starts; returns the failure of the lowest index that failed. Checks cancel (may be NULL) before each item. */
 strl_status strl_pool_for(strl_pool *pool, uint64_t count, strl_job_fn job, void *context, strl_cancel *cancel,
                           strl_error *err);
 
-/* A pipeline over [0, count): work(index) on any thread, then finish(index) on the caller's thread in index order; at most
- * `window` items are between the two (0 = 4 * workers). work and finish get slot = index % window, for per-item buffers:
- * a slot is not reused before finish of its item has returned. */
+/* A pipeline over [0, count): work(index) on any thread, then finish(index) on the caller's thread in index order; at
+ * most `window` items are between the two (0 = 4 * workers). work and finish get slot = index % window, for per-item
+ * buffers: a slot is not reused before finish of its item has returned. */
 typedef strl_status (*strl_slot_fn)(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err);
 strl_status strl_pool_ordered(strl_pool *pool, uint64_t count, unsigned window, strl_slot_fn work, strl_slot_fn finish,
                               void *context, strl_cancel *cancel, strl_error *err);

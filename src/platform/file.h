@@ -30,10 +30,12 @@ strl_status strl_file_stat(const strl_file *file, strl_file_info *info, strl_err
 /* Exactly size bytes or failure: a short read is STRL_ERR_FORMAT ("ends at byte .."), an error is STRL_ERR_IO. */
 strl_status strl_file_read(strl_file *file, uint64_t offset, void *data, size_t size, strl_error *err);
 /* As many bytes as there are, up to size. */
-strl_status strl_file_read_some(strl_file *file, uint64_t offset, void *data, size_t size, size_t *got, strl_error *err);
+strl_status strl_file_read_some(strl_file *file, uint64_t offset, void *data, size_t size, size_t *got,
+                                strl_error *err);
 /* STRL_ERR_DISK_FULL where there is no room. */
 strl_status strl_file_write(strl_file *file, uint64_t offset, const void *data, size_t size, strl_error *err);
-/* Gives the range's blocks back to the file system where it can; reads of it then return zeros. Returns whether it could. */
+/* Gives the range's blocks back to the file system where it can; reads of it then return zeros. Returns whether it
+ * could. */
 bool strl_file_punch(strl_file *file, uint64_t offset, uint64_t size);
 strl_status strl_file_sync(strl_file *file, strl_error *err);
 
@@ -53,7 +55,8 @@ typedef struct strl_lock strl_lock;
 strl_status strl_lock_acquire(const char *path, strl_lock **lock, strl_error *err);
 void strl_lock_release(strl_lock *lock);
 
-/* Fault hook for tests, process-wide: the n-th read (write) from now and all after it fail with EIO (ENOSPC). 0 = off. */
+/* Fault hook for tests, process-wide: the n-th read (write) from now and all after it fail with EIO (ENOSPC). 0 =
+ * off. */
 void strl_file_fail_reads_after(uint64_t n);
 void strl_file_fail_writes_after(uint64_t n);
 

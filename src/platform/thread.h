@@ -28,7 +28,7 @@ void strl_condition_broadcast(strl_condition *condition);
 uint64_t strl_clock_ns(void);     /* monotonic */
 uint64_t strl_clock_cpu_ns(void); /* processor time of this process, all threads */
 void strl_sleep_ns(uint64_t ns);
-unsigned strl_cpu_count(void);             /* processors this process may use, at least 1 */
+unsigned strl_cpu_count(void);              /* processors this process may use, at least 1 */
 uint64_t strl_process_peak_rss_bytes(void); /* the operating system's peak resident set, children included */
 
 #endif

@@ -1,5 +1,5 @@
-/* A source that answers late, and wrongly when asked to: the network without a network. Due times count from submit, so a
- * caller that polls rarely sees the latency it asked for and no more. */
+/* A source that answers late, and wrongly when asked to: the network without a network. Due times count from submit,
+ * so a caller that polls rarely sees the latency it asked for and no more. */
 #include <inttypes.h>
 
 #include "base/fail.h"
@@ -9,7 +9,7 @@
 
 typedef struct delayed_read {
     struct delayed_read *next;
-    uint64_t token;  /* the caller's; the inner source knows this read by its address */
+    uint64_t token; /* the caller's; the inner source knows this read by its address */
     uint64_t due_ns;
     uint64_t offset;
     size_t size;
@@ -65,8 +65,8 @@ static void become_failure(strl_source_result *result, strl_status status, const
     strl__free(result->data);
     result->data = NULL;
     result->size = 0;
-    result->status = strl__fail(&result->error, status, "read of %zu bytes at byte %" PRIu64 " %s", read->size,
-                                read->offset, why);
+    result->status =
+        strl__fail(&result->error, status, "read of %zu bytes at byte %" PRIu64 " %s", read->size, read->offset, why);
 }
 
 static bool delayed_poll(strl_source *source, strl_source_result *result)

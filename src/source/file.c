@@ -1,5 +1,5 @@
-/* A file as a source. Each accepted read puts one job into a pool of the source's own; a job serves whichever waiting read
- * is the most urgent when it starts. */
+/* A file as a source. Each accepted read puts one job into a pool of the source's own; a job serves whichever waiting
+ * read is the most urgent when it starts. */
 #include "base/fail.h"
 #include "base/memory.h"
 #include "jobs/pool.h"

@@ -75,7 +75,8 @@ strl_status strl__read_queue_reserve(strl__read_queue *queue, const strl__read_r
 {
     *read = NULL;
     strl__read *made = strl__alloc_zero(1, sizeof *made);
-    if (!made || !strl__grow(&queue->waiting, &queue->waiting_capacity, queue->waiting_count + 1, sizeof *queue->waiting)) {
+    if (!made ||
+        !strl__grow(&queue->waiting, &queue->waiting_capacity, queue->waiting_count + 1, sizeof *queue->waiting)) {
         strl__free(made);
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to queue a read");
     }
@@ -170,7 +171,8 @@ bool strl__read_queue_serve(strl__read_queue *queue, strl_source *source, strl__
     if (result->data)
         result->status = fetch(source, read->request.offset, result->data, read->request.size, &result->error);
     else
-        result->status = strl__fail(&result->error, STRL_ERR_MEMORY, "no memory for a read of %zu bytes", read->request.size);
+        result->status =
+            strl__fail(&result->error, STRL_ERR_MEMORY, "no memory for a read of %zu bytes", read->request.size);
     if (result->status == STRL_OK) {
         result->size = read->request.size;
     } else {

@@ -10,8 +10,8 @@ static strl_status check_range(const strl_source *source, uint64_t offset, size_
     if (offset <= source->bytes && size <= source->bytes - offset)
         return STRL_OK;
     return strl__fail(err, STRL_ERR_FORMAT,
-                      "%zu bytes at byte %" PRIu64 " lie past the end of the %s source (%" PRIu64 " bytes)", size, offset,
-                      source->klass->kind, source->bytes);
+                      "%zu bytes at byte %" PRIu64 " lie past the end of the %s source (%" PRIu64 " bytes)", size,
+                      offset, source->klass->kind, source->bytes);
 }
 
 strl_status strl_source_submit(strl_source *source, uint64_t token, uint64_t offset, size_t size, float urgency,
@@ -27,7 +27,10 @@ bool strl_source_poll(strl_source *source, strl_source_result *result)
     return source->klass->poll(source, result);
 }
 
-void strl_source_cancel(strl_source *source, uint64_t token) { source->klass->cancel(source, token); }
+void strl_source_cancel(strl_source *source, uint64_t token)
+{
+    source->klass->cancel(source, token);
+}
 
 strl_status strl_source_read(strl_source *source, uint64_t offset, void *data, size_t size, strl_error *err)
 {

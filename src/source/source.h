@@ -1,5 +1,5 @@
-/* Where a container's bytes come from: file, memory, HTTP later. A walk polls and never waits; it cannot tell sources apart.
- * A source belongs to one thread (the walk's) and may use threads of its own behind this interface. */
+/* Where a container's bytes come from: file, memory, HTTP later. A walk polls and never waits; it cannot tell sources
+ * apart. A source belongs to one thread (the walk's) and may use threads of its own behind this interface. */
 #ifndef STRL_SOURCE_SOURCE_H
 #define STRL_SOURCE_SOURCE_H
 
@@ -17,13 +17,14 @@ typedef struct strl_source_result {
     strl_status status; /* STRL_OK: data holds exactly the bytes asked for */
     uint8_t *data;      /* owned by the receiver (strl__free); NULL on failure */
     size_t size;
-    strl_error error;   /* where status is not STRL_OK */
+    strl_error error; /* where status is not STRL_OK */
 } strl_source_result;
 
 /* Implementations fill this in as the first member of their own struct. */
 typedef struct strl_source_class {
     const char *kind; /* "file", "memory", "delayed", "http" */
-    strl_status (*submit)(strl_source *source, uint64_t token, uint64_t offset, size_t size, float urgency, strl_error *err);
+    strl_status (*submit)(strl_source *source, uint64_t token, uint64_t offset, size_t size, float urgency,
+                          strl_error *err);
     bool (*poll)(strl_source *source, strl_source_result *result);
     void (*cancel)(strl_source *source, uint64_t token);
     strl_status (*read)(strl_source *source, uint64_t offset, void *data, size_t size, strl_error *err);
@@ -35,9 +36,9 @@ struct strl_source {
     uint64_t bytes; /* size of the whole object */
 };
 
-/* Queues a read of [offset, offset + size); higher urgency is served first. The answer comes from strl_source_poll, also
- * for a cancelled or failed read (status CANCELLED, IO, ...): exactly one answer per accepted submit. A range outside the
- * source is not accepted (STRL_ERR_FORMAT). */
+/* Queues a read of [offset, offset + size); higher urgency is served first. The answer comes from strl_source_poll,
+ * also for a cancelled or failed read (status CANCELLED, IO, ...): exactly one answer per accepted submit. A range
+ * outside the source is not accepted (STRL_ERR_FORMAT). */
 strl_status strl_source_submit(strl_source *source, uint64_t token, uint64_t offset, size_t size, float urgency,
                                strl_error *err);
 /* Takes one finished read, if there is one. Never waits. */
@@ -52,9 +53,9 @@ void strl_source_close(strl_source *source); /* NULL is legal; unanswered reads 
 strl_status strl_source_open_file(const char *path, unsigned threads, strl_source **source, strl_error *err);
 /* Bytes in memory, borrowed for the life of the source. Reads are answered by the next poll. */
 strl_status strl_source_open_memory(const void *data, size_t size, strl_source **source, strl_error *err);
-/* Wraps another source (owned from then on; still the caller's on failure) and holds each answer back until delay_ns after
- * its submit. strl_source_read is not delayed. fail_every: every n-th answer is a failure (0 = none). For tests and for
- * looking at latency by hand. */
+/* Wraps another source (owned from then on; still the caller's on failure) and holds each answer back until delay_ns
+ * after its submit. strl_source_read is not delayed. fail_every: every n-th answer is a failure (0 = none). For tests
+ * and for looking at latency by hand. */
 strl_status strl_source_open_delayed(strl_source *inner, uint64_t delay_ns, unsigned fail_every, strl_source **source,
                                      strl_error *err);
 

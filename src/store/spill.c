@@ -105,9 +105,10 @@ static strl_status reserve(strl_spill_set *set, uint64_t size, strl_error *err)
     strl_status status = STRL_OK;
     strl_mutex_lock(&set->mutex);
     if (set->limit_bytes && (set->bytes > set->limit_bytes || size > set->limit_bytes - set->bytes))
-        status = strl__fail(err, STRL_ERR_LIMIT,
-                            "scratch in %.300s holds %" PRIu64 " bytes, %" PRIu64 " more would pass its limit of %" PRIu64,
-                            set->directory, set->bytes, size, set->limit_bytes);
+        status =
+            strl__fail(err, STRL_ERR_LIMIT,
+                       "scratch in %.300s holds %" PRIu64 " bytes, %" PRIu64 " more would pass its limit of %" PRIu64,
+                       set->directory, set->bytes, size, set->limit_bytes);
     else
         set->bytes += size;
     strl_mutex_unlock(&set->mutex);
@@ -173,8 +174,8 @@ static strl_status new_stream(strl_spill_set *set, const char *name, strl_spill 
     return STRL_OK;
 }
 
-static strl_status with_path(strl_spill *spill, strl_status (*call)(strl_spill *spill, const char *path, strl_error *err),
-                             strl_error *err)
+static strl_status with_path(strl_spill *spill,
+                             strl_status (*call)(strl_spill *spill, const char *path, strl_error *err), strl_error *err)
 {
     char *path = strl_path_join(spill->set->directory, spill->name);
     strl_status status = path ? call(spill, path, err)
@@ -274,7 +275,8 @@ static strl_status write_buffer(strl_spill *spill, strl_error *err)
 strl_status strl_spill_append(strl_spill *spill, const void *data, size_t size, strl_error *err)
 {
     if (spill->kept)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "the scratch file %.300s was kept to be read, not written", spill->name);
+        return strl__fail(err, STRL_ERR_ARGUMENT, "the scratch file %.300s was kept to be read, not written",
+                          spill->name);
     if (size == 0)
         return STRL_OK;
     if (size > spill->buffer_bytes - spill->buffered) {
@@ -313,7 +315,8 @@ strl_status strl_spill_read(strl_spill *spill, uint64_t offset, void *data, size
     if (offset < first || offset > end || size > end - offset)
         return strl__fail(err, STRL_ERR_ARGUMENT,
                           "read of %zu bytes at byte %" PRIu64 " of the scratch file %.200s, which has bytes %" PRIu64
-                          " to %" PRIu64, size, offset, spill->name, first, end);
+                          " to %" PRIu64,
+                          size, offset, spill->name, first, end);
     return strl_file_read(spill->file, offset, data, size, err);
 }
 

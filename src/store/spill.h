@@ -1,8 +1,8 @@
-/* Spill streams: append-only files in a scratch folder, for what does not fit into a build's memory. A set counts the bytes
- * its streams hold on disk, now and at most, and keeps them under a limit.
+/* Spill streams: append-only files in a scratch folder, for what does not fit into a build's memory. A set counts the
+ * bytes its streams hold on disk, now and at most, and keeps them under a limit.
  *
- * One thread at a time appends to a stream and closes it; any number may read flushed bytes meanwhile. Different streams of
- * one set may be used by different threads. A stream holds one file descriptor as long as it is open. */
+ * One thread at a time appends to a stream and closes it; any number may read flushed bytes meanwhile. Different
+ * streams of one set may be used by different threads. A stream holds one file descriptor as long as it is open. */
 #ifndef STRL_STORE_SPILL_H
 #define STRL_STORE_SPILL_H
 
@@ -21,8 +21,9 @@ void strl_spill_set_destroy(strl_spill_set *set);
 uint64_t strl_spill_set_bytes(strl_spill_set *set);      /* on disk now, over all streams */
 uint64_t strl_spill_set_peak_bytes(strl_spill_set *set); /* the most there ever were */
 
-/* An empty stream in the file `name` of the set's folder; a file left there by an earlier run is overwritten, a name that is
- * open in this set is refused. buffer_bytes: 0 = 256 KiB; the buffer exists from the first append to the next flush. */
+/* An empty stream in the file `name` of the set's folder; a file left there by an earlier run is overwritten, a name
+ * that is open in this set is refused. buffer_bytes: 0 = 256 KiB; the buffer exists from the first append to the next
+ * flush. */
 strl_status strl_spill_open(strl_spill_set *set, const char *name, size_t buffer_bytes, strl_spill **spill,
                             strl_error *err);
 /* A stream that an earlier run flushed and left with exactly `bytes` bytes: to be read and deleted, not appended to. */
@@ -30,16 +31,19 @@ strl_status strl_spill_open_kept(strl_spill_set *set, const char *name, uint64_t
                                  strl_error *err);
 
 /* On failure nothing has been appended, and the stream can be used on: STRL_ERR_DISK_FULL where the disk is full,
- * STRL_ERR_LIMIT where the set's limit would be passed. A failure of bytes still in the buffer shows at a later call. */
+ * STRL_ERR_LIMIT where the set's limit would be passed. A failure of bytes still in the buffer shows at a later call.
+ * */
 strl_status strl_spill_append(strl_spill *spill, const void *data, size_t size, strl_error *err);
 /* Writes what is buffered and releases the buffer. */
 strl_status strl_spill_flush(strl_spill *spill, strl_error *err);
-uint64_t strl_spill_bytes(const strl_spill *spill); /* appended so far, buffered bytes included; for the appending thread */
+uint64_t strl_spill_bytes(
+    const strl_spill *spill); /* appended so far, buffered bytes included; for the appending thread */
 
 /* Exactly size bytes at offset, all of them flushed and not dropped, or failure. */
 strl_status strl_spill_read(strl_spill *spill, uint64_t offset, void *data, size_t size, strl_error *err);
-/* Promises that no byte before offset will be read again: whole 64 KiB steps of them are given back to the disk, and to the
- * count, where the file system can do that. An offset behind an earlier one changes nothing. One thread at a time. */
+/* Promises that no byte before offset will be read again: whole 64 KiB steps of them are given back to the disk, and
+ * to the count, where the file system can do that. An offset behind an earlier one changes nothing. One thread at a
+ * time. */
 void strl_spill_drop_before(strl_spill *spill, uint64_t offset);
 
 /* The stream is closed in any case; failure means that its file is still there, and counted. NULL is legal. */

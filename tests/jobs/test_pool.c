@@ -27,14 +27,14 @@ static strl_pool *make_pool(unsigned threads)
 /* cmocka's assertions jump, so jobs on other threads count what is wrong and the test looks at the count. */
 typedef struct tally {
     strl_pool *pool;
-    uint8_t *visits;         /* by item */
-    atomic_uint busy[16];    /* by worker slot or window slot */
+    uint8_t *visits;      /* by item */
+    atomic_uint busy[16]; /* by worker slot or window slot */
     atomic_uint wrong;
     uint64_t fail_from;      /* items from here on fail */
     uint64_t fail_finish_at; /* this finish fails */
     unsigned window;
-    uint64_t values[16];     /* by window slot: what work leaves for finish */
-    uint64_t hash;           /* of the finished items, in order */
+    uint64_t values[16]; /* by window slot: what work leaves for finish */
+    uint64_t hash;       /* of the finished items, in order */
     uint64_t finished;
     strl_cancel *cancel;
     uint64_t cancel_at;

@@ -352,7 +352,8 @@ static void every_injected_failure_is_reported_and_publishes_nothing(void **stat
     (void)state;
     void (*const hooks[])(uint64_t) = {strl__alloc_fail_after, strl_file_fail_reads_after, strl_file_fail_writes_after};
     const strl_status expected[] = {STRL_ERR_MEMORY, STRL_ERR_IO, STRL_ERR_DISK_FULL};
-    const uint64_t budgets[] = {1 + 2 + 1 + 1, 4, 4}; /* lock, file and path, parent folder | 3 reads | 3 writes, and one */
+    const uint64_t budgets[] = {1 + 2 + 1 + 1, 4,
+                                4}; /* lock, file and path, parent folder | 3 reads | 3 writes, and one */
     for (size_t i = 0; i < 3; i++) {
         uint64_t budget = 0;
         strl_status status;

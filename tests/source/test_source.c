@@ -43,7 +43,15 @@ static int tear_down(void **state)
     return strl_path_remove_directory(folder, NULL) == STRL_OK ? 0 : -1;
 }
 
-enum { SOURCE_MEMORY, SOURCE_FILE_0, SOURCE_FILE_1, SOURCE_FILE_4, SOURCE_DELAYED_MEMORY, SOURCE_DELAYED_FILE, SOURCE_KINDS };
+enum {
+    SOURCE_MEMORY,
+    SOURCE_FILE_0,
+    SOURCE_FILE_1,
+    SOURCE_FILE_4,
+    SOURCE_DELAYED_MEMORY,
+    SOURCE_DELAYED_FILE,
+    SOURCE_KINDS
+};
 
 static strl_status open_kind(int kind, strl_source **source, strl_error *err)
 {
@@ -125,7 +133,10 @@ static void a_waiting_read_gives_the_bytes_of_any_kind(void **state)
 static void ranges_outside_the_source_are_not_accepted(void **state)
 {
     (void)state;
-    const struct { uint64_t offset; size_t size; } ranges[] = {
+    const struct {
+        uint64_t offset;
+        size_t size;
+    } ranges[] = {
         {BYTES, 1}, {BYTES - 1, 2}, {BYTES + 1, 0}, {UINT64_MAX, 1}, {1, SIZE_MAX}, {UINT64_MAX, SIZE_MAX},
     };
     for (int kind = 0; kind < SOURCE_KINDS; kind++) {

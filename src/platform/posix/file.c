@@ -21,11 +21,18 @@ struct strl_file {
     char *path; /* owned */
 };
 
-static _Atomic uint64_t reads_until_failure;  /* test hooks, see strl_file_fail_reads_after */
+static _Atomic uint64_t reads_until_failure; /* test hooks, see strl_file_fail_reads_after */
 static _Atomic uint64_t writes_until_failure;
 
-void strl_file_fail_reads_after(uint64_t n) { atomic_store(&reads_until_failure, n); }
-void strl_file_fail_writes_after(uint64_t n) { atomic_store(&writes_until_failure, n); }
+void strl_file_fail_reads_after(uint64_t n)
+{
+    atomic_store(&reads_until_failure, n);
+}
+
+void strl_file_fail_writes_after(uint64_t n)
+{
+    atomic_store(&writes_until_failure, n);
+}
 
 /* Counts down to 1 and stays there: the n-th call and all after it fail. */
 static bool injected_failure(_Atomic uint64_t *countdown)
@@ -107,8 +114,15 @@ strl_status strl_file_close(strl_file *file, strl_error *err)
     return status;
 }
 
-const char *strl_file_path(const strl_file *file) { return file->path; }
-uint64_t strl_file_bytes(const strl_file *file) { return atomic_load(&file->bytes); }
+const char *strl_file_path(const strl_file *file)
+{
+    return file->path;
+}
+
+uint64_t strl_file_bytes(const strl_file *file)
+{
+    return atomic_load(&file->bytes);
+}
 
 strl_status strl_file_stat(const strl_file *file, strl_file_info *info, strl_error *err)
 {
@@ -179,7 +193,8 @@ static void raise_bytes(strl_file *file, uint64_t end)
 strl_status strl_file_write(strl_file *file, uint64_t offset, const void *data, size_t size, strl_error *err)
 {
     if (offset > (uint64_t)INT64_MAX || size > (uint64_t)INT64_MAX - offset)
-        return strl__fail(err, STRL_ERR_LIMIT, "cannot write %s: %zu bytes at byte %" PRIu64 " pass the largest file size",
+        return strl__fail(err, STRL_ERR_LIMIT,
+                          "cannot write %s: %zu bytes at byte %" PRIu64 " pass the largest file size",
                           strl__path_shown(file->path), size, offset);
     size_t done = 0;
     while (done < size) {

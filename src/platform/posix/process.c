@@ -19,8 +19,15 @@ static uint64_t clock_now_ns(clockid_t clock)
     return (uint64_t)now.tv_sec * NS_PER_S + (uint64_t)now.tv_nsec;
 }
 
-uint64_t strl_clock_ns(void) { return clock_now_ns(CLOCK_MONOTONIC); }
-uint64_t strl_clock_cpu_ns(void) { return clock_now_ns(CLOCK_PROCESS_CPUTIME_ID); }
+uint64_t strl_clock_ns(void)
+{
+    return clock_now_ns(CLOCK_MONOTONIC);
+}
+
+uint64_t strl_clock_cpu_ns(void)
+{
+    return clock_now_ns(CLOCK_PROCESS_CPUTIME_ID);
+}
 
 void strl_sleep_ns(uint64_t ns)
 {

@@ -64,14 +64,45 @@ static void must(int code)
     (void)code;
 }
 
-void strl_mutex_init(strl_mutex *mutex) { must(pthread_mutex_init(mutex, NULL)); }
-void strl_mutex_deinit(strl_mutex *mutex) { must(pthread_mutex_destroy(mutex)); }
-void strl_mutex_lock(strl_mutex *mutex) { must(pthread_mutex_lock(mutex)); }
-void strl_mutex_unlock(strl_mutex *mutex) { must(pthread_mutex_unlock(mutex)); }
-void strl_condition_init(strl_condition *condition) { must(pthread_cond_init(condition, NULL)); }
-void strl_condition_deinit(strl_condition *condition) { must(pthread_cond_destroy(condition)); }
-void strl_condition_signal(strl_condition *condition) { must(pthread_cond_signal(condition)); }
-void strl_condition_broadcast(strl_condition *condition) { must(pthread_cond_broadcast(condition)); }
+void strl_mutex_init(strl_mutex *mutex)
+{
+    must(pthread_mutex_init(mutex, NULL));
+}
+
+void strl_mutex_deinit(strl_mutex *mutex)
+{
+    must(pthread_mutex_destroy(mutex));
+}
+
+void strl_mutex_lock(strl_mutex *mutex)
+{
+    must(pthread_mutex_lock(mutex));
+}
+
+void strl_mutex_unlock(strl_mutex *mutex)
+{
+    must(pthread_mutex_unlock(mutex));
+}
+
+void strl_condition_init(strl_condition *condition)
+{
+    must(pthread_cond_init(condition, NULL));
+}
+
+void strl_condition_deinit(strl_condition *condition)
+{
+    must(pthread_cond_destroy(condition));
+}
+
+void strl_condition_signal(strl_condition *condition)
+{
+    must(pthread_cond_signal(condition));
+}
+
+void strl_condition_broadcast(strl_condition *condition)
+{
+    must(pthread_cond_broadcast(condition));
+}
 
 void strl_condition_wait(strl_condition *condition, strl_mutex *mutex)
 {
