@@ -1,0 +1,36 @@
+/* What the generators share inside this folder. */
+#ifndef STRL_SCENES_GENERATOR_H
+#define STRL_SCENES_GENERATOR_H
+
+#include "scenes/ply_writer.h"
+#include "scenes/scene.h"
+#include "scenes/tile.h"
+
+/* One run of strl_scene_write. desc is complete: every default is filled in, pool is not NULL. */
+typedef struct strl__scene_run {
+    const strl_scene_desc *desc;
+    const strl_scene_progress *progress;
+    strl__ply_writer *writer;
+} strl__scene_run;
+
+/* Reports progress; STRL_ERR_CANCELLED where the caller wants to stop. */
+strl_status strl__scene_report(const strl__scene_run *run, const char *phase, uint64_t done, uint64_t total,
+                               strl_error *err);
+
+strl_status strl__scene_isosurface(strl__scene_run *run, strl_error *err);
+strl_status strl__scene_painted_plane(strl__scene_run *run, strl_error *err);
+strl_status strl__scene_plain_plane(strl__scene_run *run, strl_error *err);
+strl_status strl__scene_boxes(strl__scene_run *run, strl_error *err);
+
+/* Everything about an isosurface's extraction that does not depend on the tile. */
+typedef struct strl__isosurface {
+    strl__field field;
+    strl__grid grid;
+    strl__cube_table table;
+    strl__tile_scratch *scratch; /* one per worker of the pool */
+} strl__isosurface;
+
+/* Sets levels and grid so that the surface has desc->triangles triangles, within 2 %. */
+strl_status strl__isosurface_calibrate(const strl__scene_run *run, strl__isosurface *surface, strl_error *err);
+
+#endif

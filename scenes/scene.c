@@ -1,0 +1,102 @@
+/* The list of scenes and what all of them have in common. */
+#include "scenes/scene.h"
+
+#include <inttypes.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "scenes/generator.h"
+
+typedef struct scene_entry {
+    strl_scene_info info;
+    strl_status (*generate)(strl__scene_run *run, strl_error *err);
+    strl__ply_layout layout;
+} scene_entry;
+
+static const scene_entry scenes[] = {
+    {{"isosurface", "turbulent mixing layer: high genus, many layers, open at its four side walls only (count within 2 %)",
+      1000, 4000000000},
+     strl__scene_isosurface, STRL__PLY_POSITION_NORMAL},
+    {{"painted-plane", "square of jittered triangles with a pattern of sharp edges in vertex colours (count within 2 %)",
+      1000, 4000000000},
+     strl__scene_painted_plane, STRL__PLY_POSITION_COLOUR},
+    {{"plain-plane", "the same square in one colour", 1000, 4000000000},
+     strl__scene_plain_plane, STRL__PLY_POSITION_COLOUR},
+    {{"boxes", "separate boxes of any orientation and size in a cube (count rounded down to whole boxes)", 12, 3200000000},
+     strl__scene_boxes, STRL__PLY_POSITION},
+};
+
+enum { SCENE_COUNT = sizeof scenes / sizeof scenes[0] };
+
+const strl_scene_info *strl_scene_at(size_t index)
+{
+    return index < SCENE_COUNT ? &scenes[index].info : NULL;
+}
+
+strl_status strl__scene_report(const strl__scene_run *run, const char *phase, uint64_t done, uint64_t total,
+                               strl_error *err)
+{
+    const strl_scene_progress *progress = run->progress;
+    if (progress && progress->report && !progress->report(progress->context, phase, done, total))
+        return strl__fail(err, STRL_ERR_CANCELLED, "%s: stopped by the caller", run->desc->path);
+    return STRL_OK;
+}
+
+static strl_status find_scene(const strl_scene_desc *desc, const scene_entry **entry, strl_error *err)
+{
+    *entry = NULL;
+    if (!desc->name || !desc->path)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "a scene needs a name and a path");
+    for (size_t i = 0; i < SCENE_COUNT && !*entry; i++)
+        *entry = strcmp(scenes[i].info.name, desc->name) == 0 ? &scenes[i] : NULL;
+    if (!*entry)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "there is no scene \"%s\"", desc->name);
+    const strl_scene_info *info = &(*entry)->info;
+    if (desc->triangles < info->triangles_min || desc->triangles > info->triangles_max)
+        return strl__fail(err, STRL_ERR_LIMIT,
+                          "scene %s has %" PRIu64 " to %" PRIu64 " triangles (its PLY numbers vertices with an int), not %" PRIu64,
+                          info->name, info->triangles_min, info->triangles_max, desc->triangles);
+    return STRL_OK;
+}
+
+static strl_status generate(const scene_entry *entry, strl__scene_run *run, strl_scene_result *result, strl_error *err)
+{
+    strl_scene_result made = {0};
+    bool bare = entry->layout == STRL__PLY_POSITION_NORMAL && run->desc->no_normals;
+    strl_status status = strl__ply_create(run->desc->path, bare ? STRL__PLY_POSITION : entry->layout, &run->writer, err);
+    if (status == STRL_OK)
+        status = entry->generate(run, err);
+    if (status == STRL_OK)
+        status = strl__ply_finish(run->writer, &made.bytes, err);
+    if (status == STRL_OK && result) {
+        made.vertices = strl__ply_vertex_count(run->writer);
+        made.triangles = strl__ply_triangle_count(run->writer);
+        *result = made;
+    }
+    strl__ply_destroy(run->writer);
+    return status;
+}
+
+strl_status strl_scene_write(const strl_scene_desc *desc, const strl_scene_progress *progress, strl_scene_result *result,
+                             strl_error *err)
+{
+    if (result)
+        *result = (strl_scene_result){0};
+    strl_scene_desc full = *desc;
+    full.triangles = desc->triangles ? desc->triangles : 1000000;
+    full.memory_bytes = desc->memory_bytes ? desc->memory_bytes : (uint64_t)256 << 20;
+    const scene_entry *entry;
+    strl_status status = find_scene(&full, &entry, err);
+    if (status != STRL_OK)
+        return status;
+    strl_pool *own_pool = NULL;
+    if (!full.pool) {
+        status = strl_pool_create(0, &own_pool, err);
+        full.pool = own_pool;
+    }
+    strl__scene_run run = {.desc = &full, .progress = progress};
+    if (status == STRL_OK)
+        status = generate(entry, &run, result, err);
+    strl_pool_destroy(own_pool);
+    return status;
+}
