@@ -34,8 +34,8 @@ strl_status strl_file_read_some(strl_file *file, uint64_t offset, void *data, si
                                 strl_error *err);
 /* STRL_ERR_DISK_FULL where there is no room. */
 strl_status strl_file_write(strl_file *file, uint64_t offset, const void *data, size_t size, strl_error *err);
-/* Gives the range's blocks back to the file system where it can; reads of it then return zeros. Returns whether it
- * could. */
+/* Gives the range's blocks back to the file system where it can; reads of it then return zeros. Returns
+ * whether it could. */
 bool strl_file_punch(strl_file *file, uint64_t offset, uint64_t size);
 strl_status strl_file_sync(strl_file *file, strl_error *err);
 
@@ -55,8 +55,8 @@ typedef struct strl_lock strl_lock;
 strl_status strl_lock_acquire(const char *path, strl_lock **lock, strl_error *err);
 void strl_lock_release(strl_lock *lock);
 
-/* Fault hook for tests, process-wide: the n-th read (write) from now and all after it fail with EIO (ENOSPC). 0 =
- * off. */
+/* Fault hook for tests, process-wide: the n-th read (write) from now and all after it fail with EIO (ENOSPC).
+ * 0 switches it off. */
 void strl_file_fail_reads_after(uint64_t n);
 void strl_file_fail_writes_after(uint64_t n);
 

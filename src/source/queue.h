@@ -1,6 +1,6 @@
 /* The reads a source has accepted and not yet answered: waiting ones by urgency, then age, and finished ones in the
- * order they finished. A request holds the place of its own answer, so that once accepted it can always be answered.
- * */
+ * order they finished. A request holds the place of its own answer, so that once accepted it can always
+ * be answered. */
 #ifndef STRL_SOURCE_QUEUE_H
 #define STRL_SOURCE_QUEUE_H
 
