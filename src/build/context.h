@@ -1,0 +1,25 @@
+/* What all stages of one build share. */
+#ifndef STRL_BUILD_CONTEXT_H
+#define STRL_BUILD_CONTEXT_H
+
+#include "build/build.h"
+#include "geometry/progressive.h"
+#include "readers/reader.h"
+#include "store/spill.h"
+
+typedef struct strl_build_context {
+    const strl_build_desc *desc;
+    strl_build_result *result;
+    strl_pool *pool;
+    strl_spill_set *spills;
+    const char *scratch_dir;
+    uint64_t memory_bytes;
+    strl_build_progress progress;
+} strl_build_context;
+
+/* Reports progress; STRL_ERR_CANCELLED where the callback says so. */
+strl_status strl__build_report(strl_build_context *context, uint64_t done, uint64_t total, strl_error *err);
+/* Starts the next stage. */
+void strl__build_stage(strl_build_context *context, const char *stage);
+
+#endif

@@ -1,0 +1,109 @@
+#include "build/ingest/ingest.h"
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "build/ingest/internal.h"
+
+static strl_status open_readers(strl_build_context *context, strl_reader **readers, strl_ingest *ingest, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
+        strl_reader_desc desc = {.path = context->desc->inputs[i], .scratch_dir = context->scratch_dir,
+                                 .memory_bytes = context->memory_bytes / 4};
+        strl_reader_info info;
+        status = strl_reader_open(&desc, &readers[i], err);
+        if (status)
+            break;
+        strl_reader_info_get(readers[i], &info);
+        if (context->desc->up_axis)
+            ingest->up = (strl_axis)(context->desc->up_axis - 1);
+        else if (i == 0)
+            ingest->up = info.default_up;
+        else if (ingest->up != info.default_up)
+            status = strl__fail(err, STRL_ERR_ARGUMENT, "%s and %s disagree about the up axis (%c and %c): say --up",
+                                context->desc->inputs[0], context->desc->inputs[i], 'x' + (int)ingest->up,
+                                'x' + (int)info.default_up);
+    }
+    return status;
+}
+
+static void note_drops(strl_build_context *context, strl_reader *const *readers)
+{
+    for (uint32_t i = 0; i < context->desc->input_count; i++) {
+        strl_reader_drops drops;
+        strl_reader_drops_get(readers[i], &drops);
+        context->result->dropped_nonfinite += drops.nonfinite;
+        context->result->dropped_degenerate += drops.degenerate_faces;
+        context->result->dropped_lines += drops.lines;
+        context->result->dropped_points += drops.points;
+        context->result->triangles_in += drops.nonfinite + drops.degenerate_faces;
+    }
+}
+
+strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, strl_error *err)
+{
+    model_survey survey = {0};
+    bucket_set buckets = {0};
+    pair_spills pairs = {0};
+    *ingest = (strl_ingest){0};
+    strl_reader **readers = strl__alloc_zero(context->desc->input_count, sizeof *readers);
+    strl_status status = readers ? open_readers(context, readers, ingest, err)
+                                 : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u inputs", context->desc->input_count);
+    if (status)
+        goto done;
+    strl__build_stage(context, "survey");
+    status = strl__survey_run(context, readers, &survey, err);
+    if (status)
+        goto done;
+    context->result->triangles_in = survey.triangles;
+    note_drops(context, readers);
+    context->progress.triangles_in = survey.triangles;
+    ingest->has_normals = survey.any_normal;
+    ingest->has_colours = survey.any_colour;
+    status = strl__survey_choose_lattice(context, &survey, ingest, err);
+    if (status)
+        goto done;
+    strl__build_stage(context, "read");
+    status = strl__distribute(context, readers, &survey, ingest, &buckets, err);
+    if (status)
+        goto done;
+    for (uint32_t i = 0; i < context->desc->input_count; i++) {
+        strl_reader_close(readers[i]);
+        readers[i] = NULL;
+    }
+    strl__build_stage(context, "sort");
+    status = strl__sort_buckets(context, ingest, &buckets, &pairs, err);
+    if (status)
+        goto done;
+    strl__build_stage(context, "connect");
+    status = strl__connect_cells(context, ingest, &pairs, err);
+done:
+    for (uint32_t i = 0; readers && i < context->desc->input_count; i++)
+        strl_reader_close(readers[i]);
+    strl__free(readers);
+    strl__survey_deinit(&survey);
+    strl__buckets_deinit(&buckets);
+    strl__pair_spills_deinit(&pairs);
+    return status;
+}
+
+static void names_deinit(strl_names *names)
+{
+    for (size_t i = 0; i < names->count; i++)
+        strl__free(names->items[i]);
+    strl__free(names->items);
+    strl__free(names->rgba);
+    *names = (strl_names){0};
+}
+
+void strl_ingest_deinit(strl_ingest *ingest)
+{
+    strl_spill_close_and_delete(ingest->soup, NULL);
+    strl_spill_close_and_delete(ingest->shared, NULL);
+    strl__free(ingest->cells);
+    strl__free(ingest->edges);
+    strl__free(ingest->palette);
+    names_deinit(&ingest->parts);
+    names_deinit(&ingest->materials);
+    *ingest = (strl_ingest){0};
+}

@@ -1,0 +1,75 @@
+/* Ingest, shared by all builders: inputs -> triangles on the lattice, sorted along a space-filling curve, cut into cells of some
+ * dozens of triangles; the graph of cells that share lattice positions; and the shared positions themselves.
+ *
+ *   reader --(bounds, edge lengths, sample)--> lattice, splitters
+ *   reader --(quantise, drop)--> buckets --(sort)--> soup + cells + (position, cell) pairs
+ *   pairs  --(by hash of position)--> cell graph + shared positions
+ *
+ * All arrays that stay in memory are per cell, and the number of cells is bounded by the memory budget. */
+#ifndef STRL_BUILD_INGEST_INGEST_H
+#define STRL_BUILD_INGEST_INGEST_H
+
+#include "build/context.h"
+
+/* No normal was given: it is computed where all triangles round the vertex are at hand. */
+#define STRL_NORMAL_MISSING 0xffffu
+
+/* One corner of a triangle on the lattice. */
+typedef struct strl_soup_corner {
+    uint32_t position[3]; /* lattice cells from the tree's origin, below 2^31 */
+    uint16_t normal[2];   /* octahedral, or STRL_NORMAL_MISSING */
+    uint32_t colour;      /* sRGB-encoded RGBA8 */
+} strl_soup_corner;
+
+typedef struct strl_soup_triangle {
+    strl_soup_corner corner[3];
+    uint32_t palette; /* index into strl_ingest.palette */
+} strl_soup_triangle;
+
+typedef struct strl_cell {
+    uint64_t first; /* index of its first triangle in the soup */
+    uint32_t count;
+} strl_cell;
+
+/* An edge of the cell graph: how many lattice positions two cells share. */
+typedef struct strl_cell_edge {
+    uint32_t a, b; /* cells, a < b */
+    uint32_t weight;
+} strl_cell_edge;
+
+typedef struct strl_names {
+    char **items; /* owned */
+    uint32_t *rgba; /* of materials; NULL for parts */
+    size_t count, capacity, rgba_capacity;
+} strl_names;
+
+typedef struct strl_ingest {
+    double origin[3], step;   /* lattice cell c is origin + step * c */
+    uint32_t box_max[3];      /* lattice, of what was kept; the least corner is in box_min */
+    uint32_t box_min[3];
+    unsigned curve_shift;     /* lattice coordinates lose so many bits on the curve, which has 21 of each axis */
+    float leaf_error;         /* lattice units: what quantisation moves a point at most */
+    strl_axis up;
+    bool has_normals, has_colours;
+    uint64_t triangle_count;  /* kept */
+    strl_spill *soup;         /* triangle_count records, packed (see soup.h) */
+    strl_cell *cells;         /* [cell_count] in order of the curve */
+    uint32_t cell_count;
+    strl_cell_edge *edges;    /* [edge_count], sorted by (a, b) */
+    size_t edge_count;
+    strl_spill *shared;       /* u32 words: x y z n cell[n], for each position that n >= 2 cells have */
+    strl_palette_entry *palette; /* [palette_count] */
+    size_t palette_count, palette_capacity;
+    strl_names parts, materials;
+} strl_ingest;
+
+strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, strl_error *err);
+void strl_ingest_deinit(strl_ingest *ingest);
+
+/* Reads `count` triangles from index `first`. scratch: count * strl_soup_bytes() bytes of the caller's. */
+strl_status strl_ingest_read(const strl_ingest *ingest, uint64_t first, uint32_t count, void *scratch,
+                             strl_soup_triangle *triangles, strl_error *err);
+/* Bytes of one packed record: 40, and 12 more each with normals and colours. */
+size_t strl_soup_bytes(const strl_ingest *ingest);
+
+#endif

@@ -1,0 +1,59 @@
+/* Internal to build/ingest. */
+#ifndef STRL_BUILD_INGEST_INTERNAL_H
+#define STRL_BUILD_INGEST_INTERNAL_H
+
+#include "build/ingest/ingest.h"
+
+#define MAX_BUCKETS 384u
+#define READ_BATCH 8192u
+
+/* First pass: what must be known before a single position can be put on the lattice. */
+typedef struct model_survey {
+    double min[3], max[3];
+    uint64_t triangles;            /* as the readers gave them */
+    bool any_normal, any_colour;
+    uint64_t *edge_histogram;      /* [EDGE_BINS] of squared edge lengths */
+    double (*sample)[3];           /* [SAMPLE_CAPACITY] centroids, one of sample_stride triangles */
+    uint32_t sample_count;
+    uint64_t sample_stride;
+} model_survey;
+
+strl_status strl__survey_run(strl_build_context *context, strl_reader *const *readers, model_survey *survey, strl_error *err);
+void strl__survey_deinit(model_survey *survey);
+/* Sets origin, step, curve_shift, leaf_error. */
+strl_status strl__survey_choose_lattice(const strl_build_context *context, const model_survey *survey, strl_ingest *ingest,
+                                        strl_error *err);
+
+/* Position on the curve of a lattice point. */
+uint64_t strl__curve_key(const strl_ingest *ingest, const uint32_t position[3]);
+uint64_t strl__curve_key_of_triangle(const strl_ingest *ingest, const strl_soup_triangle *triangle);
+
+void strl__soup_pack(const strl_ingest *ingest, const strl_soup_triangle *triangle, uint8_t *bytes);
+void strl__soup_unpack(const strl_ingest *ingest, const uint8_t *bytes, strl_soup_triangle *triangle);
+
+/* Triangles to buckets by curve range. */
+typedef struct bucket_set {
+    uint32_t count;
+    uint64_t *splitter;   /* [count - 1] first key of bucket i + 1 */
+    strl_spill **spill;   /* [count] */
+} bucket_set;
+
+strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, const model_survey *survey,
+                             strl_ingest *ingest, bucket_set *buckets, strl_error *err);
+void strl__buckets_deinit(bucket_set *buckets);
+/* Buckets to soup, cells and position pairs. */
+typedef struct pair_spills {
+    uint32_t count; /* a power of two */
+    strl_spill **spill;
+} pair_spills;
+
+strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest, bucket_set *buckets, pair_spills *pairs,
+                               strl_error *err);
+/* Pairs to edges and shared positions. */
+strl_status strl__connect_cells(strl_build_context *context, strl_ingest *ingest, pair_spills *pairs, strl_error *err);
+void strl__pair_spills_deinit(pair_spills *pairs);
+
+/* Bytes that one bucket or pair spill may take, so that every worker can hold one and its sort. */
+uint64_t strl__bucket_bytes(const strl_build_context *context);
+
+#endif

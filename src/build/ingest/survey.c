@@ -1,0 +1,158 @@
+/* First pass over the inputs: bounds, edge lengths, a sample of centroids. Constant memory. */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "build/ingest/internal.h"
+
+#define SAMPLE_CAPACITY 65536u
+/* Bins of a squared length by the top bits of its float pattern: 8 bins an octave of the square, 16 an octave of length. */
+#define EDGE_BIN_SHIFT 20
+#define EDGE_BINS (1u << (31 - EDGE_BIN_SHIFT))
+
+static void count_edges(model_survey *survey, const strl_triangle *triangle)
+{
+    for (int c = 0; c < 3; c++) {
+        const double *a = triangle->position[c], *b = triangle->position[c == 2 ? 0 : c + 1];
+        double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2], length2 = x * x + y * y + z * z;
+        float value = (float)length2;
+        uint32_t bits;
+        memcpy(&bits, &value, sizeof bits);
+        if (length2 > 0)
+            survey->edge_histogram[bits >> EDGE_BIN_SHIFT]++;
+    }
+}
+
+/* Keeps one of sample_stride triangles; when the table is full, every other one goes. */
+static void take_sample(model_survey *survey, const strl_triangle *triangle)
+{
+    if (survey->triangles % survey->sample_stride)
+        return;
+    if (survey->sample_count == SAMPLE_CAPACITY) {
+        for (uint32_t i = 0; i < SAMPLE_CAPACITY / 2; i++)
+            memcpy(survey->sample[i], survey->sample[2 * i], sizeof *survey->sample);
+        survey->sample_count /= 2;
+        survey->sample_stride *= 2;
+        if (survey->triangles % survey->sample_stride)
+            return;
+    }
+    for (int k = 0; k < 3; k++)
+        survey->sample[survey->sample_count][k] =
+            (triangle->position[0][k] + triangle->position[1][k] + triangle->position[2][k]) / 3;
+    survey->sample_count++;
+}
+
+static void take(model_survey *survey, const strl_triangle *triangle)
+{
+    for (int c = 0; c < 3; c++)
+        for (int k = 0; k < 3; k++) {
+            double value = triangle->position[c][k];
+            survey->min[k] = value < survey->min[k] ? value : survey->min[k];
+            survey->max[k] = value > survey->max[k] ? value : survey->max[k];
+        }
+    survey->any_normal |= (triangle->flags & STRL_TRIANGLE_HAS_NORMAL) != 0;
+    survey->any_colour |= (triangle->flags & STRL_TRIANGLE_HAS_COLOUR) != 0;
+    count_edges(survey, triangle);
+    take_sample(survey, triangle);
+    survey->triangles++;
+}
+
+strl_status strl__survey_run(strl_build_context *context, strl_reader *const *readers, model_survey *survey, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    uint64_t bytes_before = 0, bytes_total = 0;
+    strl_triangle *batch = strl__alloc(READ_BATCH, sizeof *batch);
+    *survey = (model_survey){.min = {INFINITY, INFINITY, INFINITY}, .max = {-INFINITY, -INFINITY, -INFINITY},
+                              .sample_stride = 1};
+    survey->edge_histogram = strl__alloc_zero(EDGE_BINS, sizeof *survey->edge_histogram);
+    survey->sample = strl__alloc(SAMPLE_CAPACITY, sizeof *survey->sample);
+    if (!batch || !survey->edge_histogram || !survey->sample) {
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory to read the input");
+        goto done;
+    }
+    for (uint32_t i = 0; i < context->desc->input_count; i++) {
+        strl_reader_info info;
+        strl_reader_info_get(readers[i], &info);
+        bytes_total += info.file_bytes;
+    }
+    for (uint32_t i = 0; i < context->desc->input_count; i++) {
+        size_t count;
+        do {
+            status = strl_reader_next(readers[i], batch, READ_BATCH, &count, err);
+            for (size_t t = 0; t < count && !status; t++)
+                take(survey, &batch[t]);
+            if (!status)
+                status = strl__build_report(context, bytes_before + strl_reader_bytes_done(readers[i]), bytes_total, err);
+            if (status)
+                goto done;
+        } while (count);
+        strl_reader_info info;
+        strl_reader_info_get(readers[i], &info);
+        bytes_before += info.file_bytes;
+    }
+    if (survey->triangles == 0)
+        status = strl__fail(err, STRL_ERR_FORMAT, "%s holds no triangle that could be built", context->desc->inputs[0]);
+done:
+    strl__free(batch);
+    return status;
+}
+
+void strl__survey_deinit(model_survey *survey)
+{
+    strl__free(survey->edge_histogram);
+    strl__free(survey->sample);
+    *survey = (model_survey){0};
+}
+
+/* A length that 99 % of the edges reach: the lower end of the percentile's bin. */
+static double short_edge(const model_survey *survey)
+{
+    uint64_t total = 0, seen = 0;
+    for (uint32_t i = 0; i < EDGE_BINS; i++)
+        total += survey->edge_histogram[i];
+    for (uint32_t i = 0; i < EDGE_BINS; i++) {
+        seen += survey->edge_histogram[i];
+        if (seen > total / 100) {
+            uint32_t bits = i << EDGE_BIN_SHIFT;
+            float value;
+            memcpy(&value, &bits, sizeof value);
+            return sqrt(value);
+        }
+    }
+    return 0;
+}
+
+static double power_of_two_below(double value)
+{
+    int exponent;
+    frexp(value, &exponent);
+    return ldexp(1, exponent - 1);
+}
+
+strl_status strl__survey_choose_lattice(const strl_build_context *context, const model_survey *survey, strl_ingest *ingest,
+                                        strl_error *err)
+{
+    double extent = 0, largest = 0;
+    for (int k = 0; k < 3; k++) {
+        extent = fmax(extent, survey->max[k] - survey->min[k]);
+        largest = fmax(largest, fmax(fabs(survey->min[k]), fabs(survey->max[k])));
+    }
+    if (!(extent > largest * 1e-13) || !(extent < 1e150) || !(extent > 1e-150))
+        return strl__fail(err, STRL_ERR_FORMAT, "the model's extent %g cannot be put on a lattice at coordinates of %g",
+                          extent, largest);
+    double wanted = context->desc->grid > 0 ? context->desc->grid : ldexp(extent, -20);
+    double edge = short_edge(survey);
+    if (!(context->desc->grid > 0) && edge > 0)
+        wanted = fmin(wanted, edge / 16);
+    double finest = 2 * power_of_two_below(ldexp(extent, -30)); /* coordinates stay below 2^31 */
+    ingest->step = fmax(power_of_two_below(wanted), finest);
+    for (int k = 0; k < 3; k++)
+        ingest->origin[k] = floor(survey->min[k] / ingest->step) * ingest->step;
+    while (extent / ingest->step + 2 >= ldexp(1, 21 + (int)ingest->curve_shift))
+        ingest->curve_shift++;
+    double rounding = (largest + extent) * 4 * DBL_EPSILON / ingest->step;
+    ingest->leaf_error = nextafterf((float)(0.5 * sqrt(3.) + 2 * rounding), INFINITY);
+    return STRL_OK;
+}
