@@ -1,0 +1,73 @@
+/* The front as a draw list. */
+#include "walk/internal.h"
+
+#include <math.h>
+#include <string.h>
+
+/* A load's number and a placement share a key; strl_walk_open refuses more placements. */
+#define PLACEMENT_BITS 24
+/* The eye may stand inside a box; the depth buffer still wants a near plane before it. */
+#define LEAST_NEAR 1e-6
+
+static strl_draw_item make_item(const strl_walk *walk, const strl_view *view, const strl__active *active)
+{
+    const strl__node *node = active->node;
+    const strl_node *record = node->record;
+    const strl__placement *placement = &walk->placements[active->placement];
+    const strl_tree *tree = walk->trees[placement->tree].tree;
+    const strl__mesh *mesh = &node->mesh;
+    float error = mesh->errors[mesh->state];
+    strl_draw_item item = {
+        .key = node->load << PLACEMENT_BITS | active->placement,
+        .placement = active->placement,
+        .node = node->treelet->data.first_node + (uint32_t)(node - node->treelet->nodes),
+        .level = record->level, .group = record->group, .state = mesh->state, .visible = active->visible,
+        .vertices = mesh->vertices, .vertex_count = mesh->vertex_count,
+        .indices = mesh->indices, .index_count = 3 * mesh->triangle_end[mesh->state],
+        .dirty_first = node->dirty_first, .dirty_count = node->dirty_end - node->dirty_first,
+        .step = tree->step,
+        .error = (float)(error * tree->step),
+        .error_px = (float)strl_view_error_px(view, &active->box, error * placement->length_scale),
+    };
+    memcpy(item.anchor, record->anchor, sizeof item.anchor);
+    memcpy(item.box_min, record->box_min, sizeof item.box_min);
+    memcpy(item.box_max, record->box_max, sizeof item.box_max);
+    memcpy(item.origin, tree->origin, sizeof item.origin);
+    memcpy(item.transform, placement->transform, sizeof item.transform);
+    return item;
+}
+
+static void count_item(strl_walk *walk, const strl_draw_item *item)
+{
+    strl_walk_stats *stats = &walk->stats;
+    if (!item->visible) {
+        stats->nodes_culled++;
+        return;
+    }
+    stats->nodes++;
+    stats->triangles += item->index_count / 3;
+    stats->max_error_px = fmaxf(stats->max_error_px, item->error_px);
+}
+
+strl_status strl__draw_list(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err)
+{
+    double least = INFINITY, largest = 0;
+    if (!strl__grow(&walk->items, &walk->item_capacity, walk->front.count, sizeof *walk->items))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a draw list of %zu items", walk->front.count);
+    for (size_t i = 0; i < walk->front.count; i++) {
+        const strl__active *active = &walk->front.items[i];
+        walk->items[i] = make_item(walk, view, active);
+        count_item(walk, &walk->items[i]);
+        if (!active->visible)
+            continue;
+        double near_depth, far_depth;
+        strl_view_depth_range(view, &active->box, &near_depth, &far_depth);
+        least = fmin(least, near_depth);
+        largest = fmax(largest, far_depth);
+    }
+    list->items = walk->items;
+    list->count = (uint32_t)walk->front.count;
+    list->far_distance = largest > 0 ? largest : 1;
+    list->near_distance = fmin(fmax(least, list->far_distance * LEAST_NEAR), list->far_distance / 2);
+    return STRL_OK;
+}

@@ -1,0 +1,304 @@
+/* What the files of walk/ share.
+ *
+ * A frame runs: answers and finished decodes (requests.c) -> the cut that the camera wants and the part of it that residency
+ * allows (front.c, under budget.c's allowed error) -> states of the front's meshes (refine.c) -> reads for what is missing
+ * (requests.c over residency.c) -> draw list (draw.c).
+ *
+ * Invariants: (1) a group splits as a whole, only when all its members are active and all children of all members are
+ * resident, so that the front is a cut without cracks whatever is resident; (2) nodes of the wanted cut and all their
+ * ancestors carry wanted_frame = this frame and are not evicted, so that collapsing never waits; (3) resident_bytes counts
+ * meshes, records and reservations of reads under way, and never exceeds memory_bytes. */
+#ifndef STRL_WALK_INTERNAL_H
+#define STRL_WALK_INTERNAL_H
+
+#include <stdatomic.h>
+
+#include "base/fail.h"
+#include "container/treelet.h"
+#include "frame/view.h"
+#include "stroll/walk.h"
+
+#define STRL__REQUEST_NODES 32u          /* most nodes that one page is read for at a time */
+#define STRL__MAX_REQUESTS 256u
+#define STRL__MAX_PAGE_BYTES (16u << 20) /* a larger page is a fault: it would be held undecoded, outside of the budget */
+#define STRL__GIVE_UP_FAILURES 3u        /* from then on strl_walk_settled does not wait for it; it is still retried */
+
+typedef enum strl__residency { STRL__ABSENT, STRL__PENDING, STRL__RESIDENT } strl__residency;
+
+/* When something that failed may be asked for again. */
+typedef struct strl__retry {
+    uint32_t failures; /* in a row */
+    uint64_t frame;    /* not before this frame */
+} strl__retry;
+
+/* A decoded node: one block of at most strl_node_decoded_bytes, which `vertices` begins. indices[k] = resolve(corner k, state)
+ * for all corners, also those of triangles that the state does not have yet. The corners that a vertex v >= base_vertices
+ * moves (those in its subtree of the parent forest) are corners[moved_first[v - base] ...], moved_count of them. */
+typedef struct strl__mesh {
+    uint32_t vertex_count, base_vertices, triangle_count, step_count, state;
+    strl_vertex *vertices; /* owned, with all that follows; NULL = not resident */
+    uint32_t *corners;
+    uint32_t *moved_first, *moved_count; /* [vertex_count - base_vertices] */
+    uint32_t *triangle_end;              /* [step_count + 1] */
+    float *errors;                       /* [step_count + 1], lattice units, the larger of both kinds */
+    uint16_t *vertex_end;                /* [step_count + 1] */
+    uint16_t *parents;                   /* [vertex_count - base_vertices] */
+    uint16_t *indices;                   /* [3 * triangle_count] */
+} strl__mesh;
+
+typedef struct strl__node {
+    const strl_node *record;
+    struct strl__treelet *treelet;
+    struct strl__node *older, *newer; /* residency list; resident nodes only */
+    struct strl__request *request;    /* while pending */
+    strl__mesh mesh;                  /* resident nodes only */
+    uint64_t load;                    /* serial number of the mesh's load */
+    strl__residency residency;
+    strl__retry retry;
+    uint64_t counted_pass;  /* last traversal that counted its bytes */
+    uint64_t wanted_frame;  /* last frame whose wanted cut has it at or above itself */
+    uint64_t touched_frame; /* the same or prefetched */
+    uint64_t front_frame;   /* last frame in whose front it was */
+    uint64_t drawn_frame;   /* last frame in which it was visible too */
+    uint64_t split_frame;   /* last frame in which it was split */
+    bool was_drawn;         /* in the frame before front_frame */
+    uint32_t wanted_state;  /* of the front_frame; the finest over the placements */
+    uint32_t dirty_first, dirty_end;
+} strl__node;
+
+/* A page of records and what the walk knows of each node. */
+typedef struct strl__treelet {
+    uint32_t tree, index;
+    strl__residency residency;
+    strl__retry retry;
+    uint32_t pins;  /* nodes resident or pending */
+    uint64_t bytes; /* counted in resident_bytes */
+    uint64_t touched_frame;
+    strl_treelet_ref ref;
+    strl_treelet data;
+    strl__node nodes[STRL_TREELET_NODES];
+} strl__treelet;
+
+/* Open-addressed map of (tree, index) to treelet. */
+typedef struct strl__treelets {
+    strl__treelet **slots; /* owned with what they point at */
+    size_t capacity;       /* a power of two, or 0 */
+    size_t count;
+} strl__treelets;
+
+typedef struct strl__placement {
+    uint32_t tree;
+    double transform[12];
+    double length_scale; /* world units per lattice unit, at most */
+} strl__placement;
+
+typedef struct strl__walk_tree {
+    const strl_tree *tree; /* borrowed from the container */
+    strl__node *root;      /* NULL where no placement uses the tree */
+} strl__walk_tree;
+
+/* A page's bytes, shared by the decode jobs of its nodes. */
+typedef struct strl__page {
+    atomic_uint references;
+    uint8_t *data; /* owned */
+    size_t size;
+} strl__page;
+
+enum { STRL__JOB_QUEUED, STRL__JOB_RUNNING, STRL__JOB_DONE, STRL__JOB_ABANDONED };
+
+/* Decodes one node. Whole in itself: an abandoned job that runs after the walk is closed releases itself. */
+typedef struct strl__job {
+    atomic_int phase;
+    strl__page *page;
+    strl_node record;
+    strl__node *node;  /* the walk's thread only */
+    strl__mesh mesh;   /* result; its block is owned */
+    strl_status status;
+    strl_error error;
+} strl__job;
+
+typedef struct strl__request {
+    bool used, answered, cancelled;
+    bool prefetch;          /* for nothing that was wanted at submission */
+    uint64_t token;
+    uint64_t touched_frame; /* last frame that wanted something of it */
+    uint64_t offset;        /* of the page */
+    strl__treelet *treelet; /* records asked for; NULL = a page for nodes */
+    uint32_t node_count;    /* asked for; after the answer: not decoded yet */
+    strl__node *nodes[STRL__REQUEST_NODES];
+} strl__request;
+
+/* Something to read: a node's mesh, or the treelet with the children of a node. */
+typedef struct strl__candidate {
+    float urgency;
+    uint32_t treelet; /* index within the tree where it is records; STRL_NONE = the node's mesh */
+    strl__node *node; /* the node, or the one whose treelet names the wanted treelet */
+} strl__candidate;
+
+typedef struct strl__candidates {
+    strl__candidate *items;
+    size_t count, capacity;
+} strl__candidates;
+
+typedef struct strl__nodes {
+    strl__node **items;
+    size_t count, capacity;
+} strl__nodes;
+
+typedef struct strl__split {
+    strl__node *node;
+    bool by_group; /* only another member of its group asked for it */
+} strl__split;
+
+typedef struct strl__splits {
+    strl__split *items;
+    size_t count, capacity;
+} strl__splits;
+
+/* A node at the level in work. */
+typedef struct strl__visit {
+    strl__node *node;
+    uint32_t next; /* next member of its group, STRL_NONE at the end */
+    bool active;   /* false: wanted, but its parents could not split yet */
+} strl__visit;
+
+typedef struct strl__visits {
+    strl__visit *items;
+    size_t count, capacity;
+} strl__visits;
+
+typedef struct strl__group {
+    uint32_t id, first, last, members;
+} strl__group;
+
+typedef struct strl__groups {
+    strl__group *items;
+    size_t count, capacity;
+    uint32_t *table; /* index of a group + 1, by hash of its id */
+    size_t table_capacity;
+} strl__groups;
+
+typedef struct strl__active {
+    strl__node *node;
+    uint32_t placement;
+    bool visible;
+    strl_box box; /* world */
+} strl__active;
+
+typedef struct strl__front {
+    strl__active *items;
+    size_t count, capacity;
+} strl__front;
+
+typedef enum strl__cut_kind {
+    STRL__CUT_FRONT,   /* finds the front, collects what it misses */
+    STRL__CUT_PROBE,   /* only counts bytes; asks for records */
+    STRL__CUT_PREFETCH /* touches what it finds, collects the rest as prefetch */
+} strl__cut_kind;
+
+/* One traversal from the roots. */
+typedef struct strl__cut {
+    strl__cut_kind kind;
+    const strl_view *view;
+    double allowed_px;
+    uint64_t capacity_bytes;
+    bool stop_at_capacity; /* groups stay coarse where the next split would not fit; otherwise overflow is set */
+    uint64_t bytes;        /* result: of all nodes of the cut and their ancestors */
+    bool overflow;         /* result: more than capacity; the rest is undefined */
+    bool records_missing;  /* result: the cut ends early for want of records that are on their way */
+    bool waits;            /* result: something is missing that has not been given up */
+    uint32_t missing;      /* result: nodes of the wanted front that are not in the front, or groups' members cut short */
+} strl__cut;
+
+struct strl_walk {
+    strl_container *container; /* owned */
+    strl_source *source;       /* the container's */
+    strl_executor executor;    /* submit NULL: inline */
+    uint64_t memory_bytes;
+    double error_px;
+    double bounds[6];
+    strl__walk_tree *trees;
+    uint32_t tree_count;
+    strl__placement *placements;
+    uint32_t placement_count;
+    uint64_t root_bytes; /* meshes of the roots */
+
+    uint64_t frame, pass, loads, tokens;
+    uint32_t coarsening; /* allowed error = error_px * 2^(coarsening / 4) */
+    bool settled;
+
+    strl__treelets treelets;
+    uint64_t treelet_bytes;  /* part of resident_bytes */
+    uint64_t resident_bytes;
+    strl__node *oldest, *newest;
+
+    strl__request requests[STRL__MAX_REQUESTS];
+    uint32_t requests_in_flight, requests_pending;
+    strl__job **jobs; /* owned, in order of submission */
+    size_t job_count, job_capacity;
+
+    strl__visits level, below; /* scratch of a traversal */
+    strl__groups groups;
+    strl__nodes children; /* of the group in work */
+    strl__nodes wanted;   /* the wanted cut and all above it */
+    strl__nodes ahead;    /* resident, likely to be wanted soon */
+    strl__splits split, split_before; /* of this frame and the last */
+    strl__candidates missing, prefetch;
+    strl__front front;
+    strl_draw_item *items;
+    size_t item_capacity;
+    strl_camera camera; /* of the last frame */
+    strl_walk_stats stats;
+};
+
+/* mesh.c: thread-safe. */
+strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size, strl__mesh *mesh, strl_error *err);
+void strl__mesh_deinit(strl__mesh *mesh);
+/* Moves to another state in time proportional to the corners that change; widens [*first, *end) to hold them. */
+void strl__mesh_set_state(strl__mesh *mesh, uint32_t state, uint32_t *first, uint32_t *end);
+
+/* treelets.c */
+strl__treelet *strl__treelets_find(const strl__treelets *treelets, uint32_t tree, uint32_t index);
+bool strl__treelets_insert(strl__treelets *treelets, strl__treelet *treelet); /* owned from then on; false: no memory */
+void strl__treelets_remove(strl__treelets *treelets, strl__treelet *treelet); /* and releases it */
+void strl__treelets_deinit(strl__treelets *treelets);
+
+/* residency.c */
+/* Evicts what has waited longest and that this frame does not need until `bytes` fit; evict_before: only what was touched
+ * before that frame. False where it does not fit. */
+bool strl__make_room(strl_walk *walk, uint64_t bytes, uint64_t evict_before);
+/* A treelet without content yet, its bytes reserved; NULL where there is no room or no memory. */
+strl__treelet *strl__treelet_reserve(strl_walk *walk, uint32_t tree, uint32_t index, const strl_treelet_ref *ref);
+strl_status strl__treelet_load(strl_walk *walk, strl__treelet *treelet, const void *data, size_t size, strl_error *err);
+void strl__treelet_evict_cold(strl_walk *walk, uint64_t before_frame);
+/* The node with this id; NULL where its records are not there. */
+strl__node *strl__node_find(strl_walk *walk, uint32_t tree, uint32_t id);
+void strl__node_reserve(strl_walk *walk, strl__node *node);                  /* absent -> pending; room must be there */
+void strl__node_release(strl_walk *walk, strl__node *node);                  /* pending -> absent */
+void strl__node_install(strl_walk *walk, strl__node *node, const strl__mesh *mesh); /* pending -> resident */
+void strl__node_touch(strl_walk *walk, strl__node *node);                    /* now the youngest */
+void strl__note_fault(strl_walk *walk, strl__retry *retry, const strl_error *error);
+
+/* requests.c */
+void strl__requests_receive(strl_walk *walk);
+void strl__requests_submit(strl_walk *walk);
+uint64_t strl__jobs_pump(strl_walk *walk, uint64_t budget_ns);
+void strl__jobs_abandon(strl_walk *walk);
+
+/* front.c */
+strl_status strl__cut_run(strl_walk *walk, strl__cut *cut, strl_error *err);
+/* Makes the last front cut the frame's: what it wants is kept, splits and collapses are counted. */
+void strl__cut_commit(strl_walk *walk);
+strl_box strl__world_box(const strl_tree *tree, const strl__placement *placement, const int64_t min[3],
+                         const int64_t max[3]);
+
+/* budget.c: runs the front cut with the least error that fits. */
+strl_status strl__budget_cut(strl_walk *walk, const strl_view *view, strl__cut *cut, strl_error *err);
+
+/* refine.c */
+void strl__refine_front(strl_walk *walk, const strl_view *view);
+
+/* draw.c */
+strl_status strl__draw_list(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err);
+
+#endif

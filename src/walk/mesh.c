@@ -1,0 +1,194 @@
+/* From a page's payload to what the walk draws, and from one state to another.
+ *
+ * The corners that a vertex split moves are those of the vertex's subtree in the parent forest. They are stored in preorder of
+ * that forest, so that each subtree is one run: three numbers a corner and vertex bound the memory, whatever the mesh. */
+#include "walk/internal.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <string.h>
+
+/* Every mesh within the limits of progressive.h decodes in less. */
+#define SCRATCH_BYTES ((size_t)64 << 20)
+
+/* ---- colour */
+
+static float linear_of(unsigned code)
+{
+    float value = (float)code / 255;
+    return value <= 0.04045f ? value / 12.92f : powf((value + 0.055f) / 1.055f, 2.4f);
+}
+
+static unsigned code_of(float linear)
+{
+    float value = linear <= 0.0031308f ? linear * 12.92f : 1.055f * powf(linear, 1 / 2.4f) - 0.055f;
+    return (unsigned)lrintf(value * 255);
+}
+
+static uint32_t multiplied(uint32_t vertex, uint32_t material)
+{
+    if (vertex == UINT32_MAX || material == UINT32_MAX)
+        return vertex & material;
+    uint32_t product = ((vertex >> 24) * (material >> 24) + 127) / 255 << 24;
+    for (unsigned shift = 0; shift < 24; shift += 8) {
+        unsigned a = vertex >> shift & 255, b = material >> shift & 255;
+        unsigned code = a == 255 ? b : b == 255 ? a : code_of(linear_of(a) * linear_of(b));
+        product |= code << shift;
+    }
+    return product;
+}
+
+static void make_vertices(const strl_pm *pm, strl_vertex *vertices)
+{
+    uint32_t last[2] = {UINT32_MAX, UINT32_MAX}, product = UINT32_MAX; /* neighbours often have one colour */
+    for (uint32_t v = 0; v < pm->vertex_count; v++) {
+        uint32_t colour = pm->colour ? pm->colour[v] : UINT32_MAX;
+        uint32_t material = pm->palette[pm->palette_index ? pm->palette_index[v] : 0].rgba;
+        if (colour != last[0] || material != last[1])
+            product = multiplied(colour, material);
+        last[0] = colour, last[1] = material;
+        memcpy(vertices[v].position, pm->position[v], sizeof vertices[v].position);
+        memcpy(vertices[v].normal, pm->normal[v], sizeof vertices[v].normal);
+        for (unsigned i = 0; i < 4; i++)
+            vertices[v].rgba[i] = (uint8_t)(product >> 8 * i);
+    }
+}
+
+/* ---- layout */
+
+static strl_status allocate(const strl_pm *pm, strl__mesh *mesh, strl_error *err)
+{
+    size_t vertices = pm->vertex_count, added = vertices - pm->vertex_end[0], states = (size_t)pm->step_count + 1;
+    size_t corners = 3 * (size_t)pm->triangle_count;
+    size_t words = corners + 2 * added + 2 * states, halves = states + added + corners;
+    uint8_t *block = strl__alloc(1, vertices * sizeof(strl_vertex) + words * 4 + halves * 2);
+    if (!block)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %" PRIu32 " vertices", pm->vertex_count);
+    *mesh = (strl__mesh){.vertex_count = pm->vertex_count, .base_vertices = pm->vertex_end[0],
+                         .triangle_count = pm->triangle_count, .step_count = pm->step_count};
+    /* Four-byte arrays come first, so that all are aligned. */
+    mesh->vertices = (strl_vertex *)block;
+    mesh->corners = (uint32_t *)(mesh->vertices + vertices);
+    mesh->moved_first = mesh->corners + corners;
+    mesh->moved_count = mesh->moved_first + added;
+    mesh->triangle_end = mesh->moved_count + added;
+    mesh->errors = (float *)(mesh->triangle_end + states);
+    mesh->vertex_end = (uint16_t *)(mesh->errors + states);
+    mesh->parents = mesh->vertex_end + states;
+    mesh->indices = mesh->parents + added;
+    return STRL_OK;
+}
+
+/* ---- runs of moved corners */
+
+/* fill[v]: where the next run or corner of v's subtree goes. */
+static strl_status place_runs(const strl_pm *pm, strl__mesh *mesh, const uint32_t *own, uint32_t *fill, strl_error *err)
+{
+    uint32_t base = mesh->base_vertices, end = 0;
+    uint64_t moves = 0;
+    for (uint32_t v = mesh->vertex_count; v-- > base;) {
+        mesh->moved_count[v - base] += own[v];
+        moves += mesh->moved_count[v - base];
+        if (pm->parent[v] >= base)
+            mesh->moved_count[pm->parent[v] - base] += mesh->moved_count[v - base];
+    }
+    if (moves > STRL_PM_MAX_MOVES)
+        return strl__fail(err, STRL_ERR_FORMAT, "refining a node moves %" PRIu64 " corners, expected at most %u", moves,
+                          STRL_PM_MAX_MOVES);
+    for (uint32_t v = base; v < mesh->vertex_count; v++) { /* parents before children */
+        uint32_t *from = pm->parent[v] < base ? &end : &fill[pm->parent[v]];
+        mesh->moved_first[v - base] = *from;
+        *from += mesh->moved_count[v - base];
+        fill[v] = mesh->moved_first[v - base] + own[v];
+    }
+    return STRL_OK;
+}
+
+static strl_status find_moves(const strl_pm *pm, strl__mesh *mesh, strl_arena *arena, strl_error *err)
+{
+    uint32_t base = mesh->base_vertices, corners = 3 * pm->triangle_count;
+    const uint16_t *corner = pm->triangle ? &pm->triangle[0][0] : NULL;
+    uint32_t *own = strl_arena_alloc_zero(arena, (size_t)mesh->vertex_count + 1, sizeof *own);
+    uint32_t *fill = strl_arena_alloc_zero(arena, (size_t)mesh->vertex_count + 1, sizeof *fill);
+    uint16_t *first = strl_arena_alloc(arena, (size_t)mesh->vertex_count + 1, sizeof *first);
+    if (!own || !fill || !first)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory to decode a node of %" PRIu32 " vertices", mesh->vertex_count);
+    for (uint32_t k = 0; k < corners; k++)
+        own[corner[k]]++;
+    memset(mesh->moved_count, 0, (mesh->vertex_count - base) * sizeof *mesh->moved_count);
+    strl_status status = place_runs(pm, mesh, own, fill, err);
+    if (status != STRL_OK)
+        return status;
+    /* A vertex's own corners stand before the runs of its children. */
+    for (uint32_t v = base; v < mesh->vertex_count; v++)
+        fill[v] = mesh->moved_first[v - base];
+    for (uint32_t k = 0; k < corners; k++)
+        if (corner[k] >= base)
+            mesh->corners[fill[corner[k]]++] = k;
+    for (uint32_t v = 0; v < mesh->vertex_count; v++)
+        first[v] = (uint16_t)(v < base ? v : first[pm->parent[v]]);
+    for (uint32_t k = 0; k < corners; k++)
+        mesh->indices[k] = first[corner[k]];
+    return STRL_OK;
+}
+
+static void copy_states(const strl_pm *pm, strl__mesh *mesh)
+{
+    for (uint32_t s = 0; s <= pm->step_count; s++) {
+        mesh->vertex_end[s] = (uint16_t)pm->vertex_end[s];
+        mesh->triangle_end[s] = pm->triangle_end[s];
+        mesh->errors[s] = fmaxf(pm->geometric_error[s], pm->appearance_error[s]);
+    }
+    for (uint32_t v = mesh->base_vertices; v < mesh->vertex_count; v++)
+        mesh->parents[v - mesh->base_vertices] = pm->parent[v];
+}
+
+strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size, strl__mesh *mesh, strl_error *err)
+{
+    strl_arena arena;
+    strl_pm pm;
+    *mesh = (strl__mesh){0};
+    strl_arena_init(&arena, SCRATCH_BYTES);
+    strl_status status = strl_page_mesh(record, page, size, &arena, &pm, err);
+    if (status == STRL_OK)
+        status = allocate(&pm, mesh, err);
+    if (status == STRL_OK)
+        status = find_moves(&pm, mesh, &arena, err);
+    if (status == STRL_OK) {
+        copy_states(&pm, mesh);
+        make_vertices(&pm, mesh->vertices);
+    } else {
+        strl__mesh_deinit(mesh);
+    }
+    strl_arena_deinit(&arena);
+    return status;
+}
+
+void strl__mesh_deinit(strl__mesh *mesh)
+{
+    strl__free(mesh->vertices);
+    *mesh = (strl__mesh){0};
+}
+
+/* ---- states */
+
+void strl__mesh_set_state(strl__mesh *mesh, uint32_t state, uint32_t *first, uint32_t *end)
+{
+    uint32_t low = *first, high = *end, base = mesh->base_vertices;
+    bool refine = state > mesh->state;
+    uint32_t from = mesh->vertex_end[mesh->state], to = mesh->vertex_end[state];
+    uint32_t count = refine ? to - from : from - to;
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t v = refine ? from + i : from - 1 - i;
+        uint16_t value = refine ? (uint16_t)v : mesh->parents[v - base];
+        const uint32_t *corner = mesh->corners + mesh->moved_first[v - base];
+        for (uint32_t k = 0; k < mesh->moved_count[v - base]; k++) {
+            mesh->indices[corner[k]] = value;
+            low = corner[k] < low ? corner[k] : low;
+            high = corner[k] + 1 > high ? corner[k] + 1 : high;
+        }
+    }
+    mesh->state = state;
+    *first = low;
+    *end = high;
+}

@@ -1,0 +1,102 @@
+/* States of the front's progressive meshes: the coarsest that keeps to the allowed error, reached from the last frame's. */
+#include "walk/internal.h"
+
+/* What decides on a state: its error, projected over the node's box. */
+typedef struct projector {
+    const strl_view *view;
+    const strl_box *box;
+    const float *errors; /* by state, never increasing */
+    double length_scale;
+    double allowed_px;
+} projector;
+
+static bool suffices(const projector *p, uint32_t state)
+{
+    return strl_view_error_px(p->view, p->box, p->errors[state] * p->length_scale) <= p->allowed_px;
+}
+
+/* The first state in (low, high] that suffices, where low does not and high does. */
+static uint32_t bisect(const projector *p, uint32_t low, uint32_t high)
+{
+    while (high - low > 1) {
+        uint32_t middle = low + (high - low) / 2;
+        if (suffices(p, middle))
+            high = middle;
+        else
+            low = middle;
+    }
+    return high;
+}
+
+/* Gallops from the last state, which is close in a smooth walk; the answer does not depend on where it begins. */
+static uint32_t coarsest_state(const projector *p, uint32_t begin, uint32_t finest)
+{
+    uint32_t stride = 1, low = begin, high = begin;
+    if (suffices(p, begin)) {
+        while (low > 0 && suffices(p, low)) {
+            high = low;
+            low = low > stride ? low - stride : 0;
+            stride *= 2;
+        }
+        return high == 0 || suffices(p, low) ? low : bisect(p, low, high);
+    }
+    while (high < finest && !suffices(p, high)) {
+        low = high;
+        high = finest - high > stride ? high + stride : finest;
+        stride *= 2;
+    }
+    return suffices(p, high) ? bisect(p, low, high) : finest;
+}
+
+static void choose_state(strl_walk *walk, const strl_view *view, const strl__active *active)
+{
+    strl__node *node = active->node;
+    const projector p = {view, &active->box, node->mesh.errors, walk->placements[active->placement].length_scale,
+                         walk->stats.allowed_error_px};
+    uint32_t state = coarsest_state(&p, node->mesh.state, node->mesh.step_count);
+    if (node->front_frame != walk->frame) {
+        node->was_drawn = node->drawn_frame > 0 && node->drawn_frame + 1 == walk->frame;
+        node->front_frame = walk->frame;
+        node->wanted_state = state;
+    } else if (state > node->wanted_state) {
+        node->wanted_state = state; /* placements share a node's indices: the finest state serves all */
+    }
+    if (active->visible)
+        node->drawn_frame = walk->frame;
+}
+
+static void apply_state(strl_walk *walk, strl__node *node)
+{
+    strl__mesh *mesh = &node->mesh;
+    uint32_t before = mesh->state, state = node->wanted_state;
+    uint32_t count_before = 3 * mesh->triangle_end[before], count = 3 * mesh->triangle_end[state];
+    uint32_t first = UINT32_MAX, end = 0;
+    if (state > before)
+        walk->stats.vertex_splits += state - before;
+    else
+        walk->stats.vertex_collapses += before - state;
+    if (state != before)
+        strl__mesh_set_state(mesh, state, &first, &end);
+    if (!node->was_drawn) {
+        first = 0, end = count;
+    } else if (count > count_before) { /* not uploaded while they were not drawn */
+        first = first < count_before ? first : count_before;
+        end = count;
+    }
+    end = end < count ? end : count;
+    node->dirty_first = first < end ? first : 0;
+    node->dirty_end = first < end ? end : 0;
+}
+
+void strl__refine_front(strl_walk *walk, const strl_view *view)
+{
+    for (size_t i = 0; i < walk->front.count; i++)
+        choose_state(walk, view, &walk->front.items[i]);
+    for (size_t i = 0; i < walk->front.count; i++) {
+        strl__node *node = walk->front.items[i].node;
+        if (node->wanted_state == UINT32_MAX)
+            continue; /* done for another placement */
+        apply_state(walk, node);
+        node->wanted_state = UINT32_MAX;
+    }
+}

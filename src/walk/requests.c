@@ -1,0 +1,355 @@
+/* Reads and decodes. A request is one page of nodes or one treelet; it keeps its slot until every node of it is decoded, so that
+ * undecoded bytes are bounded by the number of slots. Decoding is a job per node: the executor's, or the pump's. */
+#include "walk/internal.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+
+#include "platform/thread.h"
+
+#define FORGET_FRAMES 16u   /* a read that nothing has wanted for this long is cancelled */
+#define SPARE_FRAMES 60u    /* prefetching evicts only what has been idle for longer */
+#define ABANDON_WAIT_NS 50000u
+
+/* ---- jobs */
+
+static void release_page(strl__page *page)
+{
+    if (page && atomic_fetch_sub_explicit(&page->references, 1, memory_order_acq_rel) == 1) {
+        strl__free(page->data);
+        strl__free(page);
+    }
+}
+
+static void destroy_job(strl__job *job)
+{
+    strl__mesh_deinit(&job->mesh);
+    release_page(job->page);
+    strl__free(job);
+}
+
+/* Runs on any thread. */
+static void run_job(void *context)
+{
+    strl__job *job = context;
+    int phase = STRL__JOB_QUEUED;
+    if (!atomic_compare_exchange_strong(&job->phase, &phase, STRL__JOB_RUNNING)) {
+        destroy_job(job); /* abandoned: the walk has let go of it */
+        return;
+    }
+    job->status = strl__mesh_create(&job->record, job->page->data, job->page->size, &job->mesh, &job->error);
+    atomic_store_explicit(&job->phase, STRL__JOB_DONE, memory_order_release);
+}
+
+uint64_t strl__jobs_pump(strl_walk *walk, uint64_t budget_ns)
+{
+    uint64_t ran = 0, start = strl_clock_ns();
+    for (size_t i = 0; i < walk->job_count; i++) {
+        if (atomic_load_explicit(&walk->jobs[i]->phase, memory_order_relaxed) != STRL__JOB_QUEUED)
+            continue;
+        if (ran > 0 && strl_clock_ns() - start >= budget_ns)
+            break;
+        run_job(walk->jobs[i]);
+        ran++;
+    }
+    return ran;
+}
+
+void strl__jobs_abandon(strl_walk *walk)
+{
+    for (size_t i = 0; i < walk->job_count; i++) {
+        strl__job *job = walk->jobs[i];
+        int phase = STRL__JOB_QUEUED;
+        if (walk->executor.submit && atomic_compare_exchange_strong(&job->phase, &phase, STRL__JOB_ABANDONED))
+            continue; /* the executor still holds it and will release it */
+        while (atomic_load_explicit(&job->phase, memory_order_acquire) == STRL__JOB_RUNNING)
+            strl_sleep_ns(ABANDON_WAIT_NS);
+        destroy_job(job);
+    }
+    walk->job_count = 0;
+}
+
+/* ---- slots */
+
+static void free_slot(strl_walk *walk, strl__request *request)
+{
+    *request = (strl__request){0};
+    walk->requests_pending--;
+}
+
+static void node_done(strl_walk *walk, strl__request *request)
+{
+    if (--request->node_count == 0)
+        free_slot(walk, request);
+}
+
+static void node_failed(strl_walk *walk, strl__request *request, strl__node *node, const strl_error *error)
+{
+    if (error->status != STRL_ERR_CANCELLED)
+        strl__note_fault(walk, &node->retry, error);
+    strl__node_release(walk, node);
+    node_done(walk, request);
+}
+
+static void reap_jobs(strl_walk *walk)
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < walk->job_count; i++) {
+        strl__job *job = walk->jobs[i];
+        if (atomic_load_explicit(&job->phase, memory_order_acquire) != STRL__JOB_DONE) {
+            walk->jobs[kept++] = job;
+            continue;
+        }
+        strl__request *request = job->node->request;
+        if (job->status == STRL_OK) {
+            strl__node_install(walk, job->node, &job->mesh);
+            job->mesh = (strl__mesh){0};
+            node_done(walk, request);
+        } else {
+            node_failed(walk, request, job->node, &job->error);
+        }
+        destroy_job(job);
+    }
+    walk->job_count = kept;
+}
+
+/* ---- answers */
+
+/* Takes over a reference of the page. */
+static strl_status start_job(strl_walk *walk, strl__node *node, strl__page *page, strl_error *err)
+{
+    strl__job *job = strl__alloc_zero(1, sizeof *job);
+    if (!job || !strl__grow(&walk->jobs, &walk->job_capacity, walk->job_count + 1, sizeof *walk->jobs)) {
+        strl__free(job);
+        release_page(page);
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory to decode a node");
+    }
+    job->page = page;
+    job->node = node;
+    job->record = *node->record;
+    if (walk->executor.submit) {
+        strl_status status = walk->executor.submit(walk->executor.context, run_job, job, err);
+        if (status != STRL_OK) {
+            destroy_job(job);
+            return status;
+        }
+    }
+    walk->jobs[walk->job_count++] = job;
+    return STRL_OK;
+}
+
+static void fail_nodes(strl_walk *walk, strl__request *request, const strl_error *error)
+{
+    for (uint32_t i = request->node_count; i-- > 0;)
+        node_failed(walk, request, request->nodes[i], error);
+}
+
+static void receive_page(strl_walk *walk, strl__request *request, strl_source_result *result)
+{
+    strl_error error = {0};
+    uint32_t count = request->node_count;
+    strl__page *page = NULL;
+    strl_status status = strl_page_check(&request->nodes[0]->record->page, result->data, result->size, &error);
+    if (status == STRL_OK && !(page = strl__alloc_zero(1, sizeof *page)))
+        status = strl__fail(&error, STRL_ERR_MEMORY, "no memory for a page");
+    if (status != STRL_OK) {
+        fail_nodes(walk, request, &error);
+        return;
+    }
+    page->data = result->data, page->size = result->size;
+    result->data = NULL;
+    atomic_init(&page->references, count + 1);
+    request->answered = true;
+    strl__node *nodes[STRL__REQUEST_NODES];
+    for (uint32_t i = 0; i < count; i++)
+        nodes[i] = request->nodes[i];
+    for (uint32_t i = 0; i < count; i++)
+        if (start_job(walk, nodes[i], page, &error) != STRL_OK)
+            node_failed(walk, request, nodes[i], &error);
+    release_page(page);
+}
+
+static void receive_treelet(strl_walk *walk, strl__request *request, const strl_source_result *result)
+{
+    strl_error error = {0};
+    strl__treelet *treelet = request->treelet;
+    if (strl__treelet_load(walk, treelet, result->data, result->size, &error) != STRL_OK)
+        strl__note_fault(walk, &treelet->retry, &error);
+    free_slot(walk, request);
+}
+
+static void receive_failure(strl_walk *walk, strl__request *request, strl_source_result *result)
+{
+    result->error.status = result->status;
+    if (!request->treelet) {
+        fail_nodes(walk, request, &result->error);
+        return;
+    }
+    request->treelet->residency = STRL__ABSENT;
+    if (result->status != STRL_ERR_CANCELLED)
+        strl__note_fault(walk, &request->treelet->retry, &result->error);
+    free_slot(walk, request);
+}
+
+void strl__requests_receive(strl_walk *walk)
+{
+    strl_source_result result;
+    reap_jobs(walk);
+    while (strl_source_poll(walk->source, &result)) {
+        strl__request *request = &walk->requests[result.token % STRL__MAX_REQUESTS];
+        if (request->used && request->token == result.token && !request->answered) {
+            if (result.status != STRL_OK)
+                receive_failure(walk, request, &result);
+            else {
+                walk->stats.bytes_read += result.size;
+                if (request->treelet)
+                    receive_treelet(walk, request, &result);
+                else
+                    receive_page(walk, request, &result);
+            }
+        }
+        strl__free(result.data);
+    }
+}
+
+/* ---- submission */
+
+static int by_urgency(const void *left, const void *right)
+{
+    const strl__candidate *a = left, *b = right;
+    if (a->urgency != b->urgency)
+        return a->urgency > b->urgency ? -1 : 1;
+    const strl_page_ref *page_a = &a->node->record->page, *page_b = &b->node->record->page;
+    return page_a->offset < page_b->offset ? -1 : page_a->offset > page_b->offset;
+}
+
+static strl__request *unanswered_page(strl_walk *walk, uint64_t offset)
+{
+    for (uint32_t i = 0; i < walk->requests_in_flight; i++) {
+        strl__request *request = &walk->requests[i];
+        if (request->used && !request->answered && !request->cancelled && !request->treelet && request->offset == offset &&
+            request->node_count < STRL__REQUEST_NODES)
+            return request;
+    }
+    return NULL;
+}
+
+static strl__request *take_slot(strl_walk *walk, uint32_t in_flight)
+{
+    if (walk->requests_pending >= in_flight)
+        return NULL;
+    uint32_t i = 0;
+    while (walk->requests[i].used)
+        i++;
+    strl__request *request = &walk->requests[i];
+    *request = (strl__request){.used = true, .token = ++walk->tokens * STRL__MAX_REQUESTS + i, .touched_frame = walk->frame};
+    walk->requests_pending++;
+    return request;
+}
+
+static strl_status submit(strl_walk *walk, strl__request *request, uint64_t offset, size_t size, float urgency, strl_error *err)
+{
+    if (size > STRL__MAX_PAGE_BYTES)
+        return strl__fail(err, STRL_ERR_LIMIT, "the page at byte %" PRIu64 " has %zu bytes, expected at most %u", offset, size,
+                          STRL__MAX_PAGE_BYTES);
+    strl_status status = strl_source_submit(walk->source, request->token, offset, size, urgency, err);
+    if (status == STRL_OK)
+        walk->stats.requests++;
+    return status;
+}
+
+static void submit_page(strl_walk *walk, strl__request *request, strl__node *node, float urgency)
+{
+    const strl_page_ref *page = &node->record->page;
+    strl_error error = {0};
+    request->offset = page->offset;
+    request->nodes[request->node_count++] = node;
+    strl__node_reserve(walk, node);
+    node->request = request;
+    if (submit(walk, request, page->offset, page->bytes, urgency, &error) != STRL_OK)
+        node_failed(walk, request, node, &error);
+}
+
+/* False where no room could be made: then nothing less urgent may take it either. */
+static bool ask_for_node(strl_walk *walk, const strl__candidate *candidate, uint32_t in_flight, uint64_t evict_before,
+                         bool prefetch)
+{
+    strl__node *node = candidate->node;
+    if (node->residency != STRL__ABSENT)
+        return true;
+    strl__request *request = unanswered_page(walk, node->record->page.offset);
+    if (!request && walk->requests_pending >= in_flight)
+        return true;
+    if (!strl__make_room(walk, strl_node_decoded_bytes(node->record), evict_before))
+        return false;
+    if (!request) {
+        request = take_slot(walk, in_flight);
+        request->prefetch = prefetch;
+        submit_page(walk, request, node, candidate->urgency);
+        return true;
+    }
+    strl__node_reserve(walk, node);
+    node->request = request;
+    request->nodes[request->node_count++] = node;
+    request->touched_frame = walk->frame;
+    return true;
+}
+
+static void ask_for_treelet(strl_walk *walk, const strl__candidate *candidate, uint32_t in_flight)
+{
+    const strl__treelet *parent = candidate->node->treelet;
+    strl__treelet *treelet = strl__treelets_find(&walk->treelets, parent->tree, candidate->treelet);
+    if (walk->requests_pending >= in_flight || (treelet && (treelet->residency != STRL__ABSENT || treelet->retry.frame > walk->frame)))
+        return;
+    uint32_t first = parent->data.first_child_treelet;
+    if (candidate->treelet < first || candidate->treelet - first >= parent->data.child_ref_count)
+        return; /* front.c has noted the fault */
+    const strl_treelet_ref *ref = &parent->data.child_refs[candidate->treelet - first];
+    if (!treelet)
+        treelet = strl__treelet_reserve(walk, parent->tree, candidate->treelet, ref);
+    if (!treelet)
+        return;
+    strl_error error = {0};
+    strl__request *request = take_slot(walk, in_flight);
+    request->treelet = treelet;
+    treelet->residency = STRL__PENDING;
+    if (submit(walk, request, ref->offset, ref->bytes, candidate->urgency, &error) == STRL_OK)
+        return;
+    treelet->residency = STRL__ABSENT;
+    strl__note_fault(walk, &treelet->retry, &error);
+    free_slot(walk, request);
+}
+
+static void ask_for_all(strl_walk *walk, strl__candidates *candidates, uint32_t in_flight, uint64_t evict_before, bool prefetch)
+{
+    bool room = true;
+    qsort(candidates->items, candidates->count, sizeof *candidates->items, by_urgency);
+    for (size_t i = 0; i < candidates->count; i++) {
+        const strl__candidate *candidate = &candidates->items[i];
+        if (candidate->treelet != STRL_NONE)
+            ask_for_treelet(walk, candidate, in_flight);
+        else if (room)
+            room = ask_for_node(walk, candidate, in_flight, evict_before, prefetch);
+    }
+}
+
+static void forget_stale(strl_walk *walk)
+{
+    for (uint32_t i = 0; i < walk->requests_in_flight; i++) {
+        strl__request *request = &walk->requests[i];
+        if (!request->used || request->answered || request->cancelled || request->treelet ||
+            request->touched_frame + FORGET_FRAMES >= walk->frame)
+            continue;
+        request->cancelled = true;
+        strl_source_cancel(walk->source, request->token);
+    }
+}
+
+void strl__requests_submit(strl_walk *walk)
+{
+    ask_for_all(walk, &walk->missing, walk->requests_in_flight, walk->frame + 1, false);
+    uint64_t idle_since = walk->frame > SPARE_FRAMES ? walk->frame - SPARE_FRAMES : 0;
+    if (walk->missing.count == 0)
+        ask_for_all(walk, &walk->prefetch, (walk->requests_in_flight + 1) / 2, idle_since, true);
+    forget_stale(walk);
+}

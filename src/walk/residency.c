@@ -1,0 +1,176 @@
+/* What is in memory, under one budget: treelets and meshes, and the reservations of those on their way. */
+#include "walk/internal.h"
+
+#include <inttypes.h>
+#include <string.h>
+
+#define RETRY_FRAMES 8u /* doubles with each failure in a row */
+#define RETRY_DOUBLINGS 7u
+/* Ids are breadth first, so the children of 128 nodes fill at most this many treelets. */
+#define MAX_CHILD_TREELETS (STRL_NODE_MAX_CHILDREN + 1)
+
+/* ---- meshes */
+
+static void unlink_node(strl_walk *walk, strl__node *node)
+{
+    *(node->older ? &node->older->newer : &walk->oldest) = node->newer;
+    *(node->newer ? &node->newer->older : &walk->newest) = node->older;
+    node->older = node->newer = NULL;
+}
+
+static void link_newest(strl_walk *walk, strl__node *node)
+{
+    node->older = walk->newest;
+    node->newer = NULL;
+    *(walk->newest ? &walk->newest->newer : &walk->oldest) = node;
+    walk->newest = node;
+}
+
+void strl__node_reserve(strl_walk *walk, strl__node *node)
+{
+    node->residency = STRL__PENDING;
+    node->treelet->pins++;
+    walk->resident_bytes += strl_node_decoded_bytes(node->record);
+}
+
+void strl__node_release(strl_walk *walk, strl__node *node)
+{
+    node->residency = STRL__ABSENT;
+    node->request = NULL;
+    node->treelet->pins--;
+    walk->resident_bytes -= strl_node_decoded_bytes(node->record);
+}
+
+void strl__node_install(strl_walk *walk, strl__node *node, const strl__mesh *mesh)
+{
+    node->residency = STRL__RESIDENT;
+    node->request = NULL;
+    node->mesh = *mesh;
+    node->load = ++walk->loads;
+    node->retry = (strl__retry){0};
+    node->touched_frame = walk->frame;
+    node->front_frame = node->drawn_frame = 0; /* what was drawn of an earlier load has another key */
+    link_newest(walk, node);
+}
+
+void strl__node_touch(strl_walk *walk, strl__node *node)
+{
+    node->touched_frame = walk->frame;
+    if (node->residency != STRL__RESIDENT || walk->newest == node)
+        return;
+    unlink_node(walk, node);
+    link_newest(walk, node);
+}
+
+static void evict(strl_walk *walk, strl__node *node)
+{
+    unlink_node(walk, node);
+    strl__mesh_deinit(&node->mesh);
+    strl__node_release(walk, node);
+}
+
+bool strl__make_room(strl_walk *walk, uint64_t bytes, uint64_t evict_before)
+{
+    if (bytes > walk->memory_bytes)
+        return false;
+    while (walk->resident_bytes > walk->memory_bytes - bytes) {
+        /* Wanted nodes are touched last of all, so the oldest one tells for the rest. */
+        strl__node *oldest = walk->oldest;
+        if (!oldest || oldest->wanted_frame == walk->frame || oldest->touched_frame >= evict_before)
+            break;
+        evict(walk, oldest);
+    }
+    if (walk->resident_bytes > walk->memory_bytes - bytes)
+        strl__treelet_evict_cold(walk, evict_before < walk->frame ? evict_before : walk->frame);
+    return walk->resident_bytes <= walk->memory_bytes - bytes;
+}
+
+/* ---- treelets */
+
+static void release_treelet(strl_walk *walk, strl__treelet *treelet)
+{
+    walk->resident_bytes -= treelet->bytes;
+    walk->treelet_bytes -= treelet->bytes;
+    strl__treelets_remove(&walk->treelets, treelet);
+}
+
+void strl__treelet_evict_cold(strl_walk *walk, uint64_t before_frame)
+{
+    for (size_t slot = 0; slot < walk->treelets.capacity;) {
+        strl__treelet *treelet = walk->treelets.slots[slot];
+        bool cold = treelet && treelet->pins == 0 && treelet->residency != STRL__PENDING &&
+                    treelet->touched_frame < before_frame;
+        if (cold)
+            release_treelet(walk, treelet); /* another may have moved into the slot */
+        else
+            slot++;
+    }
+}
+
+strl__treelet *strl__treelet_reserve(strl_walk *walk, uint32_t tree, uint32_t index, const strl_treelet_ref *ref)
+{
+    uint64_t bytes = sizeof(strl__treelet) + MAX_CHILD_TREELETS * sizeof(strl_treelet_ref);
+    /* Records may take an eighth of the budget before old ones go, and half of it in the end. */
+    if (walk->treelet_bytes + bytes > walk->memory_bytes / 8)
+        strl__treelet_evict_cold(walk, walk->frame);
+    if (walk->treelet_bytes + bytes > walk->memory_bytes / 2 || walk->treelet_bytes + bytes + walk->root_bytes > walk->memory_bytes ||
+        !strl__make_room(walk, bytes, walk->frame + 1))
+        return NULL;
+    strl__treelet *treelet = strl__alloc_zero(1, sizeof *treelet);
+    if (!treelet)
+        return NULL;
+    treelet->tree = tree, treelet->index = index, treelet->ref = *ref;
+    treelet->bytes = bytes;
+    treelet->touched_frame = walk->frame;
+    if (!strl__treelets_insert(&walk->treelets, treelet)) {
+        strl__free(treelet);
+        return NULL;
+    }
+    walk->resident_bytes += bytes;
+    walk->treelet_bytes += bytes;
+    return treelet;
+}
+
+strl_status strl__treelet_load(strl_walk *walk, strl__treelet *treelet, const void *data, size_t size, strl_error *err)
+{
+    strl_status status = strl_treelet_decode(walk->container, treelet->tree, treelet->index, &treelet->ref, data, size,
+                                             &treelet->data, err);
+    if (status == STRL_OK && treelet->data.child_ref_count > MAX_CHILD_TREELETS) {
+        status = strl__fail(err, STRL_ERR_FORMAT, "treelet %" PRIu32 " names %" PRIu32 " treelets of children, expected at most %u",
+                            treelet->index, treelet->data.child_ref_count, MAX_CHILD_TREELETS);
+        strl_treelet_deinit(&treelet->data);
+        treelet->data = (strl_treelet){0};
+    }
+    treelet->residency = status == STRL_OK ? STRL__RESIDENT : STRL__ABSENT;
+    if (status != STRL_OK)
+        return status;
+    treelet->retry = (strl__retry){0};
+    for (uint32_t i = 0; i < treelet->data.node_count; i++) {
+        treelet->nodes[i].record = &treelet->data.nodes[i];
+        treelet->nodes[i].treelet = treelet;
+    }
+    return STRL_OK;
+}
+
+strl__node *strl__node_find(strl_walk *walk, uint32_t tree, uint32_t id)
+{
+    strl__treelet *treelet = strl__treelets_find(&walk->treelets, tree, id / STRL_TREELET_NODES);
+    if (!treelet)
+        return NULL;
+    treelet->touched_frame = walk->frame;
+    uint32_t i = id % STRL_TREELET_NODES;
+    return treelet->residency == STRL__RESIDENT && i < treelet->data.node_count ? &treelet->nodes[i] : NULL;
+}
+
+/* ---- faults */
+
+void strl__note_fault(strl_walk *walk, strl__retry *retry, const strl_error *error)
+{
+    uint32_t doublings = retry->failures < RETRY_DOUBLINGS ? retry->failures : RETRY_DOUBLINGS;
+    retry->failures++;
+    retry->frame = walk->frame + ((uint64_t)RETRY_FRAMES << doublings);
+    walk->stats.faults++;
+    size_t length = strnlen(error->message, sizeof walk->stats.last_fault - 1);
+    memcpy(walk->stats.last_fault, error->message, length);
+    walk->stats.last_fault[length] = 0;
+}

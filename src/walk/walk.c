@@ -1,0 +1,307 @@
+/* A walk's life: open, frames, close. */
+#include "walk/internal.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <string.h>
+
+#include "platform/thread.h"
+
+#define DEFAULT_MEMORY_BYTES ((uint64_t)512 << 20)
+#define DEFAULT_REQUESTS 16u
+#define MAX_PLACEMENTS (1u << 24) /* what a draw item's key can tell apart */
+#define AHEAD_FRAMES 15.0         /* how far the eye's motion is carried on for prefetching */
+
+/* ---- opening */
+
+/* The largest singular value of a placement: the root of the largest eigenvalue of its transposed times itself, by Jacobi
+ * rotations; a little more for rounding, because errors must stay bounds. */
+static double largest_scale(const double transform[12])
+{
+    double a[3][3] = {{0}};
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            for (int row = 0; row < 3; row++)
+                a[i][j] += transform[4 * row + i] * transform[4 * row + j];
+    for (int sweep = 0; sweep < 12; sweep++)
+        for (int p = 0; p < 2; p++)
+            for (int q = p + 1; q < 3; q++) {
+                if (a[p][q] == 0)
+                    continue;
+                double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
+                double t = copysign(1, theta) / (fabs(theta) + sqrt(theta * theta + 1));
+                double c = 1 / sqrt(t * t + 1), s = t * c, shift = t * a[p][q];
+                int r = 3 - p - q;
+                double rp = a[r][p], rq = a[r][q];
+                a[p][p] -= shift, a[q][q] += shift;
+                a[p][q] = a[q][p] = 0;
+                a[r][p] = a[p][r] = c * rp - s * rq;
+                a[r][q] = a[q][r] = s * rp + c * rq;
+            }
+    double largest = sqrt(fmax(a[0][0], fmax(a[1][1], a[2][2])));
+    return largest == 1 ? 1 : largest * (1 + 1e-12);
+}
+
+static strl_status load_placements(strl_walk *walk, strl_error *err)
+{
+    uint64_t count = strl_container_get_info(walk->container)->placement_count;
+    if (count == 0 || count > MAX_PLACEMENTS || count > walk->memory_bytes / sizeof(strl__placement))
+        return strl__fail(err, count ? STRL_ERR_LIMIT : STRL_ERR_FORMAT, "the container has %" PRIu64
+                          " placements, expected at least 1 and no more than memory for walking allows", count);
+    walk->placements = strl__alloc((size_t)count, sizeof *walk->placements);
+    if (!walk->placements)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %" PRIu64 " placements", count);
+    for (; walk->placement_count < count; walk->placement_count++) {
+        strl__placement *placement = &walk->placements[walk->placement_count];
+        strl_placement stored;
+        strl_status status = strl_container_placement(walk->container, walk->placement_count, &stored, err);
+        if (status != STRL_OK)
+            return status;
+        const strl_tree *tree = strl_container_tree(walk->container, stored.tree);
+        if (!tree)
+            return strl__fail(err, STRL_ERR_FORMAT, "placement %" PRIu32 " names tree %" PRIu32 ", expected less than %" PRIu32,
+                              walk->placement_count, stored.tree, walk->tree_count);
+        placement->tree = stored.tree;
+        memcpy(placement->transform, stored.transform, sizeof placement->transform);
+        placement->length_scale = largest_scale(stored.transform) * tree->step;
+        if (!isfinite(placement->length_scale))
+            return strl__fail(err, STRL_ERR_FORMAT, "placement %" PRIu32 ": its transform is not finite", walk->placement_count);
+    }
+    return STRL_OK;
+}
+
+/* Reads a range and waits. *data is the caller's. */
+static strl_status read_range(strl_walk *walk, uint64_t offset, size_t size, uint8_t **data, strl_error *err)
+{
+    *data = NULL;
+    if (size > STRL__MAX_PAGE_BYTES)
+        return strl__fail(err, STRL_ERR_LIMIT, "the page at byte %" PRIu64 " has %zu bytes, expected at most %u", offset, size,
+                          STRL__MAX_PAGE_BYTES);
+    *data = strl__alloc(size, 1);
+    if (!*data)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a page of %zu bytes", size);
+    return strl_source_read(walk->source, offset, *data, size, err);
+}
+
+static strl_status load_root_records(strl_walk *walk, uint32_t tree, strl_error *err)
+{
+    strl_treelet_ref ref;
+    uint8_t *data = NULL;
+    strl_status status = strl_container_root_treelet(walk->container, tree, &ref, err);
+    if (status != STRL_OK)
+        return status;
+    strl__treelet *treelet = strl__treelet_reserve(walk, tree, 0, &ref);
+    if (!treelet)
+        return strl__fail(err, STRL_ERR_MEMORY, "the root records of tree %" PRIu32 " do not fit into the memory for walking, %"
+                          PRIu64 " bytes", tree, walk->memory_bytes);
+    status = read_range(walk, ref.offset, ref.bytes, &data, err);
+    if (status == STRL_OK)
+        status = strl__treelet_load(walk, treelet, data, ref.bytes, err);
+    if (status == STRL_OK)
+        walk->trees[tree].root = &treelet->nodes[0];
+    strl__free(data);
+    return status;
+}
+
+static strl_status load_root(strl_walk *walk, uint32_t tree, strl_error *err)
+{
+    uint8_t *data = NULL;
+    strl__mesh mesh;
+    strl_status status = load_root_records(walk, tree, err);
+    if (status != STRL_OK)
+        return status;
+    strl__node *root = walk->trees[tree].root;
+    uint64_t bytes = strl_node_decoded_bytes(root->record);
+    if (!strl__make_room(walk, bytes, 0))
+        return strl__fail(err, STRL_ERR_MEMORY, "the root of tree %" PRIu32 " takes %" PRIu64
+                          " bytes, more than is left of the memory for walking, %" PRIu64 " bytes", tree, bytes, walk->memory_bytes);
+    strl__node_reserve(walk, root);
+    walk->root_bytes += bytes;
+    const strl_page_ref *page = &root->record->page;
+    status = read_range(walk, page->offset, page->bytes, &data, err);
+    if (status == STRL_OK)
+        status = strl_page_check(page, data, page->bytes, err);
+    if (status == STRL_OK)
+        status = strl__mesh_create(root->record, data, page->bytes, &mesh, err);
+    if (status == STRL_OK)
+        strl__node_install(walk, root, &mesh);
+    strl__free(data);
+    return status;
+}
+
+static strl_status load_trees(strl_walk *walk, strl_error *err)
+{
+    walk->tree_count = strl_container_get_info(walk->container)->tree_count;
+    walk->trees = strl__alloc_zero(walk->tree_count, sizeof *walk->trees);
+    if (!walk->trees)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %" PRIu32 " trees", walk->tree_count);
+    for (uint32_t tree = 0; tree < walk->tree_count; tree++)
+        walk->trees[tree].tree = strl_container_tree(walk->container, tree);
+    strl_status status = load_placements(walk, err);
+    for (uint32_t i = 0; status == STRL_OK && i < walk->placement_count; i++)
+        if (!walk->trees[walk->placements[i].tree].root)
+            status = load_root(walk, walk->placements[i].tree, err);
+    return status;
+}
+
+static void find_bounds(strl_walk *walk)
+{
+    for (int axis = 0; axis < 3; axis++)
+        walk->bounds[axis] = INFINITY, walk->bounds[axis + 3] = -INFINITY;
+    for (uint32_t i = 0; i < walk->placement_count; i++) {
+        const strl__placement *placement = &walk->placements[i];
+        const strl_tree *tree = walk->trees[placement->tree].tree;
+        strl_box box = strl__world_box(tree, placement, tree->box_min, tree->box_max);
+        for (int axis = 0; axis < 3; axis++) {
+            walk->bounds[axis] = fmin(walk->bounds[axis], box.min[axis]);
+            walk->bounds[axis + 3] = fmax(walk->bounds[axis + 3], box.max[axis]);
+        }
+    }
+}
+
+static void apply_desc(strl_walk *walk, const strl_walk_desc *desc)
+{
+    const strl_walk_desc defaults = {0};
+    desc = desc ? desc : &defaults;
+    walk->memory_bytes = desc->memory_bytes ? desc->memory_bytes : DEFAULT_MEMORY_BYTES;
+    walk->requests_in_flight = desc->requests_in_flight ? desc->requests_in_flight : DEFAULT_REQUESTS;
+    if (walk->requests_in_flight > STRL__MAX_REQUESTS)
+        walk->requests_in_flight = STRL__MAX_REQUESTS;
+    if (desc->executor)
+        walk->executor = *desc->executor;
+    strl_walk_set_error_px(walk, desc->error_px);
+    walk->stats.allowed_error_px = walk->error_px;
+}
+
+strl_status strl_walk_open(strl_source *source, const strl_walk_desc *desc, strl_walk **out, strl_error *err)
+{
+    *out = NULL;
+    strl_walk *walk = strl__alloc_zero(1, sizeof *walk);
+    if (!walk) {
+        strl_source_close(source);
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a walk");
+    }
+    apply_desc(walk, desc);
+    strl_status status = strl_container_open(source, &walk->container, err);
+    if (status == STRL_OK) {
+        walk->source = strl_container_source(walk->container);
+        status = load_trees(walk, err);
+    }
+    if (status != STRL_OK) {
+        strl_walk_close(walk);
+        return status;
+    }
+    find_bounds(walk);
+    walk->stats.resident_bytes = walk->resident_bytes;
+    *out = walk;
+    return STRL_OK;
+}
+
+void strl_walk_close(strl_walk *walk)
+{
+    if (!walk)
+        return;
+    strl__jobs_abandon(walk);
+    strl__treelets_deinit(&walk->treelets);
+    strl_container_close(walk->container);
+    void *const owned[] = {walk->trees,          walk->placements,    walk->jobs,          walk->level.items,
+                           walk->below.items,    walk->groups.items,  walk->groups.table,  walk->children.items,
+                           walk->wanted.items,   walk->ahead.items,   walk->split.items,   walk->split_before.items,
+                           walk->missing.items,  walk->prefetch.items, walk->front.items,  walk->items, walk};
+    for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
+        strl__free(owned[i]);
+}
+
+/* ---- frames */
+
+static void begin_frame(strl_walk *walk)
+{
+    strl_walk_stats *stats = &walk->stats;
+    strl_walk_stats kept = *stats;
+    *stats = (strl_walk_stats){.frame = ++walk->frame, .allowed_error_px = kept.allowed_error_px, .faults = kept.faults};
+    memcpy(stats->last_fault, kept.last_fault, sizeof stats->last_fault);
+    walk->settled = false;
+}
+
+/* What a camera further on along its motion would want. Only while nothing is missing now. */
+static strl_status look_ahead(strl_walk *walk, const strl_camera *camera, strl_error *err)
+{
+    strl_camera further = *camera;
+    double moved = 0;
+    for (int axis = 0; axis < 3; axis++) {
+        double eye = camera->eye[axis] - walk->camera.eye[axis], target = camera->target[axis] - walk->camera.target[axis];
+        moved += fabs(eye) + fabs(target);
+        further.eye[axis] += AHEAD_FRAMES * eye;
+        further.target[axis] += AHEAD_FRAMES * target;
+    }
+    strl_view view;
+    if (walk->frame < 2 || walk->missing.count > 0 || moved == 0 || !strl_view_init(&view, &further))
+        return STRL_OK;
+    strl__cut cut = {.kind = STRL__CUT_PREFETCH, .view = &view, .allowed_px = walk->stats.allowed_error_px,
+                     .capacity_bytes = walk->memory_bytes - walk->treelet_bytes, .stop_at_capacity = true};
+    return strl__cut_run(walk, &cut, err);
+}
+
+static strl_status select_front(strl_walk *walk, const strl_camera *camera, const strl_view *view, strl_error *err)
+{
+    strl__cut cut;
+    strl_status status = strl__budget_cut(walk, view, &cut, err);
+    if (status == STRL_OK)
+        status = look_ahead(walk, camera, err);
+    if (status != STRL_OK) {
+        walk->split_before.count = 0; /* of the frame before this one: no longer to compare with */
+        return status;
+    }
+    walk->stats.missing_nodes = cut.missing;
+    walk->settled = !cut.waits;
+    strl__cut_commit(walk);
+    return STRL_OK;
+}
+
+strl_status strl_walk_frame(strl_walk *walk, const strl_camera *camera, strl_draw_list *list, strl_error *err)
+{
+    uint64_t start = strl_clock_ns();
+    strl_view view;
+    *list = (strl_draw_list){.near_distance = 1, .far_distance = 2};
+    begin_frame(walk);
+    strl__requests_receive(walk);
+    strl_status status = strl_view_init(&view, camera) ? STRL_OK
+                         : strl__fail(err, STRL_ERR_ARGUMENT, "the camera is degenerate: not finite, without a direction or an image");
+    if (status == STRL_OK)
+        status = select_front(walk, camera, &view, err);
+    if (status == STRL_OK) {
+        strl__refine_front(walk, &view);
+        strl__requests_submit(walk);
+        status = strl__draw_list(walk, &view, list, err);
+        walk->camera = *camera;
+    }
+    walk->stats.requests_pending = walk->requests_pending;
+    walk->stats.resident_bytes = walk->resident_bytes;
+    walk->stats.select_ns = strl_clock_ns() - start;
+    return status;
+}
+
+uint64_t strl_walk_pump(strl_walk *walk, uint64_t budget_ns)
+{
+    return walk->executor.submit ? 0 : strl__jobs_pump(walk, budget_ns);
+}
+
+bool strl_walk_settled(const strl_walk *walk)
+{
+    return walk->settled;
+}
+
+const strl_walk_stats *strl_walk_get_stats(const strl_walk *walk)
+{
+    return &walk->stats;
+}
+
+void strl_walk_bounds(const strl_walk *walk, double bounds[6])
+{
+    memcpy(bounds, walk->bounds, sizeof walk->bounds);
+}
+
+void strl_walk_set_error_px(strl_walk *walk, double error_px)
+{
+    walk->error_px = isfinite(error_px) && error_px > 0 ? error_px : 1;
+}
