@@ -47,6 +47,7 @@ enum strl__section_kind {
 
 #define STRL__MAX_PAGE_BYTES (16u << 20)
 #define STRL__MAX_PAGE_NODES 1024u
+#define STRL__PAGE_DECODED_BYTES (64u << 20) /* the writer closes a page that has reached this */
 
 #define STRL__TABLE_PAGE_BYTES 65536u
 #define STRL__TABLE_MAX_DEPTH 3u

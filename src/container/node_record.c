@@ -1,6 +1,5 @@
 /* Node records: docs/format.md, "Node record". */
 #include <inttypes.h>
-#include <math.h>
 
 #include "base/fail.h"
 #include "container/record.h"
@@ -128,7 +127,7 @@ static bool box_is_legal(const int64_t low[3], const int64_t high[3])
 
 static bool range_is_legal(float least, float most)
 {
-    return isfinite(least) && isfinite(most) && least >= 0 && least <= most;
+    return least >= 0 && least <= most && most <= STRL_PM_MAX_ERROR; /* false for NaN and infinity too */
 }
 
 static strl_status check_errors(const strl_node *node, uint32_t id, strl_error *err)

@@ -89,6 +89,8 @@ strl_status strl_page_mesh(const strl_node *record, const void *page, size_t siz
     if (status != STRL_OK) {
         strl_arena_rewind(arena, mark);
         *mesh = (strl_pm){0};
+        strl__fail_context(err, status, "page at byte %" PRIu64 ", payload at its byte %" PRIu32, record->page.offset,
+                           record->payload_offset);
     }
     return status;
 }

@@ -1,0 +1,104 @@
+/* Part and material names: docs/format.md, "Paged tables". */
+#include "container/names.h"
+
+#include <inttypes.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "container/opened.h"
+
+unsigned strl__utf8_length(const uint8_t *text, size_t left)
+{
+    if (left == 0 || text[0] < 0x80)
+        return left != 0;
+    unsigned length = text[0] >= 0xf0 ? 4 : text[0] >= 0xe0 ? 3 : 2;
+    if (text[0] < 0xc2 || text[0] > 0xf4 || length > left)
+        return 0;
+    for (unsigned i = 1; i < length; i++)
+        if ((text[i] & 0xc0) != 0x80)
+            return 0;
+    /* Overlong forms, surrogates, and what lies past U+10FFFF. */
+    if ((text[0] == 0xe0 && text[1] < 0xa0) || (text[0] == 0xed && text[1] > 0x9f) || (text[0] == 0xf0 && text[1] < 0x90) ||
+        (text[0] == 0xf4 && text[1] > 0x8f))
+        return 0;
+    return length;
+}
+
+bool strl__utf8_is_name(const uint8_t *text, size_t bytes)
+{
+    for (size_t at = 0; at < bytes;) {
+        unsigned length = text[at] ? strl__utf8_length(text + at, bytes - at) : 0;
+        if (!length)
+            return false;
+        at += length;
+    }
+    return true;
+}
+
+bool strl__utf8_clean(const char *name, uint8_t *out, size_t capacity, size_t *bytes)
+{
+    const uint8_t *text = (const uint8_t *)name;
+    size_t size = strlen(name), used = 0;
+    for (size_t at = 0; at < size;) {
+        unsigned length = strl__utf8_length(text + at, size - at);
+        const void *piece = length ? (const void *)(text + at) : "\xef\xbf\xbd";
+        size_t piece_bytes = length ? length : 3;
+        if (piece_bytes > capacity - used)
+            return false;
+        memcpy(out + used, piece, piece_bytes);
+        used += piece_bytes;
+        at += length ? length : 1;
+    }
+    *bytes = used;
+    return true;
+}
+
+/* Cut at a character's border, so that what fits stays UTF-8. */
+static void copy_cut(const uint8_t *text, size_t bytes, char *name, size_t size)
+{
+    size_t used = 0;
+    while (used < bytes) {
+        unsigned length = strl__utf8_length(text + used, bytes - used);
+        if (used + length >= size)
+            break;
+        used += length;
+    }
+    if (size) {
+        memcpy(name, text, used);
+        name[used] = 0;
+    }
+}
+
+static strl_status get_name(strl_container *container, strl__table *table, uint32_t index, uint32_t head_bytes, uint8_t *head,
+                            char *name, size_t size, strl_error *err)
+{
+    const uint8_t *item;
+    uint32_t bytes;
+    if (size)
+        name[0] = 0;
+    strl_status status = strl__table_get(table, container->source, index, &item, &bytes, err);
+    if (status == STRL_OK && (bytes < head_bytes || bytes > head_bytes + STRL__MAX_NAME_BYTES ||
+                              !strl__utf8_is_name(item + head_bytes, bytes - head_bytes)))
+        status = strl__fail(err, STRL_ERR_FORMAT, "table of %s: item %" PRIu32 " of %" PRIu32
+                            " bytes is not a name in UTF-8 of at most %u bytes", table->name, index, bytes, STRL__MAX_NAME_BYTES);
+    if (status != STRL_OK)
+        return strl__opened_fail(container, status, err);
+    if (head_bytes)
+        memcpy(head, item, head_bytes);
+    copy_cut(item + head_bytes, bytes - head_bytes, name, size);
+    return STRL_OK;
+}
+
+strl_status strl_container_part(strl_container *container, uint32_t part, char *name, size_t size, strl_error *err)
+{
+    return get_name(container, &container->parts, part, 0, NULL, name, size, err);
+}
+
+strl_status strl_container_material(strl_container *container, uint32_t material, char *name, size_t size, uint32_t *rgba,
+                                    strl_error *err)
+{
+    uint8_t head[STRL__MATERIAL_HEAD_BYTES] = {0};
+    strl_status status = get_name(container, &container->materials, material, sizeof head, head, name, size, err);
+    *rgba = (uint32_t)strl__load_le(head, 4);
+    return status;
+}
