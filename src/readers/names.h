@@ -1,0 +1,35 @@
+/* A bounded table of names, each with a colour: parts and materials. An index never changes once it was given. */
+#ifndef STRL_READERS_NAMES_H
+#define STRL_READERS_NAMES_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "base/memory.h"
+#include "stroll/error.h"
+
+/* Longer names are cut here. */
+#define STRL__NAME_BYTES_MAX 1023u
+
+typedef struct strl__name {
+    const char *text; /* UTF-8 */
+    uint32_t rgba;    /* sRGB-encoded RGBA8, R in the lowest byte */
+} strl__name;
+
+typedef struct strl__names {
+    strl_arena arena;
+    strl__name *items; /* owned */
+    size_t count, capacity;
+    uint32_t *slots; /* open addressing; index + 1, 0 = free; owned */
+    size_t slot_count;
+    size_t limit_bytes;
+} strl__names;
+
+void strl__names_init(strl__names *names, size_t limit_bytes);
+void strl__names_deinit(strl__names *names);
+/* The index of a name, which is added (white) where it is new. Bytes that are not UTF-8 are taken as Latin-1. */
+strl_status strl__names_add(strl__names *names, const char *text, size_t length, uint32_t *index, strl_error *err);
+/* The index of a name, UINT32_MAX where it is unknown. */
+uint32_t strl__names_find(const strl__names *names, const char *text, size_t length);
+
+#endif

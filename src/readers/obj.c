@@ -1,0 +1,419 @@
+/* Wavefront OBJ. Vertices and faces may stand in any order, so a first pass gathers v and vn (and reads the mtllibs), and
+ * every further pass turns f into batches. o and g make parts, usemtl makes materials. Texture coordinates are checked but
+ * not kept; free-form geometry and all other statements are passed over. */
+#include <inttypes.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "readers/internal.h"
+#include "readers/mtl.h"
+#include "readers/text.h"
+
+typedef struct obj_name {
+    char text[STRL__NAME_BYTES_MAX + 1];
+    size_t length;
+} obj_name;
+
+typedef struct obj_state {
+    strl__names library;    /* materials that the mtllibs define */
+    bool has_library;       /* the names were initialised */
+    bool has_colour;        /* some vertex has one */
+    uint64_t vertices_seen; /* of this pass, so far: what negative indices count from */
+    uint64_t normals_seen;
+    obj_name object, group, material;
+    uint32_t part_index, material_index;
+    bool part_known, material_known; /* the indices fit the names */
+} obj_state;
+
+typedef enum obj_keyword {
+    OBJ_VERTEX, OBJ_NORMAL, OBJ_FACE, OBJ_LINE, OBJ_POINT, OBJ_OBJECT, OBJ_GROUP, OBJ_USE_MATERIAL, OBJ_LIBRARY, OBJ_OTHER
+} obj_keyword;
+
+#define VERTEX_BYTES 28u /* three doubles and a colour */
+#define NORMAL_BYTES 12u /* three floats */
+
+static bool matches(const char *at, const char *word, size_t length)
+{
+    return memcmp(at, word, length) == 0 && (strl__is_blank(at[length]) || strl__is_line_end(at[length]));
+}
+
+/* The keyword at the start of a statement; its bytes are passed. A whole token can be looked at. */
+static obj_keyword take_keyword(strl__input *input)
+{
+    static const struct {
+        const char *word;
+        uint8_t length;
+        obj_keyword keyword;
+    } words[] = {
+        {"v", 1, OBJ_VERTEX},  {"f", 1, OBJ_FACE},   {"vn", 2, OBJ_NORMAL},          {"l", 1, OBJ_LINE},
+        {"p", 1, OBJ_POINT},   {"o", 1, OBJ_OBJECT}, {"g", 1, OBJ_GROUP},            {"fo", 2, OBJ_FACE},
+        {"usemtl", 6, OBJ_USE_MATERIAL},             {"mtllib", 6, OBJ_LIBRARY},
+    };
+    const char *at = input->at;
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++)
+        if (*at == *words[i].word && input->end - at >= words[i].length && matches(at, words[i].word, words[i].length)) {
+            input->at += words[i].length;
+            return words[i].keyword;
+        }
+    return OBJ_OTHER;
+}
+
+/* The first statement that is no comment must be one that OBJ files begin with. */
+static bool obj_recognises(const strl__input *input, uint64_t file_bytes)
+{
+    static const char *const words[] = {"v", "vn", "vt", "f", "o", "g", "s", "mtllib", "usemtl", "l", "p"};
+    (void)file_bytes;
+    const char *at = input->at;
+    if (input->end - at >= 3 && memcmp(at, "\xef\xbb\xbf", 3) == 0)
+        at += 3;
+    for (;;) {
+        while (strl__is_blank(*at) || strl__is_line_end(*at))
+            at++;
+        if (*at != '#')
+            break;
+        while (at < input->end && !strl__is_line_end(*at))
+            at++;
+    }
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
+        size_t length = strlen(words[i]);
+        if (input->end - at > (ptrdiff_t)length && memcmp(at, words[i], length) == 0 && strl__is_blank(at[length]))
+            return true;
+    }
+    return false;
+}
+
+static strl_status obj_open(strl_reader *reader, strl_error *err)
+{
+    strl__input *input = &reader->input;
+    strl__input_want(input, 2);
+    if (input->end - input->at >= 2 && (memcmp(input->at, "\xff\xfe", 2) == 0 || memcmp(input->at, "\xfe\xff", 2) == 0))
+        return strl__fail(err, STRL_ERR_UNSUPPORTED, "%s, byte 0: expected text in UTF-8, found UTF-16", reader->path);
+    reader->triangles_hint = reader->opened.bytes / 60 + 1;
+    return STRL_OK;
+}
+
+static strl_status read_coordinates(strl__input *input, double *values, unsigned least, unsigned most, unsigned *count,
+                                    strl_error *err)
+{
+    for (*count = 0; *count < most; (*count)++) {
+        strl__text_skip_blanks(input);
+        if (*count >= least && (strl__text_at_line_end(input) || *input->at == '#'))
+            break;
+        if (!strl__text_number(input, &values[*count]))
+            return strl__text_expected(input, "a number", err);
+    }
+    return STRL_OK;
+}
+
+/* v x y z [r g b]; a lone fourth number is a weight, which polygons do not use. */
+static strl_status read_vertex(strl_reader *reader, strl_error *err)
+{
+    obj_state *obj = reader->state;
+    double values[6];
+    unsigned count;
+    strl_status status = read_coordinates(&reader->input, values, 3, 6, &count, err);
+    if (status)
+        return status;
+    uint8_t record[VERTEX_BYTES];
+    uint8_t *channel = record + 24;
+    memcpy(record, values, 24);
+    for (unsigned i = 0; i < 4; i++)
+        channel[i] = count == 6 && i < 3 ? strl__colour_channel(STRL__F64, values[3 + i]) : 255;
+    obj->has_colour = obj->has_colour || count == 6;
+    return strl__table_append(&reader->vertices, record, err);
+}
+
+static strl_status read_normal(strl_reader *reader, strl_error *err)
+{
+    double values[3] = {0};
+    unsigned count;
+    strl_status status = read_coordinates(&reader->input, values, 3, 3, &count, err);
+    const float normal[3] = {(float)values[0], (float)values[1], (float)values[2]};
+    return status ? status : strl__table_append(&reader->normals, normal, err);
+}
+
+/* The library's path beside the model; owned by the caller. */
+static char *library_path(const strl_reader *reader, const char *name, size_t length)
+{
+    const char *slash = strrchr(reader->path, '/');
+    size_t folder = slash && name[0] != '/' ? (size_t)(slash + 1 - reader->path) : 0;
+    char *path = strl__alloc(folder + length + 1, 1);
+    if (!path)
+        return NULL;
+    memcpy(path, reader->path, folder);
+    for (size_t i = 0; i < length; i++)
+        path[folder + i] = name[i] == '\\' ? '/' : name[i];
+    path[folder + length] = 0;
+    return path;
+}
+
+static strl_status read_library(strl_reader *reader, const char *name, size_t length, bool *found, strl_error *err)
+{
+    obj_state *obj = reader->state;
+    char *path = library_path(reader, name, length);
+    strl_status status = path ? strl__mtl_read(path, &obj->library, found, err)
+                              : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", reader->path);
+    strl__free(path);
+    return status;
+}
+
+/* mtllib NAME..: the whole line is tried first, because names with blanks are more common than several names. */
+static strl_status read_libraries(strl_reader *reader, strl_error *err)
+{
+    strl__input *input = &reader->input;
+    strl__text_skip_blanks(input);
+    size_t length = strl__text_rest_of_line(input);
+    bool found = false;
+    strl_status status = length ? read_library(reader, input->at, length, &found, err) : STRL_OK;
+    while (!status && !found && !strl__text_at_line_end(input)) {
+        bool ignored;
+        size_t token = strl__text_token(input);
+        if (token < length)
+            status = read_library(reader, input->at, token, &ignored, err);
+        input->at += token;
+        strl__text_skip_blanks(input);
+    }
+    return status;
+}
+
+static strl_status gather(strl_reader *reader, strl_error *err)
+{
+    strl__input *input = &reader->input;
+    strl_status status = STRL_OK;
+    for (; !status; strl__text_skip_line(input)) {
+        strl__text_skip_blanks(input);
+        if (input->at == input->end)
+            return strl__input_status(input, err);
+        switch (take_keyword(input)) {
+        case OBJ_VERTEX: status = read_vertex(reader, err); break;
+        case OBJ_NORMAL: status = read_normal(reader, err); break;
+        case OBJ_LIBRARY: status = read_libraries(reader, err); break;
+        default: break;
+        }
+    }
+    return status;
+}
+
+static void build_tables(strl_reader *reader)
+{
+    const bool big_endian = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
+    strl__layout vertex = {.stride = VERTEX_BYTES, .big_endian = big_endian, .has_position = true, .has_colour = true,
+                           .has_alpha = true};
+    strl__layout normal = {.stride = NORMAL_BYTES, .big_endian = big_endian, .has_normal = true};
+    for (uint32_t i = 0; i < 4; i++)
+        vertex.colour[i] = (strl__field){24 + i, STRL__U8};
+    for (uint32_t i = 0; i < 3; i++) {
+        vertex.position[i] = (strl__field){8 * i, STRL__F64};
+        normal.normal[i] = (strl__field){4 * i, STRL__F32};
+    }
+    size_t window = (size_t)(reader->memory_bytes / 2);
+    strl__table_build(&reader->vertices, &vertex, reader->scratch_dir, window / 3 * 2);
+    strl__table_build(&reader->normals, &normal, reader->scratch_dir, window / 3);
+}
+
+static strl_status obj_prepare(strl_reader *reader, strl_error *err)
+{
+    obj_state *obj = reader->state;
+    if (obj->has_library)
+        strl__names_deinit(&obj->library);
+    strl__names_init(&obj->library, (size_t)(reader->memory_bytes / 32));
+    obj->has_library = true;
+    obj->has_colour = false;
+    build_tables(reader);
+    strl__input_seek(&reader->input, 0, 1);
+    strl__text_skip_byte_order_mark(&reader->input);
+    strl_status status = gather(reader, err);
+    if (!status)
+        status = strl__table_finish(&reader->vertices, err);
+    if (!status)
+        status = strl__table_finish(&reader->normals, err);
+    reader->vertices.layout.has_colour = obj->has_colour;
+    return status ? status : strl__reader_init_batch(reader, true, err);
+}
+
+static strl_status obj_start(strl_reader *reader, strl_error *err)
+{
+    obj_state *obj = reader->state;
+    (void)err;
+    obj->vertices_seen = obj->normals_seen = 0;
+    obj->object.length = obj->group.length = obj->material.length = 0;
+    obj->part_known = obj->material_known = false;
+    reader->batch.has_corner_colour = obj->has_colour;
+    strl__input_seek(&reader->input, 0, 1);
+    strl__text_skip_byte_order_mark(&reader->input);
+    return STRL_OK;
+}
+
+static void take_name(strl__input *input, obj_name *name)
+{
+    strl__text_skip_blanks(input);
+    size_t length = strl__text_rest_of_line(input);
+    name->length = length < sizeof name->text ? length : sizeof name->text - 1;
+    memcpy(name->text, input->at, name->length);
+}
+
+/* Parts and materials are added when a first face has them. */
+static strl_status name_face(strl_reader *reader, strl_error *err)
+{
+    obj_state *obj = reader->state;
+    strl_status status = STRL_OK;
+    if (!obj->part_known) {
+        char name[2 * sizeof obj->object.text];
+        size_t length = obj->object.length;
+        memcpy(name, obj->object.text, length);
+        if (length > 0 && obj->group.length > 0)
+            name[length++] = '/';
+        memcpy(name + length, obj->group.text, obj->group.length);
+        length += obj->group.length;
+        status = strl__names_add(&reader->parts, name, length, &obj->part_index, err);
+        obj->part_known = !status;
+    }
+    if (!status && !obj->material_known) {
+        const obj_name *material = &obj->material;
+        uint32_t defined = strl__names_find(&obj->library, material->text, material->length);
+        status = strl__names_add(&reader->materials, material->text, material->length, &obj->material_index, err);
+        if (!status && defined != UINT32_MAX)
+            reader->materials.items[obj->material_index].rgba = obj->library.items[defined].rgba;
+        obj->material_known = !status;
+    }
+    return status ? strl__fail_context(err, status, "%s, line %" PRIu64, reader->path, reader->input.line) : STRL_OK;
+}
+
+static strl_status index_fail(strl_reader *reader, const char *what, int64_t found, uint64_t count, strl_error *err)
+{
+    return strl__fail(err, STRL_ERR_FORMAT, "%s, line %" PRIu64 ": expected the index of one of %" PRIu64
+                      " %s, found %" PRId64, reader->path, reader->input.line, count, what, found);
+}
+
+/* From the file's count (1 = first, -1 = last so far) to ours. False where there is no such thing. */
+static bool to_index(int64_t written, uint64_t seen, uint64_t count, uint64_t *index)
+{
+    *index = written > 0 ? (uint64_t)written - 1 : seen + (uint64_t)written; /* wraps where it is before the first */
+    return written != 0 && *index < count && (written > 0 || (uint64_t)-written <= seen);
+}
+
+/* v, v/vt, v//vn or v/vt/vn, where what stands after a slash may be missing. */
+static strl_status read_corner(strl_reader *reader, uint64_t *vertex, uint64_t *normal, strl_error *err)
+{
+    obj_state *obj = reader->state;
+    strl__input *input = &reader->input;
+    int64_t written[3] = {0, 0, 0};
+    bool given[3] = {false, false, false};
+    const char *at = input->at;
+    for (unsigned i = 0; i < 3; i++) {
+        const char *after = strl__integer_parse(at, &written[i]);
+        given[i] = after != NULL;
+        at = after ? after : at;
+        if (*at != '/' || i == 2)
+            break;
+        at++;
+    }
+    if (!given[0] || !strl__is_token_end(input, at))
+        return strl__text_expected(input, "a corner such as 1, 1/2, 1//3 or 1/2/3", err);
+    if (!to_index(written[0], obj->vertices_seen, reader->vertices.count, vertex))
+        return index_fail(reader, "vertices", written[0], reader->vertices.count, err);
+    *normal = STRL__NO_INDEX;
+    if (given[2] && !to_index(written[2], obj->normals_seen, reader->normals.count, normal))
+        return index_fail(reader, "normals", written[2], reader->normals.count, err);
+    input->at = at;
+    return STRL_OK;
+}
+
+static strl_status read_face(strl_reader *reader, strl_error *err)
+{
+    obj_state *obj = reader->state;
+    strl__batch *batch = &reader->batch;
+    strl__face face = {.colour = 0xffffffffu};
+    for (;;) {
+        strl__text_skip_blanks(&reader->input);
+        if (strl__text_at_line_end(&reader->input) || *reader->input.at == '#')
+            break;
+        if (face.corner_count == STRL__POLYGON_CORNERS_MAX)
+            return strl__fail(err, STRL_ERR_LIMIT, "%s, line %" PRIu64 ": expected at most %u corners in a face",
+                              reader->path, reader->input.line, STRL__POLYGON_CORNERS_MAX);
+        size_t slot = batch->corner_count + face.corner_count++;
+        uint64_t normal = STRL__NO_INDEX;
+        strl_status status = read_corner(reader, &batch->vertex[slot], &normal, err);
+        if (status)
+            return status;
+        if (batch->normal)
+            batch->normal[slot] = normal;
+    }
+    if (face.corner_count < 3) {
+        reader->drops.degenerate_faces++;
+        return STRL_OK;
+    }
+    if (!obj->part_known || !obj->material_known) {
+        strl_status status = name_face(reader, err);
+        if (status)
+            return status;
+    }
+    face.part = obj->part_index;
+    face.material = obj->material_index;
+    strl__batch_add(batch, &face);
+    return STRL_OK;
+}
+
+static strl_status read_statement(strl_reader *reader, strl_error *err)
+{
+    obj_state *obj = reader->state;
+    strl__input *input = &reader->input;
+    switch (take_keyword(input)) {
+    case OBJ_VERTEX: obj->vertices_seen++; break;
+    case OBJ_NORMAL: obj->normals_seen++; break;
+    case OBJ_FACE: return read_face(reader, err);
+    case OBJ_LINE: reader->drops.lines++; break;
+    case OBJ_POINT: reader->drops.points++; break;
+    case OBJ_OBJECT:
+        take_name(input, &obj->object);
+        obj->group.length = 0;
+        obj->part_known = false;
+        break;
+    case OBJ_GROUP:
+        take_name(input, &obj->group);
+        obj->part_known = false;
+        break;
+    case OBJ_USE_MATERIAL:
+        take_name(input, &obj->material);
+        obj->material_known = false;
+        break;
+    default: break;
+    }
+    return STRL_OK;
+}
+
+static strl_status obj_fill(strl_reader *reader, strl_error *err)
+{
+    strl__input *input = &reader->input;
+    for (; !strl__batch_is_full(&reader->batch); strl__text_skip_line(input)) {
+        strl__text_skip_blanks(input);
+        if (input->at == input->end) {
+            reader->ended = true;
+            return strl__input_status(input, err);
+        }
+        strl_status status = read_statement(reader, err);
+        if (status)
+            return status;
+    }
+    return STRL_OK;
+}
+
+static void obj_close(strl_reader *reader)
+{
+    obj_state *obj = reader->state;
+    if (obj->has_library)
+        strl__names_deinit(&obj->library);
+}
+
+const strl__format strl__format_obj = {
+    .name = "obj",
+    .default_up = STRL_AXIS_Y,
+    .state_bytes = sizeof(obj_state),
+    .recognises = obj_recognises,
+    .open = obj_open,
+    .prepare = obj_prepare,
+    .start = obj_start,
+    .fill = obj_fill,
+    .close = obj_close,
+};

@@ -1,0 +1,257 @@
+/* Opening, recognising and driving a format. A quarter of the budget is for faces under way, half for windows on vertices,
+ * an eighth for names, a 32nd for the input; the rest is for polygons and small change. */
+#include "readers/reader.h"
+
+#include <inttypes.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "readers/internal.h"
+#include "readers/text.h"
+
+#define MEMORY_DEFAULT ((uint64_t)256 << 20)
+#define INPUT_BYTES_MAX ((uint64_t)1 << 20)
+
+/* The most certain signature first. */
+static const strl__format *const formats[] = {&strl__format_ply, &strl__format_stl, &strl__format_obj};
+
+static bool has_extension(const char *path, const char *extension)
+{
+    size_t length = strlen(path), wanted = strlen(extension);
+    if (length <= wanted || path[length - wanted - 1] != '.')
+        return false;
+    for (size_t i = 0; i < wanted; i++)
+        if ((path[length - wanted + i] | 0x20) != extension[i])
+            return false;
+    return true;
+}
+
+static strl_status recognise(strl_reader *reader, strl_error *err)
+{
+    if (reader->opened.bytes == 0)
+        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected a mesh, found an empty file", reader->path);
+    strl__input_want(&reader->input, STRL__TOKEN_BYTES);
+    strl_status status = strl__input_status(&reader->input, err);
+    if (status)
+        return status;
+    for (size_t i = 0; i < sizeof formats / sizeof *formats && !reader->format; i++)
+        if (formats[i]->recognises(&reader->input, reader->opened.bytes))
+            reader->format = formats[i];
+    for (size_t i = 0; i < sizeof formats / sizeof *formats && !reader->format; i++)
+        if (has_extension(reader->path, formats[i]->name))
+            reader->format = formats[i];
+    if (reader->format)
+        return STRL_OK;
+    return strl__fail(err, STRL_ERR_UNSUPPORTED,
+                      "%s: expected a PLY, STL or OBJ file, found neither their first bytes nor their names",
+                      reader->path);
+}
+
+static strl_status open_file(strl_reader *reader, const strl_reader_desc *desc, strl_error *err)
+{
+    reader->path = strl__strdup(desc->path);
+    reader->scratch_dir = desc->scratch_dir ? strl__strdup(desc->scratch_dir) : NULL;
+    if (!reader->path || (desc->scratch_dir && !reader->scratch_dir))
+        return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", desc->path);
+    strl_status status = strl_file_open(desc->path, &reader->file, err);
+    if (!status)
+        status = strl_file_stat(reader->file, &reader->opened, err);
+    uint64_t input_bytes = reader->memory_bytes / 32;
+    if (!status)
+        status = strl__input_init(&reader->input, reader->file,
+                                  (size_t)(input_bytes < INPUT_BYTES_MAX ? input_bytes : INPUT_BYTES_MAX), err);
+    return status;
+}
+
+static strl_status open_format(strl_reader *reader, strl_error *err)
+{
+    strl_status status = reader->format ? STRL_OK : recognise(reader, err);
+    if (status)
+        return status;
+    reader->state = strl__alloc_zero(1, reader->format->state_bytes);
+    if (!reader->state)
+        return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a reader", reader->path);
+    strl__input_seek(&reader->input, 0, 1);
+    return reader->format->open(reader, err);
+}
+
+strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__format *format, strl_reader **out,
+                                 strl_error *err)
+{
+    *out = NULL;
+    uint64_t memory_bytes = desc->memory_bytes ? desc->memory_bytes : MEMORY_DEFAULT;
+    if (memory_bytes < STRL__READER_MEMORY_LEAST)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "%s: %" PRIu64 " bytes of memory are too few, a reader needs %" PRIu64,
+                          desc->path, memory_bytes, STRL__READER_MEMORY_LEAST);
+    strl_reader *reader = strl__alloc_zero(1, sizeof *reader);
+    if (!reader)
+        return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a reader", desc->path);
+    reader->format = format;
+    reader->memory_bytes = memory_bytes;
+    strl__names_init(&reader->parts, (size_t)(memory_bytes / 16));
+    strl__names_init(&reader->materials, (size_t)(memory_bytes / 16));
+    strl_status status = open_file(reader, desc, err);
+    if (!status)
+        status = open_format(reader, err);
+    if (!status)
+        *out = reader;
+    else
+        strl_reader_close(reader);
+    return status;
+}
+
+strl_status strl_reader_open(const strl_reader_desc *desc, strl_reader **reader, strl_error *err)
+{
+    return strl__reader_open_as(desc, NULL, reader, err);
+}
+
+void strl_reader_close(strl_reader *reader)
+{
+    if (!reader)
+        return;
+    if (reader->format && reader->format->close && reader->state)
+        reader->format->close(reader);
+    strl__table_deinit(&reader->vertices);
+    strl__table_deinit(&reader->normals);
+    strl__batch_deinit(&reader->batch);
+    strl__input_deinit(&reader->input);
+    strl__names_deinit(&reader->parts);
+    strl__names_deinit(&reader->materials);
+    strl_file_close(reader->file, NULL); /* only read from */
+    strl__free(reader->state);
+    strl__free(reader->scratch_dir);
+    strl__free(reader->path);
+    strl__free(reader);
+}
+
+void strl_reader_info_get(const strl_reader *reader, strl_reader_info *info)
+{
+    *info = (strl_reader_info){
+        .format = reader->format->name,
+        .default_up = reader->format->default_up,
+        .triangles_hint = reader->triangles_hint,
+        .file_bytes = reader->opened.bytes,
+    };
+}
+
+strl_status strl__reader_init_batch(strl_reader *reader, bool indexed, strl_error *err)
+{
+    const strl__table *tables[2] = {&reader->vertices, &reader->normals};
+    strl__batch_desc desc = {.indexed = indexed, .bytes = (size_t)(reader->memory_bytes / 4)};
+    desc.indexed_normals = indexed && reader->normals.count > 0;
+    for (unsigned i = 0; i < 2; i++)
+        if (indexed && tables[i]->count > 0 && !strl__table_is_resident(tables[i]))
+            desc.sorted = true;
+    return strl__batch_init(&reader->batch, &desc, err);
+}
+
+static strl_status make_ready(strl_reader *reader, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    if (!reader->prepared) {
+        strl__table_deinit(&reader->vertices);
+        strl__table_deinit(&reader->normals);
+        strl__batch_deinit(&reader->batch);
+        status = reader->format->prepare(reader, err);
+        reader->prepared = !status;
+    }
+    if (!status && !reader->started) {
+        status = reader->format->start(reader, err);
+        reader->started = !status;
+    }
+    return status;
+}
+
+static strl_status read_batch(strl_reader *reader, strl_error *err)
+{
+    strl__batch_reset(&reader->batch);
+    strl_status status = reader->format->fill(reader, err);
+    if (!status && reader->batch.vertex)
+        status = strl__batch_resolve(&reader->batch, &reader->vertices, reader->normals.count ? &reader->normals : NULL,
+                                     err);
+    return status;
+}
+
+static strl_status next_triangles(strl_reader *reader, strl_triangle *triangles, size_t capacity, size_t *count,
+                                  strl_error *err)
+{
+    strl_status status = make_ready(reader, err);
+    while (!status && *count < capacity) {
+        size_t added = 0;
+        status = strl__batch_emit(&reader->batch, triangles + *count, capacity - *count, &added, &reader->drops, err);
+        *count += added;
+        if (status || added > 0)
+            continue;
+        if (reader->ended)
+            break;
+        status = read_batch(reader, err);
+    }
+    return status;
+}
+
+strl_status strl_reader_next(strl_reader *reader, strl_triangle *triangles, size_t capacity, size_t *count,
+                             strl_error *err)
+{
+    *count = 0;
+    if (!reader->failed) {
+        strl_status status = next_triangles(reader, triangles, capacity, count, &reader->failure);
+        if (!status)
+            return STRL_OK;
+        reader->failed = true;
+        *count = 0;
+    }
+    if (err)
+        *err = reader->failure;
+    return reader->failure.status;
+}
+
+strl_status strl_reader_rewind(strl_reader *reader, strl_error *err)
+{
+    strl_file_info now;
+    strl_status status = strl_file_stat(reader->file, &now, err);
+    if (status)
+        return status;
+    if (now.bytes != reader->opened.bytes || now.modified_ns != reader->opened.modified_ns)
+        return strl__fail(err, STRL_ERR_IO,
+                          "%s has changed while it was read: it had %" PRIu64 " bytes, now it has %" PRIu64
+                          " and a time of change %s",
+                          reader->path, reader->opened.bytes, now.bytes,
+                          now.modified_ns != reader->opened.modified_ns ? "of its own" : "as before");
+    reader->started = reader->ended = reader->failed = false;
+    reader->drops = (strl_reader_drops){0};
+    strl__batch_reset(&reader->batch);
+    return STRL_OK;
+}
+
+void strl_reader_drops_get(const strl_reader *reader, strl_reader_drops *drops)
+{
+    *drops = reader->drops;
+}
+
+uint64_t strl_reader_bytes_done(const strl_reader *reader)
+{
+    return reader->started ? strl__input_offset(&reader->input) : 0;
+}
+
+uint32_t strl_reader_part_count(const strl_reader *reader)
+{
+    return reader->parts.count ? (uint32_t)reader->parts.count : 1;
+}
+
+const char *strl_reader_part_name(const strl_reader *reader, uint32_t part)
+{
+    return part < reader->parts.count ? reader->parts.items[part].text : "";
+}
+
+uint32_t strl_reader_material_count(const strl_reader *reader)
+{
+    return reader->materials.count ? (uint32_t)reader->materials.count : 1;
+}
+
+const char *strl_reader_material(const strl_reader *reader, uint32_t material, uint32_t *rgba)
+{
+    bool known = material < reader->materials.count;
+    *rgba = known ? reader->materials.items[material].rgba : 0xffffffffu;
+    return known ? reader->materials.items[material].text : "";
+}
