@@ -33,25 +33,29 @@ static strl_status check_desc(const strl_container_writer_desc *desc, strl_error
     return STRL_OK;
 }
 
+/* Takes the name over where the file is there afterwards, because destroy removes what the writer names. */
+static strl_status create_file(char **name, strl_file **file, char **kept, strl_error *err)
+{
+    strl_status status = strl_file_create(*name, file, err);
+    if (status == STRL_OK || status == STRL_ERR_MEMORY) { /* without memory it fails after creating the file */
+        *kept = *name;
+        *name = NULL;
+    }
+    return status;
+}
+
 static strl_status open_files(strl_container_writer *writer, const strl_container_writer_desc *desc, strl_error *err)
 {
     writer->path = strl__strdup(desc->path);
     char *part_path = path_with(desc->path, ".part");
     char *spill_path = strl_path_join(desc->scratch_dir, "container-nodes.spill");
-    strl_status status = writer->path && part_path && spill_path ? STRL_OK
-                         : strl__fail(err, STRL_ERR_MEMORY, "no memory to create %s", desc->path);
-    /* The names are kept only once the files are ours, because destroy removes what they name. */
+    strl_status status = STRL_OK;
+    if (!writer->path || !part_path || !spill_path)
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory to create %s", desc->path);
     if (status == STRL_OK)
-        status = strl_file_create(part_path, &writer->sink.file, err);
-    if (status == STRL_OK) {
-        writer->part_path = part_path;
-        part_path = NULL;
-        status = strl_file_create(spill_path, &writer->spill, err);
-    }
-    if (status == STRL_OK) {
-        writer->spill_path = spill_path;
-        spill_path = NULL;
-    }
+        status = create_file(&part_path, &writer->sink.file, &writer->part_path, err);
+    if (status == STRL_OK)
+        status = create_file(&spill_path, &writer->spill, &writer->spill_path, err);
     strl__free(part_path);
     strl__free(spill_path);
     return status;
