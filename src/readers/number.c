@@ -143,6 +143,15 @@ static const char *parse_exponent(const char *at, int *exponent)
     return at;
 }
 
+static inline const char *read_digits(const char *at, uint64_t *digits)
+{
+    uint64_t value = *digits;
+    for (unsigned digit; (digit = (unsigned)(unsigned char)*at - '0') < 10; at++)
+        value = value * 10 + digit;
+    *digits = value;
+    return at;
+}
+
 static ptrdiff_t leading_zeros(const char *at)
 {
     ptrdiff_t count = 0;
@@ -161,16 +170,14 @@ const char *strl__number_parse(const char *at, double *value)
         return parse_word(at, negative, value);
     uint64_t digits = 0;
     const char *start = at;
-    while (is_digit(*at))
-        digits = digits * 10 + (uint64_t)(*at++ - '0');
+    at = read_digits(at, &digits);
     ptrdiff_t digit_count = at - start;
     ptrdiff_t fraction_count = 0;
     if (*at == '.') {
         const char *fraction = ++at;
         if (*at == '#' && digit_count == 1)
             return parse_microsoft_word(at, negative, value);
-        while (is_digit(*at))
-            digits = digits * 10 + (uint64_t)(*at++ - '0');
+        at = read_digits(at, &digits);
         fraction_count = at - fraction;
     }
     digit_count += fraction_count;
@@ -198,11 +205,10 @@ const char *strl__integer_parse(const char *at, int64_t *value)
     if (!is_digit(*at))
         return NULL;
     const char *start = at;
-    uint64_t digits = 0;
     while (*at == '0')
         at++, start++;
-    while (is_digit(*at))
-        digits = digits * 10 + (uint64_t)(*at++ - '0');
+    uint64_t digits = 0;
+    at = read_digits(at, &digits);
     if (at - start > 18)
         return NULL;
     *value = negative ? -(int64_t)digits : (int64_t)digits;

@@ -1,5 +1,5 @@
-/* Opening, recognising and driving a format. A quarter of the budget is for faces under way, half for windows on vertices,
- * an eighth for names, a 32nd for the input; the rest is for polygons and small change. */
+/* Opening, recognising and driving a format. Five eighths of the budget are for windows on vertices and faces under way, an
+ * eighth is for names, a 32nd for the input; the rest is for polygons and small change. */
 #include "readers/reader.h"
 
 #include <inttypes.h>
@@ -138,11 +138,13 @@ void strl_reader_info_get(const strl_reader *reader, strl_reader_info *info)
 strl_status strl__reader_init_batch(strl_reader *reader, bool indexed, strl_error *err)
 {
     const strl__table *tables[2] = {&reader->vertices, &reader->normals};
-    strl__batch_desc desc = {.indexed = indexed, .bytes = (size_t)(reader->memory_bytes / 4)};
+    strl__batch_desc desc = {.indexed = indexed, .bytes = (size_t)(reader->memory_bytes / 8 * 5)};
     desc.indexed_normals = indexed && reader->normals.count > 0;
     for (unsigned i = 0; i < 2; i++)
-        if (indexed && tables[i]->count > 0 && !strl__table_is_resident(tables[i]))
-            desc.sorted = true;
+        if (indexed && tables[i]->count > 0) {
+            desc.sorted = desc.sorted || !strl__table_is_resident(tables[i]);
+            desc.bytes -= strl__table_window_bytes(tables[i]); /* together at most half of the budget */
+        }
     return strl__batch_init(&reader->batch, &desc, err);
 }
 

@@ -187,10 +187,10 @@ static strl_status begin_facet(strl_reader *reader, strl_error *err)
         return STRL_OK;
     input->at += 6;
     for (unsigned axis = 0; axis < 3; axis++) {
-        double ignored;
         strl__text_skip_space(input);
-        if (!strl__text_number(input, &ignored))
+        if (input->at == input->end)
             return strl__text_expected(input, "a component of the normal", err);
+        input->at += strl__text_token(input);
     }
     return STRL_OK;
 }

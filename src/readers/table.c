@@ -10,7 +10,11 @@ void strl__table_place(strl__table *table, const strl__layout *layout, strl_file
                        size_t window_limit)
 {
     *table = (strl__table){.layout = *layout, .file = file, .offset = offset, .count = count};
-    table->window_limit = window_limit < layout->stride ? layout->stride : window_limit;
+    table->window_limit = window_limit;
+    if (file && !strl__table_is_resident(table))
+        table->window_limit /= STRL__TABLE_NARROW;
+    if (table->window_limit < layout->stride)
+        table->window_limit = layout->stride;
 }
 
 void strl__table_build(strl__table *table, const strl__layout *layout, const char *scratch_dir, size_t window_limit)
@@ -95,7 +99,15 @@ strl_status strl__table_append(strl__table *table, const void *record, strl_erro
 
 strl_status strl__table_finish(strl__table *table, strl_error *err)
 {
-    return table->spill && table->window_count ? flush(table, err) : STRL_OK;
+    if (!table->spill)
+        return STRL_OK;
+    strl_status status = table->window_count ? flush(table, err) : STRL_OK;
+    strl__free(table->window);
+    table->window = NULL;
+    table->window_capacity = 0;
+    table->window_first = 0;
+    table->window_limit /= STRL__TABLE_NARROW;
+    return status;
 }
 
 strl_status strl__table_load(strl__table *table, uint64_t first, uint64_t last, strl_error *err)

@@ -27,6 +27,9 @@ typedef struct strl__table {
     uint64_t window_count;  /* records in the window */
 } strl__table;
 
+/* A table that does not fit window_limit is given a quarter of it: sweeping needs no more, and the sort can use the rest. */
+#define STRL__TABLE_NARROW 4u
+
 /* The records lie in file, which is borrowed; the caller has checked that they lie inside it. */
 void strl__table_place(strl__table *table, const strl__layout *layout, strl_file *file, uint64_t offset, uint64_t count,
                        size_t window_limit);
@@ -46,6 +49,12 @@ static inline bool strl__table_is_resident(const strl__table *table)
 static inline uint64_t strl__table_window_records(const strl__table *table)
 {
     return table->window_limit / table->layout.stride;
+}
+
+/* The bytes that the window may take from now on. */
+static inline size_t strl__table_window_bytes(const strl__table *table)
+{
+    return strl__table_is_resident(table) ? (size_t)table->count * table->layout.stride : table->window_limit;
 }
 
 /* Has records first..last (inclusive, < count, no more than fit) in the window. */

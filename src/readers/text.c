@@ -86,23 +86,28 @@ size_t strl__text_token(const strl__input *input)
     return (size_t)(at - input->at);
 }
 
+static bool ends_token(const strl__input *input, const char *at)
+{
+    return strl__is_blank(*at) || strl__is_line_end(*at) || at == input->end;
+}
+
+/* The zero at the end of the buffer ends the comparisons. */
 bool strl__text_token_is(const strl__input *input, const char *word)
 {
-    size_t length = strlen(word);
-    return strl__text_token(input) == length && memcmp(input->at, word, length) == 0;
+    const char *at = input->at;
+    for (; *word; at++, word++)
+        if (*at != *word)
+            return false;
+    return ends_token(input, at);
 }
 
 bool strl__text_token_is_caseless(const strl__input *input, const char *lower)
 {
-    size_t length = strlen(lower);
-    if (strl__text_token(input) != length)
-        return false;
-    for (size_t i = 0; i < length; i++) {
-        char c = input->at[i];
-        if ((c >= 'A' && c <= 'Z' ? c | 0x20 : c) != lower[i])
+    const char *at = input->at;
+    for (; *lower; at++, lower++)
+        if ((*at | 0x20) != *lower)
             return false;
-    }
-    return true;
+    return ends_token(input, at);
 }
 
 size_t strl__text_rest_of_line(const strl__input *input)

@@ -45,7 +45,7 @@ void strl__text_skip_line(strl__input *input);    /* to the start of the next li
 void strl__text_end_line(strl__input *input);     /* over the line end at `at`, if there is one */
 size_t strl__text_token(const strl__input *input); /* bytes of the token at `at`; 0 at the end of a line */
 bool strl__text_token_is(const strl__input *input, const char *word);           /* the token at `at` is this word */
-bool strl__text_token_is_caseless(const strl__input *input, const char *lower); /* the same for any case */
+bool strl__text_token_is_caseless(const strl__input *input, const char *lower); /* the same for letters of any case */
 /* The rest of the line without blanks at its end, up to STRL__TOKEN_BYTES - 1 bytes; consumes nothing. */
 size_t strl__text_rest_of_line(const strl__input *input);
 
