@@ -1,5 +1,5 @@
 /* Scene `boxes`: many closed boxes that share nothing, of any orientation and size, in the unit cube: a mesh whose topology
- * nobody can simplify across parts. The boxes' mean distance sets their size, so that some of them touch. */
+ * nobody can simplify across parts. The boxes' mean distance sets their size, so that few of them touch. */
 #include "scenes/generator.h"
 
 #include <math.h>
@@ -46,7 +46,7 @@ static box_frame random_box(uint64_t seed, uint64_t index, double spacing)
         {2 * (q[1] * q[2] - q[0] * q[3]), 1 - 2 * (q[1] * q[1] + q[3] * q[3]), 2 * (q[2] * q[3] + q[0] * q[1])},
         {2 * (q[1] * q[3] + q[0] * q[2]), 2 * (q[2] * q[3] - q[0] * q[1]), 1 - 2 * (q[1] * q[1] + q[2] * q[2])}};
     double u = next_uniform(&state);
-    double size = spacing * (0.1 + 0.5 * u * u); /* many small ones, few large ones */
+    double size = spacing * (0.06 + 0.3 * u * u); /* many small ones, few large ones */
     box_frame frame;
     for (int axis = 0; axis < 3; axis++) {
         double half = size * (0.4 + 0.6 * next_uniform(&state));

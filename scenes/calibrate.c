@@ -1,21 +1,28 @@
 /* How fine a grid, and how many levels of noise, give the wanted number of triangles.
  *
  * All levels are tried from the coarsest on, counted exactly at the coarsest useful sampling (two cells per coefficient, which
- * is 1/8 to 1/64 of the work of the final grid), until the wanted count is in reach with at most CELLS_MAX cells per
+ * is 1/5 to 1/20 of the work of the final grid), until the wanted count is in reach with at most CELLS_MAX cells per
  * coefficient. For a given level the count grows with the square of the resolution, nearly; how nearly is measured, on a
  * sample of boxes counted at both resolutions. Small surfaces are counted exactly instead, as often as it takes. */
 #include "scenes/generator.h"
 
 #include <math.h>
 #include <stdatomic.h>
+#include <stdbool.h>
 
 #include "base/fail.h"
 #include "base/hash.h"
 
-#define CELLS_MAX 8.0 /* per coefficient; noise of the finest level has a wavelength of 8 to 20 cells */
+#define CELLS_MAX 5.5     /* per coefficient; noise of the finest level has a wavelength of about 8 to 14 cells */
 #define EXACT_MAX 250000u /* triangles up to which every try is counted exactly */
 
-enum { BOX = 7 /* coefficients along the side of a sampled box */, BOXES_MIN = 64, BOXES_MAX = 1536, TRIES = 64 };
+enum {
+    BOX = 7 /* coefficients along the side of a sampled box */,
+    BOXES_MIN = 64,
+    BOXES_MAX = 1536,
+    TRIES = 160,
+    SECANT_TRIES = 6
+};
 
 typedef struct counting {
     const strl__isosurface *surface;
@@ -58,8 +65,8 @@ static strl_status count_grid(const strl__scene_run *run, const strl__isosurface
                               uint64_t *triangles, strl_error *err)
 {
     counting work = {.surface = surface, .grid = grid};
-    strl_status status = strl_pool_for(run->desc->pool, grid.tiles[0] * grid.tiles[1] * grid.tiles[2], count_tile, &work,
-                                       run->desc->cancel, err);
+    strl_status status = strl_pool_for(run->desc->pool, grid.tiles[0] * grid.tiles[1] * grid.tiles[2], count_tile,
+                                       &work, run->desc->cancel, err);
     *triangles = atomic_load(&work.fine);
     return status;
 }
@@ -88,8 +95,8 @@ static strl_status count_box(void *context, uint64_t index, unsigned worker, str
 }
 
 /* How many times more triangles there are at so many cells per coefficient than at two. */
-static strl_status measure_growth(const strl__scene_run *run, const strl__isosurface *surface, double cells_per_coefficient,
-                                  double *growth, strl_error *err)
+static strl_status measure_growth(const strl__scene_run *run, const strl__isosurface *surface,
+                                  double cells_per_coefficient, double *growth, strl_error *err)
 {
     double spacing = strl__field_spacing(&surface->field);
     uint64_t across = (uint64_t)(1.0 / (BOX * spacing));
@@ -108,27 +115,30 @@ static strl_status measure_growth(const strl__scene_run *run, const strl__isosur
     return status;
 }
 
-/* Tries grids near the estimate, counted exactly, and keeps the best. */
+/* Tries grids near the estimate, counted exactly, and keeps the best. First the secant; where one more cell is already too
+ * much, grids of nearly the same size that sample the field elsewhere: their counts scatter round the wanted one. */
 static strl_status search_exactly(const strl__scene_run *run, strl__isosurface *surface, double cells, strl_error *err)
 {
     double wanted = (double)run->desc->triangles;
     double best = INFINITY;
+    double best_cells = cells;
     for (unsigned try = 0; try < TRIES && best > 0.003; try++) {
-        /* First the secant; where one more cell already is too much, grids of nearly the same size sampled elsewhere. */
-        uint64_t side = (uint64_t)lround(cells);
-        double shift = try < 6 ? 0 : ((double)(try * 37 % 64) / 64 - 0.5) / cells;
-        strl__grid grid = make_grid(side, side + (try > 6 && (try & 1)), (1.0 + shift) / (double)side);
-        uint64_t triangles;
+        bool secant = try < SECANT_TRIES;
+        uint64_t side = (uint64_t)lround(secant ? cells : best_cells);
+        uint64_t along = side + (secant ? 0 : try % 3);
+        double shift = secant ? 0 : (double)(try * 37 % 64) / 64 - 0.5;
+        strl__grid grid = make_grid(side, along - (along > side + 1 ? 3 : 0), (1.0 + shift / cells) / (double)side);
+        uint64_t triangles = 0;
         strl_status status = count_grid(run, surface, grid, &triangles, err);
         if (status != STRL_OK)
             return status;
         double miss = fabs((double)triangles / wanted - 1.0);
         if (miss < best) {
             best = miss;
+            best_cells = (double)side;
             surface->grid = grid;
         }
-        if (try < 6 || try % 8 == 0)
-            cells *= triangles ? sqrt(wanted / (double)triangles) : 1.5;
+        cells *= !secant ? 1.0 : triangles ? sqrt(wanted / (double)triangles) : 1.5;
     }
     return STRL_OK;
 }
@@ -172,7 +182,7 @@ strl_status strl__isosurface_calibrate(const strl__scene_run *run, strl__isosurf
         double growth;
         status = measure_growth(run, surface, per_coefficient, &growth, err);
         per_coefficient *= sqrt(wanted / (coarse_count * growth));
-        per_coefficient = per_coefficient < CELLS_MAX + 0.9 ? per_coefficient : CELLS_MAX + 0.9;
+        per_coefficient = per_coefficient < CELLS_MAX + 1.0 ? per_coefficient : CELLS_MAX + 1.0;
     }
     /* One cell more or less along one side is the finest adjustment. */
     double side = per_coefficient * coefficients;

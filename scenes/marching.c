@@ -9,9 +9,12 @@ static unsigned edge_between(unsigned corner, unsigned other)
 {
     unsigned low = corner & other;
     switch (corner ^ other) {
-    case 1: return 0 + (low >> 1 & 1) + 2 * (low >> 2 & 1);
-    case 2: return 4 + (low & 1) + 2 * (low >> 2 & 1);
-    default: return 8 + (low & 1) + 2 * (low >> 1 & 1);
+    case 1:
+        return 0 + (low >> 1 & 1) + 2 * (low >> 2 & 1);
+    case 2:
+        return 4 + (low & 1) + 2 * (low >> 2 & 1);
+    default:
+        return 8 + (low & 1) + 2 * (low >> 1 & 1);
     }
 }
 
@@ -71,7 +74,7 @@ static void link_edges(unsigned mask, int next[12])
 
 typedef struct loop_plan {
     uint8_t edges[12];
-    int cost[12][12];  /* of the cheapest triangulation of the sub-polygon [i, j] */
+    int cost[12][12]; /* of the cheapest triangulation of the sub-polygon [i, j] */
     uint8_t apex[12][12];
 } loop_plan;
 

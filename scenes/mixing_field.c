@@ -6,14 +6,14 @@
 
 #include "base/hash.h"
 
-#define BASE_CELLS 4.0   /* of level 0 per unit */
-#define FALLOFF 0.63f    /* 2^(-2/3): a fine level's amplitude over that of the coarser one */
-#define COLUMN_LEVELS 2  /* the first levels, whose noise is partly one value per column: bubbles and spikes */
+#define BASE_CELLS 4.0  /* of level 0 per unit */
+#define FALLOFF 0.7f    /* a fine level's amplitude over that of the coarser one: a fractal dimension of about 2.5 */
+#define COLUMN_LEVELS 2 /* the first levels, whose noise is partly one value per column: bubbles and spikes */
 #define COLUMN_SHARE 0.6f
-#define FOCUS 2.0f       /* noise is halved where the coarser field is this many of its amplitudes away from zero */
+#define FOCUS 5.0f /* noise is halved where the coarser field is this many of its amplitudes away from zero */
 
 /* Noise amplitude of the levels that make the large shapes; the profile rises from -1 to 1. Finer ones follow by FALLOFF. */
-static const float coarse_amplitudes[] = {1.0f, 1.6f, 2.2f, 2.6f, 2.2f};
+static const float coarse_amplitudes[] = {0.7f, 1.6f, 2.8f, 4.4f, 4.0f};
 
 enum { COARSE_LEVELS = sizeof coarse_amplitudes / sizeof coarse_amplitudes[0] };
 
@@ -87,7 +87,8 @@ static void fill_coarsest(const strl__field *field, const lattice_box *box, floa
     for (unsigned k = 0; k < box->side[2]; k++) {
         double height = (double)(box->first[2] + k) / BASE_CELLS;
         double zeta = height * (2.0 / STRL__FIELD_HEIGHT) - 1.0;
-        float profile = (float)(zeta * (0.3 + 0.7 * zeta * zeta)); /* flat in the middle, where the fluids have mixed */
+        float profile =
+            (float)(zeta * (0.15 + 0.85 * zeta * zeta)); /* flat in the middle, where the fluids have mixed */
         for (unsigned j = 0; j < box->side[1]; j++) {
             for (unsigned i = 0; i < box->side[0]; i++)
                 *out++ = profile;

@@ -3,8 +3,7 @@
  *
  * It is a pyramid of uniform cubic B-splines. Level 0 is a height profile plus bubbles and spikes on a coarse lattice; each
  * further level refines the lattice by two (which represents the same function exactly) and adds seeded noise of its own
- * scale, weaker by a constant factor (that of an interface of fractal dimension 7/3, which experiments find) and only near
- * the interface that the coarser levels have made. So more levels are the same surface with more detail, never another one.
+ * scale, weaker by a constant factor and mostly near the interface that the coarser levels have made. So more levels are the same surface with more detail, never another one.
  * A spline stays within the range of its coefficients: boxes without surface are found early, without sampling them.
  *
  * Every sample is a pure function of (seed, levels, position): two boxes agree bit by bit where they overlap. Only additions,
@@ -18,8 +17,8 @@
 
 enum {
     STRL__FIELD_LEVELS_MAX = 16,
-    STRL__FIELD_SIDE = 66,       /* samples along an axis of a box, at most */
-    STRL__FIELD_STRIDE = 68,     /* floats from one row of samples to the next */
+    STRL__FIELD_SIDE = 66,        /* samples along an axis of a box, at most */
+    STRL__FIELD_STRIDE = 68,      /* floats from one row of samples to the next */
     STRL__FIELD_LATTICE_SIDE = 40 /* coefficients along an axis, at most */
 };
 

@@ -10,7 +10,9 @@
 #include "base/hash.h"
 #include "base/memory.h"
 
-enum { RECORD_BYTES = 15, JITTER_PERCENT = 25 };
+#define JITTER 0.25 /* of a cell, to each side */
+
+enum { RECORD_BYTES = 15 };
 
 /* Uniform in [0, 1). */
 static double uniform(uint64_t key)
@@ -73,17 +75,22 @@ static void paint(uint64_t seed, double x, double y, uint8_t colour[3])
     }
 }
 
-static void fill_row(const strl_scene_desc *desc, uint64_t side, uint64_t row, bool painted, uint8_t *records)
+/* Cells of the grid; each is two triangles. */
+typedef struct plane_grid {
+    uint64_t columns;
+    uint64_t rows;
+} plane_grid;
+
+static void fill_row(const strl_scene_desc *desc, const plane_grid *grid, uint64_t row, bool painted, uint8_t *records)
 {
-    double step = 1.0 / (double)side;
-    for (uint64_t column = 0; column <= side; column++, records += RECORD_BYTES) {
-        uint64_t key = strl__mix64(desc->seed + 0xd1342543de82ef95u * (row + 1)) + 0x9e3779b97f4a7c15u * (2 * column + 1);
-        bool inner_x = column > 0 && column < side;
-        bool inner_y = row > 0 && row < side;
-        double reach = JITTER_PERCENT * 0.01;
-        double x = ((double)column + (inner_x ? reach * (2 * uniform(key) - 1) : 0)) * step;
-        double y = ((double)row + (inner_y ? reach * (2 * uniform(key + 0x9e3779b97f4a7c15u) - 1) : 0)) * step;
-        const float position[3] = {(float)(column == side ? 1.0 : x), (float)(row == side ? 1.0 : y), 0.0f};
+    for (uint64_t column = 0; column <= grid->columns; column++, records += RECORD_BYTES) {
+        uint64_t key =
+            strl__mix64(desc->seed + 0xd1342543de82ef95u * (row + 1)) + 0x9e3779b97f4a7c15u * (2 * column + 1);
+        bool inner_x = column > 0 && column < grid->columns;
+        bool inner_y = row > 0 && row < grid->rows;
+        double x = (double)column + (inner_x ? JITTER * (2 * uniform(key) - 1) : 0);
+        double y = (double)row + (inner_y ? JITTER * (2 * uniform(key + 0x9e3779b97f4a7c15u) - 1) : 0);
+        const float position[3] = {(float)(x / (double)grid->columns), (float)(y / (double)grid->rows), 0.0f};
         memcpy(records, position, sizeof position);
         if (painted)
             paint(desc->seed, position[0] < 1 ? position[0] : 0.9999999, position[1] < 1 ? position[1] : 0.9999999,
@@ -93,11 +100,11 @@ static void fill_row(const strl_scene_desc *desc, uint64_t side, uint64_t row, b
     }
 }
 
-static void fill_strip(uint64_t side, uint64_t row, uint32_t *corners)
+static void fill_strip(uint64_t columns, uint64_t row, uint32_t *corners)
 {
-    for (uint64_t column = 0; column < side; column++, corners += 6) {
-        uint32_t a = (uint32_t)(row * (side + 1) + column);
-        uint32_t c = a + (uint32_t)(side + 1);
+    for (uint64_t column = 0; column < columns; column++, corners += 6) {
+        uint32_t a = (uint32_t)(row * (columns + 1) + column);
+        uint32_t c = a + (uint32_t)(columns + 1);
         const uint32_t two[2][6] = {{a, a + 1, c + 1, a, c + 1, c}, {a, a + 1, c, a + 1, c + 1, c}};
         memcpy(corners, two[(row + column) & 1], sizeof two[0]);
     }
@@ -105,21 +112,23 @@ static void fill_strip(uint64_t side, uint64_t row, uint32_t *corners)
 
 static strl_status write_plane(strl__scene_run *run, bool painted, strl_error *err)
 {
-    uint64_t side = (uint64_t)lround(sqrt((double)run->desc->triangles * 0.5));
-    uint8_t *records = strl__alloc(side + 1, RECORD_BYTES);
-    uint32_t *corners = strl__alloc(side, 6 * sizeof *corners);
+    double cells = (double)run->desc->triangles * 0.5;
+    plane_grid grid = {.columns = (uint64_t)lround(sqrt(cells))};
+    grid.rows = (uint64_t)lround(cells / (double)grid.columns);
+    uint8_t *records = strl__alloc(grid.columns + 1, RECORD_BYTES);
+    uint32_t *corners = strl__alloc(grid.columns, 6 * sizeof *corners);
     strl_status status = STRL_OK;
     if (!records || !corners)
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for one row of the plane");
-    for (uint64_t row = 0; status == STRL_OK && row <= side; row++) {
-        fill_row(run->desc, side, row, painted, records);
-        status = strl__ply_vertices(run->writer, records, side + 1, err);
-        if (status == STRL_OK && row < side) {
-            fill_strip(side, row, corners);
-            status = strl__ply_triangles(run->writer, corners, 2 * side, err);
+    for (uint64_t row = 0; status == STRL_OK && row <= grid.rows; row++) {
+        fill_row(run->desc, &grid, row, painted, records);
+        status = strl__ply_vertices(run->writer, records, grid.columns + 1, err);
+        if (status == STRL_OK && row < grid.rows) {
+            fill_strip(grid.columns, row, corners);
+            status = strl__ply_triangles(run->writer, corners, 2 * grid.columns, err);
         }
         if (status == STRL_OK)
-            status = strl__scene_report(run, "painting", row, side, err);
+            status = strl__scene_report(run, "painting", row, grid.rows, err);
     }
     strl__free(records);
     strl__free(corners);

@@ -96,8 +96,7 @@ strl_status strl__ply_create(const char *path, strl__ply_layout layout, strl__pl
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for the writer", path);
     self->layout = layout;
     self->path = strl__strdup(path);
-    strl_status status =
-        self->path ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for the path", path);
+    strl_status status = self->path ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for the path", path);
     if (status == STRL_OK)
         status = stream_open(&self->vertices, path, ".tmp", err);
     if (status == STRL_OK)
@@ -166,9 +165,8 @@ uint64_t strl__ply_triangle_count(const strl__ply_writer *writer)
 /* A comment fills the header up to its fixed length. */
 static strl_status write_header(strl__ply_writer *writer, strl_error *err)
 {
-    static const char *const attributes[] = {
-        "", "property float nx\nproperty float ny\nproperty float nz\n",
-        "property uchar red\nproperty uchar green\nproperty uchar blue\n"};
+    static const char *const attributes[] = {"", "property float nx\nproperty float ny\nproperty float nz\n",
+                                             "property uchar red\nproperty uchar green\nproperty uchar blue\n"};
     static const char end[] = "\nend_header\n";
     char header[HEADER_BYTES + 1];
     int length = snprintf(header, sizeof header,

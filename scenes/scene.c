@@ -14,16 +14,23 @@ typedef struct scene_entry {
 } scene_entry;
 
 static const scene_entry scenes[] = {
-    {{"isosurface", "turbulent mixing layer: high genus, many layers, open at its four side walls only (count within 2 %)",
-      1000, 4000000000},
-     strl__scene_isosurface, STRL__PLY_POSITION_NORMAL},
-    {{"painted-plane", "square of jittered triangles with a pattern of sharp edges in vertex colours (count within 2 %)",
-      1000, 4000000000},
-     strl__scene_painted_plane, STRL__PLY_POSITION_COLOUR},
+    {{"isosurface",
+      "turbulent mixing layer: high genus, many layers, open at its four side walls only (count within 2 %)", 1000,
+      4000000000},
+     strl__scene_isosurface,
+     STRL__PLY_POSITION_NORMAL},
+    {{"painted-plane",
+      "square of jittered triangles with a pattern of sharp edges in vertex colours (count within 2 %)", 1000,
+      4000000000},
+     strl__scene_painted_plane,
+     STRL__PLY_POSITION_COLOUR},
     {{"plain-plane", "the same square in one colour", 1000, 4000000000},
-     strl__scene_plain_plane, STRL__PLY_POSITION_COLOUR},
-    {{"boxes", "separate boxes of any orientation and size in a cube (count rounded down to whole boxes)", 12, 3200000000},
-     strl__scene_boxes, STRL__PLY_POSITION},
+     strl__scene_plain_plane,
+     STRL__PLY_POSITION_COLOUR},
+    {{"boxes", "separate boxes of any orientation and size in a cube (count rounded down to whole boxes)", 12,
+      3200000000},
+     strl__scene_boxes,
+     STRL__PLY_POSITION},
 };
 
 enum { SCENE_COUNT = sizeof scenes / sizeof scenes[0] };
@@ -54,7 +61,8 @@ static strl_status find_scene(const strl_scene_desc *desc, const scene_entry **e
     const strl_scene_info *info = &(*entry)->info;
     if (desc->triangles < info->triangles_min || desc->triangles > info->triangles_max)
         return strl__fail(err, STRL_ERR_LIMIT,
-                          "scene %s has %" PRIu64 " to %" PRIu64 " triangles (its PLY numbers vertices with an int), not %" PRIu64,
+                          "scene %s has %" PRIu64 " to %" PRIu64
+                          " triangles (its PLY numbers vertices with an int), not %" PRIu64,
                           info->name, info->triangles_min, info->triangles_max, desc->triangles);
     return STRL_OK;
 }
@@ -63,7 +71,8 @@ static strl_status generate(const scene_entry *entry, strl__scene_run *run, strl
 {
     strl_scene_result made = {0};
     bool bare = entry->layout == STRL__PLY_POSITION_NORMAL && run->desc->no_normals;
-    strl_status status = strl__ply_create(run->desc->path, bare ? STRL__PLY_POSITION : entry->layout, &run->writer, err);
+    strl_status status =
+        strl__ply_create(run->desc->path, bare ? STRL__PLY_POSITION : entry->layout, &run->writer, err);
     if (status == STRL_OK)
         status = entry->generate(run, err);
     if (status == STRL_OK)
@@ -77,8 +86,8 @@ static strl_status generate(const scene_entry *entry, strl__scene_run *run, strl
     return status;
 }
 
-strl_status strl_scene_write(const strl_scene_desc *desc, const strl_scene_progress *progress, strl_scene_result *result,
-                             strl_error *err)
+strl_status strl_scene_write(const strl_scene_desc *desc, const strl_scene_progress *progress,
+                             strl_scene_result *result, strl_error *err)
 {
     if (result)
         *result = (strl_scene_result){0};

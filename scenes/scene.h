@@ -12,9 +12,9 @@
 
 /* What to write. Zero-initialise: every 0 takes its default. */
 typedef struct strl_scene_desc {
-    const char *name;      /* one of strl_scene_info's names */
-    const char *path;      /* the output; replaced by the final rename only, OUT.tmp and OUT.faces.tmp stand beside it */
-    uint64_t triangles;    /* wanted; 0 = 1,000,000. strl_scene_info says how closely a scene keeps to it */
+    const char *name;   /* one of strl_scene_info's names */
+    const char *path;   /* the output; replaced by the final rename only, OUT.tmp and OUT.faces.tmp stand beside it */
+    uint64_t triangles; /* wanted; 0 = 1,000,000. strl_scene_info says how closely a scene keeps to it */
     uint64_t seed;
     uint64_t memory_bytes; /* budget of the buffers; 0 = 256 MiB */
     strl_pool *pool;       /* borrowed; NULL = the caller's thread alone */
@@ -48,7 +48,7 @@ typedef struct strl_scene_result {
 
 /* Writes the scene. On failure no output and no temporary file is left; an older output keeps its bytes.
  * progress, result and err may be NULL. */
-strl_status strl_scene_write(const strl_scene_desc *desc, const strl_scene_progress *progress, strl_scene_result *result,
-                             strl_error *err);
+strl_status strl_scene_write(const strl_scene_desc *desc, const strl_scene_progress *progress,
+                             strl_scene_result *result, strl_error *err);
 
 #endif

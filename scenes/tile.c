@@ -65,15 +65,15 @@ static uint64_t active_cells(const uint64_t *low, const uint64_t *high, unsigned
 
 static unsigned cube_mask(const uint64_t *low, const uint64_t *high, unsigned y, unsigned x)
 {
-    return (unsigned)((low[y] >> x & 3) | (low[y + 1] >> x & 3) << 2 | (high[y] >> x & 3) << 4 | (high[y + 1] >> x & 3) << 6);
+    return (unsigned)((low[y] >> x & 3) | (low[y + 1] >> x & 3) << 2 | (high[y] >> x & 3) << 4 |
+                      (high[y + 1] >> x & 3) << 6);
 }
 
 uint64_t strl__tile_count(const strl__field *field, double step, const int64_t first[3], const unsigned cells[3],
                           const strl__cube_table *table, strl__tile_scratch *scratch)
 {
-    strl__field_box box = {.first = {first[0], first[1], first[2]},
-                           .count = {cells[0] + 1, cells[1] + 1, cells[2] + 1},
-                           .step = step};
+    strl__field_box box = {
+        .first = {first[0], first[1], first[2]}, .count = {cells[0] + 1, cells[1] + 1, cells[2] + 1}, .step = step};
     if (!strl__field_sample(field, &box, &scratch->field))
         return 0;
     uint64_t triangles = 0;

@@ -64,8 +64,14 @@ typedef struct strl__tile_scratch {
 } strl__tile_scratch;
 
 /* The axes other than `axis`, lower one first. */
-static inline unsigned strl__axis_first(unsigned axis) { return axis == 0 ? 1 : 0; }
-static inline unsigned strl__axis_second(unsigned axis) { return axis == 2 ? 1 : 2; }
+static inline unsigned strl__axis_first(unsigned axis)
+{
+    return axis == 0 ? 1 : 0;
+}
+static inline unsigned strl__axis_second(unsigned axis)
+{
+    return axis == 2 ? 1 : 2;
+}
 
 /* Extracts tile (x, y, z). STRL_ERR_MEMORY where the mesh cannot grow. */
 strl_status strl__tile_extract(const strl__field *field, const strl__grid *grid, const uint64_t tile[3], bool normals,

@@ -61,17 +61,36 @@ static int run(strl_cli_args *args)
     uint64_t jobs = strl_cpu_count();
     strl_cli_list names;
     const strl_cli_option options[] = {
-        {.name = "output", .letter = 'o', .kind = STRL_CLI_STRING, .value = &desc.path, .argument = "FILE.ply",
-         .help = "the file to write", .required = true},
-        {.name = "triangles", .letter = 'n', .kind = STRL_CLI_COUNT, .value = &desc.triangles,
-         .help = "how many, K M G are powers of 1000 (1M)", .least = 1, .most = 4e9},
+        {.name = "output",
+         .letter = 'o',
+         .kind = STRL_CLI_STRING,
+         .value = &desc.path,
+         .argument = "FILE.ply",
+         .help = "the file to write",
+         .required = true},
+        {.name = "triangles",
+         .letter = 'n',
+         .kind = STRL_CLI_COUNT,
+         .value = &desc.triangles,
+         .help = "how many, K M G are powers of 1000 (1M)",
+         .least = 1,
+         .most = 4e9},
         {.name = "seed", .kind = STRL_CLI_COUNT, .value = &desc.seed, .help = "another one is another model (0)"},
         {.name = "no-normals", .kind = STRL_CLI_FLAG, .value = &desc.no_normals, .help = "positions only"},
         {.name = "memory", .kind = STRL_CLI_BYTES, .value = &desc.memory_bytes, .help = "budget of the buffers (256M)"},
-        {.name = "jobs", .letter = 'j', .kind = STRL_CLI_COUNT, .value = &jobs, .help = "threads (all processors)",
-         .least = 1, .most = 1024},
+        {.name = "jobs",
+         .letter = 'j',
+         .kind = STRL_CLI_COUNT,
+         .value = &jobs,
+         .help = "threads (all processors)",
+         .least = 1,
+         .most = 1024},
     };
-    const strl_cli_usage usage = {.positional = "NAME", .least = 1, .most = 1, .notes = notes, .options = options,
+    const strl_cli_usage usage = {.positional = "NAME",
+                                  .least = 1,
+                                  .most = 1,
+                                  .notes = notes,
+                                  .options = options,
                                   .option_count = STRL_CLI_COUNT_OF(options)};
     int stop = strl_cli_parse(args, &usage, &names);
     if (stop >= 0)
