@@ -1,0 +1,45 @@
+/* Light from the eye plus a sky hemisphere, in linear light, two-sided. Both lights fade with the angle of view, so nothing jumps
+ * where a normal turns away from the eye. */
+in highp vec3 v_view;
+in highp vec3 v_normal;
+in highp vec4 v_colour;
+
+uniform highp vec4 u_projection;
+uniform highp int u_orthographic;
+uniform highp vec3 u_sky_up; /* view space, unit */
+uniform highp float u_headlight;
+uniform highp int u_flat;
+
+layout(location = 0) out highp vec4 out_colour;
+
+const vec3 AMBIENT = vec3(0.06);
+const vec3 SKY = vec3(0.26, 0.29, 0.34);
+const vec3 GROUND = vec3(0.09, 0.08, 0.06);
+
+/* Ordered 8x8 pattern of the pixel grid: 0 to 63. */
+int bayer(ivec2 pixel)
+{
+    int x = (pixel.x ^ pixel.y) & 7, y = pixel.y & 7;
+    return ((x & 1) << 5) | ((y & 1) << 4) | ((x & 2) << 2) | ((y & 2) << 1) | ((x & 4) >> 1) | ((y & 4) >> 2);
+}
+
+void main()
+{
+    vec3 normal = v_normal;
+    if (u_flat != 0)
+        normal = cross(dFdx(v_view), dFdy(v_view));
+#ifdef STRL_ALPHA
+    if (v_colour.a * 64.0 < float(bayer(ivec2(gl_FragCoord.xy))) + 0.5)
+        discard;
+#endif
+    float length_squared = dot(normal, normal);
+    normal = length_squared > 0.0 ? normal * inversesqrt(length_squared) : vec3(0.0, 0.0, -1.0);
+    vec3 to_eye = u_orthographic != 0 ? vec3(0.0, 0.0, -1.0) : -normalize(v_view);
+    float facing = dot(normal, to_eye);
+    float up = dot(facing < 0.0 ? -normal : normal, u_sky_up);
+    vec3 light = AMBIENT + abs(facing) * (vec3(u_headlight) + mix(GROUND, SKY, 0.5 + 0.5 * up));
+    out_colour = vec4(encoded_of(v_colour.rgb * light), 1.0);
+#ifdef STRL_SYMMETRIC_DEPTH
+    gl_FragDepth = u_orthographic != 0 ? gl_FragCoord.z : u_projection.z * gl_FragCoord.w;
+#endif
+}

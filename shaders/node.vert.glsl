@@ -1,0 +1,85 @@
+/* Vertices of nodes. A lattice position reaches floats only as the exact sum anchor + offset - reference cell, so a vertex that
+ * two nodes share has the same gl_Position in both, bit by bit: no cracks. View space: x right, y up, z forward. */
+layout(location = 0) in ivec3 in_position;
+layout(location = 1) in uvec2 in_normal;
+layout(location = 2) in vec4 in_colour;
+
+#ifdef STRL_ITEM_STORAGE
+layout(location = 3) in uint in_item;
+struct Item {
+    vec4 rows[6];
+    ivec4 base[2];
+};
+layout(std430, binding = 0) readonly buffer Items { Item items[]; };
+#define ITEM_ROW(i) items[in_item].rows[i]
+#define ITEM_BASE(i) items[in_item].base[i]
+#else
+uniform highp vec4 u_rows[6];
+uniform highp ivec4 u_base[2];
+#define ITEM_ROW(i) u_rows[i]
+#define ITEM_BASE(i) u_base[i]
+#endif
+
+/* perspective: 1/tan_x, 1/tan_y, near, unused; orthographic: 1/half width, 1/half height, far, 1/(far - near) */
+uniform highp vec4 u_projection;
+uniform highp int u_orthographic;
+
+out highp vec3 v_view;
+out highp vec3 v_normal;
+out highp vec4 v_colour;
+invariant gl_Position;
+
+#define FLAG_FLOAT_POSITIONS 1
+
+/* base (64 bits in two words) + offset, rounded to float once. */
+vec3 exact_sum(ivec3 base_low, ivec3 base_high, ivec3 offset)
+{
+    uvec3 low = uvec3(base_low) + uvec3(offset);
+    ivec3 carry = ivec3(lessThan(low, uvec3(base_low)));
+    ivec3 high = base_high + (offset >> 31) + carry;
+    ivec3 negative = high >> 31;
+    low = (low ^ uvec3(negative)) - uvec3(negative);
+    high = (high ^ negative) - (negative & ivec3(equal(low, uvec3(0u))));
+    vec3 magnitude = vec3(high) * 4294967296.0 + vec3(low);
+    return mix(magnitude, -magnitude, lessThan(negative, ivec3(0)));
+}
+
+vec3 decode_normal(uvec2 coordinates)
+{
+    vec2 p = vec2(coordinates) * (2.0 / 1023.0) - 1.0;
+    float z = 1.0 - abs(p.x) - abs(p.y);
+    float fold = max(-z, 0.0);
+    p.x += p.x >= 0.0 ? -fold : fold;
+    p.y += p.y >= 0.0 ? -fold : fold;
+    return normalize(vec3(p, z));
+}
+
+void main()
+{
+    vec4 row_x = ITEM_ROW(0), row_y = ITEM_ROW(1), row_z = ITEM_ROW(2);
+    ivec4 low = ITEM_BASE(0), high = ITEM_BASE(1);
+    vec3 local = (low.w & FLAG_FLOAT_POSITIONS) != 0 ? intBitsToFloat(in_position) : exact_sum(low.xyz, high.xyz, in_position);
+    vec3 view = vec3(dot(row_x.xyz, local) + row_x.w, dot(row_y.xyz, local) + row_y.w, dot(row_z.xyz, local) + row_z.w);
+
+    vec3 normal = decode_normal(in_normal);
+    v_view = view;
+    v_normal = vec3(dot(ITEM_ROW(3).xyz, normal), dot(ITEM_ROW(4).xyz, normal), dot(ITEM_ROW(5).xyz, normal));
+    vec3 tint = vec3(ITEM_ROW(3).w, ITEM_ROW(4).w, ITEM_ROW(5).w);
+    v_colour = vec4(tint.x >= 0.0 ? tint : linear_of(in_colour.rgb), in_colour.a);
+
+    /* Reversed depth: near / z, or linear where orthographic. */
+    if (u_orthographic != 0) {
+        float depth = (u_projection.z - view.z) * u_projection.w;
+#ifdef STRL_SYMMETRIC_DEPTH
+        depth = 2.0 * depth - 1.0;
+#endif
+        gl_Position = vec4(view.xy * u_projection.xy, depth, 1.0);
+    } else {
+#ifdef STRL_SYMMETRIC_DEPTH
+        /* Only clips; the fragment shader writes the depth. */
+        gl_Position = vec4(view.xy * u_projection.xy, view.z - 2.0 * u_projection.z, view.z);
+#else
+        gl_Position = vec4(view.xy * u_projection.xy, u_projection.z, view.z);
+#endif
+    }
+}
