@@ -190,7 +190,7 @@ static uint64_t count_fans_apart(const mesh_check *mesh)
 void mesh_check_topology(const mesh_check *mesh, mesh_topology *topology)
 {
     *topology = (mesh_topology){0};
-    float walls[2][2];
+    float walls[2][2] = {{0}};
     find_walls(mesh, walls);
     size_t count = 3 * (size_t)mesh->triangle_count;
     uint64_t *keys = sorted_edges(mesh);
