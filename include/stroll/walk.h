@@ -25,9 +25,10 @@ typedef struct strl_executor {
 
 /* How to walk. Zero-initialise: every 0 takes its default. */
 typedef struct strl_walk_desc {
-    uint64_t memory_bytes;     /* hard bound of decoded nodes held; 0 = 512 MiB */
+    uint64_t memory_bytes;     /* hard bound of decoded nodes and node records held; 0 = 512 MiB. Pages that wait for decoding
+                                  come on top: requests_in_flight of them at most */
     double error_px;           /* allowed pixel error; 0 = 1 */
-    uint32_t requests_in_flight; /* 0 = 16 */
+    uint32_t requests_in_flight; /* 0 = 16; at most 256 */
     const strl_executor *executor; /* borrowed for the life of the walk */
 } strl_walk_desc;
 
@@ -36,13 +37,15 @@ typedef struct strl_walk_stats {
     uint64_t triangles;        /* in visible items */
     uint32_t nodes;            /* visible items */
     uint32_t nodes_culled;     /* active, but outside the frustum */
-    uint32_t missing_nodes;    /* nodes that the wanted front has and residency does not allow yet, counted as groups' members */
+    uint32_t missing_nodes;    /* nodes of the wanted front that are not drawn yet; where the records of their parents' children are
+                                  missing too, those parents */
     uint32_t requests;         /* reads submitted in this frame */
     uint32_t requests_pending;
     uint64_t bytes_read;       /* answered in this frame */
-    uint64_t resident_bytes;   /* decoded nodes held */
+    uint64_t resident_bytes;   /* decoded nodes and node records held, reads under way included */
     uint64_t splits, collapses;           /* of nodes, in this frame */
-    uint64_t dependent_splits, dependent_collapses; /* those that only a group's other member asked for */
+    uint64_t dependent_splits; /* those that only another member of the dependency group asked for */
+    uint64_t dependent_collapses; /* those of nodes that had stayed split for another member alone */
     uint64_t vertex_splits, vertex_collapses;       /* progressive-mesh steps done in this frame */
     double allowed_error_px;   /* error_px, or more where the budget is tight */
     float max_error_px;        /* largest claimed among visible items */
@@ -64,7 +67,9 @@ void strl_walk_set_error_px(strl_walk *walk, double error_px);
 strl_status strl_walk_frame(strl_walk *walk, const strl_camera *camera, strl_draw_list *list, strl_error *err);
 /* Runs decode jobs inline for up to budget_ns (only without executor). Returns how many ran. */
 uint64_t strl_walk_pump(strl_walk *walk, uint64_t budget_ns);
-/* True where the last frame's front is the wanted one: nothing is missing and nothing pending for it. */
+/* True where the last frame's front is the wanted one: nothing is missing and nothing pending for it. What has failed three
+ * times in a row is not waited for, though it is asked for again: missing_nodes still counts it. Without a tight budget a settled
+ * draw list is a function of camera and error alone. */
 bool strl_walk_settled(const strl_walk *walk);
 const strl_walk_stats *strl_walk_get_stats(const strl_walk *walk); /* borrowed */
 

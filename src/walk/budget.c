@@ -10,6 +10,8 @@
 #define MOST_COARSENING 64u
 /* A finer cut must fit into this share of what there is. */
 #define REFINE_SHARE 0.9
+/* Records idle for longer make room for nodes. */
+#define COLD_FRAMES 64u
 
 static double allowed_px(const strl_walk *walk, uint32_t coarsening)
 {
@@ -44,6 +46,8 @@ static strl_status try_finer(strl_walk *walk, const strl_view *view, strl__cut *
 strl_status strl__budget_cut(strl_walk *walk, const strl_view *view, strl__cut *cut, strl_error *err)
 {
     bool moved = false, pending = false;
+    if (walk->coarsening > 0 && walk->frame > COLD_FRAMES)
+        strl__treelet_evict_cold(walk, walk->frame - COLD_FRAMES);
     strl_status status = run_at(walk, view, STRL__CUT_FRONT, walk->coarsening, 1, cut, err);
     while (status == STRL_OK && cut->overflow) {
         walk->coarsening++;

@@ -107,7 +107,8 @@ static void check_child(strl_walk *walk, const strl__node *parent, strl__node *c
     strl_error error = {0};
     strl__fail(&error, STRL_ERR_FORMAT, "tree %u: node %u is not the child of node %u that it is said to be",
                parent->treelet->tree, id_of(child), id_of(parent));
-    strl__note_fault(walk, &child->retry, &error);
+    strl__back_off(walk, &child->retry);
+    strl__note_fault(walk, &error);
 }
 
 /* The records of one child, or a candidate for the treelet that has them. */

@@ -20,7 +20,6 @@
 
 #define STRL__REQUEST_NODES 32u          /* most nodes that one page is read for at a time */
 #define STRL__MAX_REQUESTS 256u
-#define STRL__MAX_PAGE_BYTES (16u << 20) /* a larger page is a fault: it would be held undecoded, outside of the budget */
 #define STRL__GIVE_UP_FAILURES 3u        /* from then on strl_walk_settled does not wait for it; it is still retried */
 
 typedef enum strl__residency { STRL__ABSENT, STRL__PENDING, STRL__RESIDENT } strl__residency;
@@ -277,7 +276,8 @@ void strl__node_reserve(strl_walk *walk, strl__node *node);                  /* 
 void strl__node_release(strl_walk *walk, strl__node *node);                  /* pending -> absent */
 void strl__node_install(strl_walk *walk, strl__node *node, const strl__mesh *mesh); /* pending -> resident */
 void strl__node_touch(strl_walk *walk, strl__node *node);                    /* now the youngest */
-void strl__note_fault(strl_walk *walk, strl__retry *retry, const strl_error *error);
+void strl__back_off(const strl_walk *walk, strl__retry *retry);
+void strl__note_fault(strl_walk *walk, const strl_error *error);
 
 /* requests.c */
 void strl__requests_receive(strl_walk *walk);

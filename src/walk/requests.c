@@ -2,7 +2,6 @@
  * undecoded bytes are bounded by the number of slots. Decoding is a job per node: the executor's, or the pump's. */
 #include "walk/internal.h"
 
-#include <inttypes.h>
 #include <stdlib.h>
 
 #include "platform/thread.h"
@@ -83,12 +82,19 @@ static void node_done(strl_walk *walk, strl__request *request)
         free_slot(walk, request);
 }
 
-static void node_failed(strl_walk *walk, strl__request *request, strl__node *node, const strl_error *error)
+/* cancelled: not its fault. */
+static void drop_node(strl_walk *walk, strl__request *request, strl__node *node, bool cancelled)
 {
-    if (error->status != STRL_ERR_CANCELLED)
-        strl__note_fault(walk, &node->retry, error);
+    if (!cancelled)
+        strl__back_off(walk, &node->retry);
     strl__node_release(walk, node);
     node_done(walk, request);
+}
+
+static void node_failed(strl_walk *walk, strl__request *request, strl__node *node, const strl_error *error)
+{
+    strl__note_fault(walk, error);
+    drop_node(walk, request, node, false);
 }
 
 static void reap_jobs(strl_walk *walk)
@@ -138,10 +144,24 @@ static strl_status start_job(strl_walk *walk, strl__node *node, strl__page *page
     return STRL_OK;
 }
 
-static void fail_nodes(strl_walk *walk, strl__request *request, const strl_error *error)
+/* One fault, however many nodes. */
+static void page_failed(strl_walk *walk, strl__request *request, const strl_error *error)
 {
+    bool cancelled = error->status == STRL_ERR_CANCELLED;
+    if (!cancelled)
+        strl__note_fault(walk, error);
     for (uint32_t i = request->node_count; i-- > 0;)
-        node_failed(walk, request, request->nodes[i], error);
+        drop_node(walk, request, request->nodes[i], cancelled);
+}
+
+static void treelet_failed(strl_walk *walk, strl__request *request, const strl_error *error)
+{
+    request->treelet->residency = STRL__ABSENT;
+    if (error->status != STRL_ERR_CANCELLED) {
+        strl__back_off(walk, &request->treelet->retry);
+        strl__note_fault(walk, error);
+    }
+    free_slot(walk, request);
 }
 
 static void receive_page(strl_walk *walk, strl__request *request, strl_source_result *result)
@@ -153,7 +173,7 @@ static void receive_page(strl_walk *walk, strl__request *request, strl_source_re
     if (status == STRL_OK && !(page = strl__alloc_zero(1, sizeof *page)))
         status = strl__fail(&error, STRL_ERR_MEMORY, "no memory for a page");
     if (status != STRL_OK) {
-        fail_nodes(walk, request, &error);
+        page_failed(walk, request, &error);
         return;
     }
     page->data = result->data, page->size = result->size;
@@ -172,23 +192,24 @@ static void receive_page(strl_walk *walk, strl__request *request, strl_source_re
 static void receive_treelet(strl_walk *walk, strl__request *request, const strl_source_result *result)
 {
     strl_error error = {0};
-    strl__treelet *treelet = request->treelet;
-    if (strl__treelet_load(walk, treelet, result->data, result->size, &error) != STRL_OK)
-        strl__note_fault(walk, &treelet->retry, &error);
-    free_slot(walk, request);
+    if (strl__treelet_load(walk, request->treelet, result->data, result->size, &error) == STRL_OK)
+        free_slot(walk, request);
+    else
+        treelet_failed(walk, request, &error);
 }
 
-static void receive_failure(strl_walk *walk, strl__request *request, strl_source_result *result)
+static void receive(strl_walk *walk, strl__request *request, strl_source_result *result)
 {
     result->error.status = result->status;
-    if (!request->treelet) {
-        fail_nodes(walk, request, &result->error);
-        return;
-    }
-    request->treelet->residency = STRL__ABSENT;
-    if (result->status != STRL_ERR_CANCELLED)
-        strl__note_fault(walk, &request->treelet->retry, &result->error);
-    free_slot(walk, request);
+    walk->stats.bytes_read += result->status == STRL_OK ? result->size : 0;
+    if (result->status != STRL_OK && request->treelet)
+        treelet_failed(walk, request, &result->error);
+    else if (result->status != STRL_OK)
+        page_failed(walk, request, &result->error);
+    else if (request->treelet)
+        receive_treelet(walk, request, result);
+    else
+        receive_page(walk, request, result);
 }
 
 void strl__requests_receive(strl_walk *walk)
@@ -197,17 +218,8 @@ void strl__requests_receive(strl_walk *walk)
     reap_jobs(walk);
     while (strl_source_poll(walk->source, &result)) {
         strl__request *request = &walk->requests[result.token % STRL__MAX_REQUESTS];
-        if (request->used && request->token == result.token && !request->answered) {
-            if (result.status != STRL_OK)
-                receive_failure(walk, request, &result);
-            else {
-                walk->stats.bytes_read += result.size;
-                if (request->treelet)
-                    receive_treelet(walk, request, &result);
-                else
-                    receive_page(walk, request, &result);
-            }
-        }
+        if (request->used && request->token == result.token && !request->answered)
+            receive(walk, request, &result);
         strl__free(result.data);
     }
 }
@@ -249,9 +261,6 @@ static strl__request *take_slot(strl_walk *walk, uint32_t in_flight)
 
 static strl_status submit(strl_walk *walk, strl__request *request, uint64_t offset, size_t size, float urgency, strl_error *err)
 {
-    if (size > STRL__MAX_PAGE_BYTES)
-        return strl__fail(err, STRL_ERR_LIMIT, "the page at byte %" PRIu64 " has %zu bytes, expected at most %u", offset, size,
-                          STRL__MAX_PAGE_BYTES);
     strl_status status = strl_source_submit(walk->source, request->token, offset, size, urgency, err);
     if (status == STRL_OK)
         walk->stats.requests++;
@@ -301,10 +310,8 @@ static void ask_for_treelet(strl_walk *walk, const strl__candidate *candidate, u
     strl__treelet *treelet = strl__treelets_find(&walk->treelets, parent->tree, candidate->treelet);
     if (walk->requests_pending >= in_flight || (treelet && (treelet->residency != STRL__ABSENT || treelet->retry.frame > walk->frame)))
         return;
-    uint32_t first = parent->data.first_child_treelet;
-    if (candidate->treelet < first || candidate->treelet - first >= parent->data.child_ref_count)
-        return; /* front.c has noted the fault */
-    const strl_treelet_ref *ref = &parent->data.child_refs[candidate->treelet - first];
+    /* Decoding has checked that a treelet names those of all children of its nodes. */
+    const strl_treelet_ref *ref = &parent->data.child_refs[candidate->treelet - parent->data.first_child_treelet];
     if (!treelet)
         treelet = strl__treelet_reserve(walk, parent->tree, candidate->treelet, ref);
     if (!treelet)
@@ -313,11 +320,8 @@ static void ask_for_treelet(strl_walk *walk, const strl__candidate *candidate, u
     strl__request *request = take_slot(walk, in_flight);
     request->treelet = treelet;
     treelet->residency = STRL__PENDING;
-    if (submit(walk, request, ref->offset, ref->bytes, candidate->urgency, &error) == STRL_OK)
-        return;
-    treelet->residency = STRL__ABSENT;
-    strl__note_fault(walk, &treelet->retry, &error);
-    free_slot(walk, request);
+    if (submit(walk, request, ref->offset, ref->bytes, candidate->urgency, &error) != STRL_OK)
+        treelet_failed(walk, request, &error);
 }
 
 static void ask_for_all(strl_walk *walk, strl__candidates *candidates, uint32_t in_flight, uint64_t evict_before, bool prefetch)

@@ -1,7 +1,6 @@
 /* What is in memory, under one budget: treelets and meshes, and the reservations of those on their way. */
 #include "walk/internal.h"
 
-#include <inttypes.h>
 #include <string.h>
 
 #define RETRY_FRAMES 8u /* doubles with each failure in a row */
@@ -135,12 +134,6 @@ strl_status strl__treelet_load(strl_walk *walk, strl__treelet *treelet, const vo
 {
     strl_status status = strl_treelet_decode(walk->container, treelet->tree, treelet->index, &treelet->ref, data, size,
                                              &treelet->data, err);
-    if (status == STRL_OK && treelet->data.child_ref_count > MAX_CHILD_TREELETS) {
-        status = strl__fail(err, STRL_ERR_FORMAT, "treelet %" PRIu32 " names %" PRIu32 " treelets of children, expected at most %u",
-                            treelet->index, treelet->data.child_ref_count, MAX_CHILD_TREELETS);
-        strl_treelet_deinit(&treelet->data);
-        treelet->data = (strl_treelet){0};
-    }
     treelet->residency = status == STRL_OK ? STRL__RESIDENT : STRL__ABSENT;
     if (status != STRL_OK)
         return status;
@@ -164,13 +157,17 @@ strl__node *strl__node_find(strl_walk *walk, uint32_t tree, uint32_t id)
 
 /* ---- faults */
 
-void strl__note_fault(strl_walk *walk, strl__retry *retry, const strl_error *error)
+void strl__back_off(const strl_walk *walk, strl__retry *retry)
 {
     uint32_t doublings = retry->failures < RETRY_DOUBLINGS ? retry->failures : RETRY_DOUBLINGS;
     retry->failures++;
     retry->frame = walk->frame + ((uint64_t)RETRY_FRAMES << doublings);
-    walk->stats.faults++;
+}
+
+void strl__note_fault(strl_walk *walk, const strl_error *error)
+{
     size_t length = strnlen(error->message, sizeof walk->stats.last_fault - 1);
+    walk->stats.faults++;
     memcpy(walk->stats.last_fault, error->message, length);
     walk->stats.last_fault[length] = 0;
 }

@@ -73,11 +73,7 @@ static strl_status load_placements(strl_walk *walk, strl_error *err)
 /* Reads a range and waits. *data is the caller's. */
 static strl_status read_range(strl_walk *walk, uint64_t offset, size_t size, uint8_t **data, strl_error *err)
 {
-    *data = NULL;
-    if (size > STRL__MAX_PAGE_BYTES)
-        return strl__fail(err, STRL_ERR_LIMIT, "the page at byte %" PRIu64 " has %zu bytes, expected at most %u", offset, size,
-                          STRL__MAX_PAGE_BYTES);
-    *data = strl__alloc(size, 1);
+    *data = strl__alloc(size, 1); /* the container has bounded it */
     if (!*data)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a page of %zu bytes", size);
     return strl_source_read(walk->source, offset, *data, size, err);
