@@ -5,16 +5,19 @@
 
 #include "base/fail.h"
 #include "base/hash.h"
+#include "base/memory.h"
+
+#define NAME_OVERHEAD_BYTES 32u /* about what the heap adds to a block */
 
 void strl__names_init(strl__names *names, size_t limit_bytes)
 {
     *names = (strl__names){.limit_bytes = limit_bytes};
-    strl_arena_init(&names->arena, 0);
 }
 
 void strl__names_deinit(strl__names *names)
 {
-    strl_arena_deinit(&names->arena);
+    for (size_t i = 0; i < names->count; i++)
+        strl__free(names->items[i].text);
     strl__free(names->items);
     strl__free(names->slots);
     *names = (strl__names){0};
@@ -111,16 +114,17 @@ strl_status strl__names_add(strl__names *names, const char *text, size_t length,
     *index = find_clean(names, cleaned, used);
     if (*index != UINT32_MAX)
         return STRL_OK;
-    size_t held = names->arena.total_bytes + 2 * names->capacity * sizeof *names->items +
+    size_t held = names->text_bytes + used + 2 * names->capacity * sizeof *names->items +
                   3 * names->slot_count * sizeof *names->slots;
     if (held > names->limit_bytes || names->count >= UINT32_MAX - 1)
-        return strl__fail(err, STRL_ERR_LIMIT, "more than %zu names, which do not fit %zu bytes of memory", names->count,
-                          names->limit_bytes);
-    char *copy = strl_arena_alloc(&names->arena, used + 1, 1);
-    if (!copy || !strl__grow(&names->items, &names->capacity, names->count + 1, sizeof *names->items) ||
-        !grow_slots(names))
+        return strl__fail(err, STRL_ERR_LIMIT, "expected at most %zu bytes of names, found more than %zu names",
+                          names->limit_bytes, names->count);
+    if (!strl__grow(&names->items, &names->capacity, names->count + 1, sizeof *names->items) || !grow_slots(names))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu names", names->count + 1);
-    memcpy(copy, cleaned, used + 1);
+    char *copy = strl__strdup(cleaned);
+    if (!copy)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a name of %zu bytes", used);
+    names->text_bytes += used + NAME_OVERHEAD_BYTES;
     names->items[names->count] = (strl__name){copy, 0xffffffffu};
     fill_slot(names, (uint32_t)names->count);
     *index = (uint32_t)names->count++;

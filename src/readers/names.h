@@ -5,23 +5,22 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "base/memory.h"
 #include "stroll/error.h"
 
 /* Longer names are cut here. */
 #define STRL__NAME_BYTES_MAX 1023u
 
 typedef struct strl__name {
-    const char *text; /* UTF-8 */
+    char *text;    /* UTF-8; where it lies does not change */
     uint32_t rgba;    /* sRGB-encoded RGBA8, R in the lowest byte */
 } strl__name;
 
 typedef struct strl__names {
-    strl_arena arena;
-    strl__name *items; /* owned */
+    strl__name *items; /* owned, as are the texts */
     size_t count, capacity;
     uint32_t *slots; /* open addressing; index + 1, 0 = free; owned */
     size_t slot_count;
+    size_t text_bytes;
     size_t limit_bytes;
 } strl__names;
 

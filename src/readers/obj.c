@@ -314,7 +314,9 @@ static strl_status read_corner(strl_reader *reader, uint64_t *vertex, uint64_t *
     if (!to_index(written[0], obj->vertices_seen, reader->vertices.count, vertex))
         return index_fail(reader, "vertices", written[0], reader->vertices.count, err);
     *normal = STRL__NO_INDEX;
-    if (given[2] && !to_index(written[2], obj->normals_seen, reader->normals.count, normal))
+    /* Some programs write normal indices without any normals: those are as good as absent. */
+    if (given[2] && reader->normals.count > 0 &&
+        !to_index(written[2], obj->normals_seen, reader->normals.count, normal))
         return index_fail(reader, "normals", written[2], reader->normals.count, err);
     input->at = at;
     return STRL_OK;

@@ -97,10 +97,26 @@ static strl_status value_fail(strl_reader *reader, const char *what, uint64_t li
                       reader->path, ply->header.ascii ? "line" : "before byte", place, what, limit, found);
 }
 
+/* In a text each record is a line; words beyond what the header announces are passed over, as Turk's own reader does
+ * (some programs write such). Only a strip may go on in the next line. */
+static void begin_record(strl_reader *reader)
+{
+    const ply_state *ply = reader->state;
+    if (ply->header.ascii)
+        strl__text_skip_space(&reader->input);
+}
+
+static void end_record(strl_reader *reader)
+{
+    const ply_state *ply = reader->state;
+    if (ply->header.ascii)
+        strl__text_skip_line(&reader->input);
+}
+
 static inline bool next_scalar(const ply_state *ply, strl__input *input, strl__scalar type, double *value)
 {
     if (ply->header.ascii) {
-        strl__text_skip_space(input);
+        strl__text_skip_blanks(input);
         return strl__text_number(input, value);
     }
     unsigned bytes = strl__scalar_bytes(type);
@@ -157,9 +173,12 @@ static strl_status skip_element(strl_reader *reader, strl_error *err)
         return strl__input_skip(&reader->input, element->count * element->stride) ? STRL_OK
                                                                                   : record_fail(reader, "a record", err);
     strl_status status = STRL_OK;
-    for (ply->record = 0; !status && ply->record < element->count; ply->record++)
+    for (ply->record = 0; !status && ply->record < element->count; ply->record++) {
+        begin_record(reader);
         for (uint32_t i = 0; !status && i < element->property_count; i++)
             status = skip_property(reader, &element->properties[i], err);
+        end_record(reader);
+    }
     return status;
 }
 
@@ -232,8 +251,11 @@ static strl_status spill_vertices(strl_reader *reader, const strl__ply_element *
 {
     ply_state *ply = reader->state;
     strl_status status = STRL_OK;
-    for (ply->record = 0; !status && ply->record < element->count; ply->record++)
+    for (ply->record = 0; !status && ply->record < element->count; ply->record++) {
+        begin_record(reader);
         status = spill_vertex(reader, element, err);
+        end_record(reader);
+    }
     return status ? status : strl__table_finish(&reader->vertices, err);
 }
 
@@ -399,9 +421,11 @@ static strl_status fill_faces(strl_reader *reader, const strl__ply_element *elem
             read_plain_faces(reader, element);
         if (ply->record == element->count || strl__batch_is_full(&reader->batch))
             break;
+        begin_record(reader);
         strl_status status = read_face(reader, element, err);
         if (status)
             return status;
+        end_record(reader);
         ply->record++;
     }
     return STRL_OK;
@@ -445,6 +469,8 @@ static strl_status fill_strip(strl_reader *reader, const strl__ply_property *pro
     }
     for (; !status && ply->strip_left > 0 && !strl__batch_is_full(&reader->batch); ply->strip_left--) {
         double value;
+        if (ply->header.ascii)
+            strl__text_skip_space(&reader->input);
         status = read_index(reader, property->type, &value, err);
         if (!status)
             status = add_strip_item(reader, value, err);
@@ -459,14 +485,19 @@ static strl_status fill_strips(strl_reader *reader, const strl__ply_element *ele
     strl_status status = STRL_OK;
     while (!status && ply->record < element->count && !strl__batch_is_full(&reader->batch)) {
         const strl__ply_property *property = &element->properties[ply->property];
+        if (ply->property == 0 && !ply->in_strip)
+            begin_record(reader);
         if (property->role == STRL__PLY_INDICES)
             status = fill_strip(reader, property, err);
         else
             status = skip_property(reader, property, err);
-        if (ply->in_strip)
+        if (status || ply->in_strip)
             continue;
         ply->property = (ply->property + 1) % element->property_count;
-        ply->record += ply->property == 0;
+        if (ply->property == 0) {
+            end_record(reader);
+            ply->record++;
+        }
     }
     return status;
 }
