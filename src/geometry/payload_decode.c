@@ -1,33 +1,39 @@
-/* Reading a node payload. docs/format-payload.md is normative. */
-#include "geometry/payload.h"
+/* Reading a node payload: head, number streams, base mesh, steps, attributes. docs/format-payload.md is normative. */
+#include "geometry/payload_decode.h"
 
 #include <inttypes.h>
+#include <string.h>
 
 #include "base/fail.h"
+
+enum { FLAG_COLOUR = 1, FLAG_PALETTE_INDEX = 2 };
 
 static strl_status read_head(strl_cursor *cursor, strl_payload_sizes *sizes, uint8_t *flags, strl_error *err)
 {
     uint8_t version = strl_cursor_u8(cursor);
     *flags = strl_cursor_u8(cursor);
-    sizes->vertex_count = strl_cursor_u32(cursor);
+    sizes->vertex_count = strl_cursor_u16(cursor);
+    sizes->base_vertex_count = strl_cursor_u16(cursor);
+    sizes->step_count = strl_cursor_u16(cursor);
+    sizes->palette_count = strl_cursor_u16(cursor);
     sizes->triangle_count = strl_cursor_u32(cursor);
-    sizes->step_count = strl_cursor_u32(cursor);
-    sizes->palette_count = strl_cursor_u32(cursor);
-    sizes->base_vertex_count = strl_cursor_u32(cursor);
     sizes->base_triangle_count = strl_cursor_u32(cursor);
-    if (cursor->failed || version != 0 || *flags > 3)
-        return strl__fail(err, STRL_ERR_FORMAT, "node payload has version %u and flags %u, expected 0 and at most 3", version,
+    if (cursor->failed)
+        return strl__fail(err, STRL_ERR_FORMAT, "node payload of %zu bytes is too short for its head", cursor->size);
+    if (version != 1 || *flags > (FLAG_COLOUR | FLAG_PALETTE_INDEX))
+        return strl__fail(err, STRL_ERR_FORMAT, "node payload has version %u and flags %u, expected 1 and at most 3", version,
                           *flags);
-    if (sizes->vertex_count > STRL_PM_MAX_VERTICES || sizes->triangle_count > STRL_PM_MAX_TRIANGLES ||
-        sizes->step_count > sizes->vertex_count || sizes->palette_count < 1 || sizes->palette_count > STRL_PM_MAX_PALETTE ||
-        sizes->base_vertex_count > sizes->vertex_count || sizes->base_triangle_count > sizes->triangle_count)
-        return strl__fail(err, STRL_ERR_FORMAT, "node payload announces %" PRIu32 " vertices, %" PRIu32 " triangles and %" PRIu32
-                          " steps, which is past the limits", sizes->vertex_count, sizes->triangle_count, sizes->step_count);
-    size_t need = (size_t)sizes->vertex_count * (size_t)(18 + (*flags & 1) * 4 + (*flags >> 1) * 2) + (size_t)sizes->triangle_count * 6 +
-                  ((size_t)sizes->step_count + 1) * 16 + (size_t)sizes->palette_count * 12;
-    if (need != strl_cursor_left(cursor))
-        return strl__fail(err, STRL_ERR_FORMAT, "node payload has %zu bytes after its head, expected %zu",
-                          strl_cursor_left(cursor), need);
+    if (sizes->triangle_count > STRL_PM_MAX_TRIANGLES || sizes->base_triangle_count > sizes->triangle_count ||
+        sizes->base_vertex_count > sizes->vertex_count || sizes->palette_count < 1 ||
+        sizes->step_count > sizes->vertex_count - sizes->base_vertex_count)
+        return strl__fail(err, STRL_ERR_FORMAT, "node payload announces %" PRIu32 " vertices (base %" PRIu32 "), %" PRIu32
+                          " triangles (base %" PRIu32 "), %" PRIu32 " steps and %" PRIu32 " palette entries, which cannot be",
+                          sizes->vertex_count, sizes->base_vertex_count, sizes->triangle_count, sizes->base_triangle_count,
+                          sizes->step_count, sizes->palette_count);
+    uint64_t items = (uint64_t)sizes->vertex_count + sizes->triangle_count + sizes->palette_count;
+    if (items > (uint64_t)cursor->size * STRL__MAX_ITEMS_A_BYTE)
+        return strl__fail(err, STRL_ERR_FORMAT, "node payload announces %" PRIu64 " items, more than its %zu bytes can hold",
+                          items, cursor->size);
     return STRL_OK;
 }
 
@@ -38,64 +44,74 @@ strl_status strl_payload_peek(const void *data, size_t size, strl_payload_sizes 
     return read_head(&cursor, sizes, &flags, err);
 }
 
-static uint16_t *read_u16s(strl_cursor *cursor, strl_arena *arena, size_t count)
+static strl_status allocate(const strl_payload_sizes *sizes, uint8_t flags, strl_arena *arena, strl_pm *pm, strl_error *err)
 {
-    uint16_t *values = strl_arena_alloc(arena, count, sizeof *values);
-    for (size_t i = 0; values && i < count; i++)
-        values[i] = strl_cursor_u16(cursor);
-    return values;
+    uint32_t vertices = sizes->vertex_count, states = sizes->step_count + 1;
+    bool colour = flags & FLAG_COLOUR, palette_index = flags & FLAG_PALETTE_INDEX;
+    pm->vertex_count = vertices;
+    pm->triangle_count = sizes->triangle_count;
+    pm->step_count = sizes->step_count;
+    pm->palette_count = sizes->palette_count;
+    pm->position = strl_arena_alloc(arena, vertices, sizeof *pm->position);
+    pm->normal = strl_arena_alloc(arena, vertices, sizeof *pm->normal);
+    pm->colour = colour ? strl_arena_alloc(arena, vertices, sizeof *pm->colour) : NULL;
+    pm->palette_index = palette_index ? strl_arena_alloc(arena, vertices, sizeof *pm->palette_index) : NULL;
+    pm->parent = strl_arena_alloc(arena, vertices, sizeof *pm->parent);
+    pm->triangle = strl_arena_alloc(arena, sizes->triangle_count, sizeof *pm->triangle);
+    pm->vertex_end = strl_arena_alloc(arena, states, sizeof *pm->vertex_end);
+    pm->triangle_end = strl_arena_alloc(arena, states, sizeof *pm->triangle_end);
+    pm->geometric_error = strl_arena_alloc(arena, states, sizeof *pm->geometric_error);
+    pm->appearance_error = strl_arena_alloc(arena, states, sizeof *pm->appearance_error);
+    pm->palette = strl_arena_alloc(arena, sizes->palette_count, sizeof *pm->palette);
+    if (!pm->position || !pm->normal || (colour && !pm->colour) || (palette_index && !pm->palette_index) || !pm->parent ||
+        !pm->triangle || !pm->vertex_end || !pm->triangle_end || !pm->geometric_error || !pm->appearance_error || !pm->palette)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory to decode a node payload");
+    memset(pm->parent, 0, sizes->base_vertex_count * sizeof *pm->parent);
+    return STRL_OK;
 }
 
-static uint32_t *read_u32s(strl_cursor *cursor, strl_arena *arena, size_t count)
+static strl_status decode_parts(struct strl__decoder *d, strl_cursor *cursor)
 {
-    uint32_t *values = strl_arena_alloc(arena, count, sizeof *values);
-    for (size_t i = 0; values && i < count; i++)
-        values[i] = strl_cursor_u32(cursor);
-    return values;
+    const strl_payload_sizes *sizes = &d->sizes;
+    uint64_t items = (uint64_t)sizes->vertex_count + sizes->triangle_count + sizes->palette_count;
+    strl_status status = strl__streams_read(cursor, cursor->size, items, d->scratch, &d->in, d->err);
+    if (status)
+        return status;
+    d->from = strl_arena_alloc(d->scratch, sizes->base_vertex_count, sizeof *d->from);
+    if (!d->from || !strl__mesh_init(&d->mesh, sizes->vertex_count, sizes->triangle_count, d->pm->position, d->scratch))
+        return strl__fail(d->err, STRL_ERR_MEMORY, "no memory to decode a node payload");
+    status = strl__decode_base(d);
+    if (!status)
+        status = strl__decode_steps(d);
+    if (!status)
+        status = strl__decode_attributes(d);
+    if (!status && !strl__streams_done(&d->in))
+        status = strl__fail(d->err, STRL_ERR_FORMAT, "node payload has numbers left over or too few");
+    for (uint32_t t = 0; !status && t < sizes->triangle_count; t++)
+        memcpy(d->pm->triangle[t], d->mesh.triangle[t], sizeof d->pm->triangle[t]);
+    return status;
 }
 
 strl_status strl_payload_decode(const void *data, size_t size, strl_arena *arena, strl_pm *pm, strl_error *err)
 {
     strl_cursor cursor = strl_cursor_make(data, size);
-    strl_payload_sizes sizes;
+    strl_pm mesh = {0};
+    struct strl__decoder decoder = {.pm = &mesh, .scratch = arena, .err = err};
     uint8_t flags;
-    *pm = (strl_pm){0};
-    strl_status status = read_head(&cursor, &sizes, &flags, err);
+    *pm = mesh;
+    strl_status status = read_head(&cursor, &decoder.sizes, &flags, err);
     if (status)
         return status;
-    size_t vertices = sizes.vertex_count, states = (size_t)sizes.step_count + 1;
-    strl_pm mesh = {.vertex_count = sizes.vertex_count, .triangle_count = sizes.triangle_count, .step_count = sizes.step_count,
-                    .palette_count = sizes.palette_count};
-    mesh.position = (int32_t(*)[3])read_u32s(&cursor, arena, vertices * 3);
-    mesh.normal = (uint16_t(*)[2])read_u16s(&cursor, arena, vertices * 2);
-    mesh.colour = flags & 1 ? read_u32s(&cursor, arena, vertices) : NULL;
-    mesh.palette_index = flags & 2 ? read_u16s(&cursor, arena, vertices) : NULL;
-    mesh.parent = read_u16s(&cursor, arena, vertices);
-    mesh.triangle = (uint16_t(*)[3])read_u16s(&cursor, arena, (size_t)sizes.triangle_count * 3);
-    mesh.vertex_end = strl_arena_alloc(arena, states, 4);
-    mesh.triangle_end = strl_arena_alloc(arena, states, 4);
-    mesh.geometric_error = strl_arena_alloc(arena, states, sizeof(float));
-    mesh.appearance_error = strl_arena_alloc(arena, states, sizeof(float));
-    mesh.palette = strl_arena_alloc(arena, sizes.palette_count, sizeof *mesh.palette);
-    if (!mesh.position || !mesh.normal || (flags & 1 && !mesh.colour) || (flags & 2 && !mesh.palette_index) || !mesh.parent ||
-        !mesh.triangle || !mesh.vertex_end || !mesh.triangle_end || !mesh.geometric_error || !mesh.appearance_error || !mesh.palette)
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory to decode a node payload");
-    for (size_t i = 0; i < states; i++) {
-        mesh.vertex_end[i] = strl_cursor_u32(&cursor);
-        mesh.triangle_end[i] = strl_cursor_u32(&cursor);
-        mesh.geometric_error[i] = strl_cursor_f32(&cursor);
-        mesh.appearance_error[i] = strl_cursor_f32(&cursor);
+    strl_arena_mark before = strl_arena_get_mark(arena);
+    status = allocate(&decoder.sizes, flags, arena, &mesh, err);
+    if (!status) {
+        strl_arena_mark results = strl_arena_get_mark(arena);
+        status = decode_parts(&decoder, &cursor);
+        strl_arena_rewind(arena, results);
     }
-    for (size_t i = 0; i < sizes.palette_count; i++) {
-        mesh.palette[i].part = strl_cursor_u32(&cursor);
-        mesh.palette[i].material = strl_cursor_u32(&cursor);
-        mesh.palette[i].rgba = strl_cursor_u32(&cursor);
-    }
-    status = strl_pm_check(&mesh, err);
-    if (!status && (mesh.vertex_end[0] != sizes.base_vertex_count || mesh.triangle_end[0] != sizes.base_triangle_count))
-        status = strl__fail(err, STRL_ERR_FORMAT, "node payload's head and states disagree on the base mesh");
     if (status)
-        return err && status != STRL_ERR_FORMAT ? (err->status = STRL_ERR_FORMAT) : STRL_ERR_FORMAT;
-    *pm = mesh;
-    return STRL_OK;
+        strl_arena_rewind(arena, before);
+    else
+        *pm = mesh;
+    return status;
 }

@@ -1,45 +1,110 @@
-/* Writing a node payload: every array as it is, little-endian. docs/format-payload.md is normative. */
-#include "geometry/payload.h"
+/* Writing a node payload: head, number streams, base mesh, steps, attributes. docs/format-payload.md is normative. */
+#include "geometry/payload_encode.h"
+
+#include <string.h>
 
 #include "base/fail.h"
 
-static void write_u16s(strl_writer *writer, const uint16_t *values, size_t count)
+/* Walks every triangle from the finest state back to its birth; where `record`, its corners there and the corners that arrive at
+ * each vertex by a step. Otherwise only counts the arrivals. */
+static void walk_triangles(struct strl__encoder *e, bool record)
 {
-    for (size_t i = 0; i < count; i++)
-        strl_writer_u16(writer, values[i]);
+    const strl_pm *pm = e->pm;
+    for (uint32_t t = 0, s = 0; t < pm->triangle_count; t++) {
+        while (t >= pm->triangle_end[s])
+            s++;
+        for (unsigned k = 0; k < 3; k++) {
+            uint32_t v = pm->triangle[t][k];
+            for (; v >= pm->vertex_end[s]; v = pm->parent[v]) {
+                if (record)
+                    e->arrival[e->arrival_first[v]++] = 4 * t + k;
+                else
+                    e->arrival_first[v]++;
+            }
+            if (record)
+                e->birth[t][k] = (uint16_t)v;
+        }
+    }
+}
+
+/* birth, arrival and arrival_first: a counting sort of the corners by the vertices that they pass. */
+static bool find_arrivals(struct strl__encoder *e)
+{
+    uint32_t vertices = e->pm->vertex_count, total = 0;
+    e->arrival_first = strl_arena_alloc_zero(e->scratch, (size_t)vertices + 2, sizeof *e->arrival_first);
+    e->birth = strl_arena_alloc(e->scratch, e->pm->triangle_count, sizeof *e->birth);
+    if (!e->arrival_first || !e->birth)
+        return false;
+    walk_triangles(e, false);
+    for (uint32_t v = 0; v < vertices; v++) {
+        uint32_t count = e->arrival_first[v];
+        e->arrival_first[v] = total;
+        total += count;
+    }
+    e->arrival = strl_arena_alloc(e->scratch, total, sizeof *e->arrival);
+    if (!e->arrival)
+        return false;
+    walk_triangles(e, true);
+    for (uint32_t v = vertices + 1; v > 0; v--) /* each first has run on to the next one's */
+        e->arrival_first[v] = e->arrival_first[v - 1];
+    e->arrival_first[0] = 0;
+    e->arrival_first[vertices] = total;
+    return true;
+}
+
+static bool init(struct strl__encoder *e)
+{
+    uint32_t vertices = e->pm->vertex_count, triangles = e->pm->triangle_count;
+    int32_t(*position)[3] = strl_arena_alloc(e->scratch, vertices, sizeof *position);
+    e->number = strl_arena_alloc_zero(e->scratch, vertices, sizeof *e->number);
+    e->vertex = strl_arena_alloc(e->scratch, vertices, sizeof *e->vertex);
+    e->from = strl_arena_alloc(e->scratch, e->pm->vertex_end[0], sizeof *e->from);
+    e->triangle_of = strl_arena_alloc(e->scratch, triangles, sizeof *e->triangle_of);
+    e->rotation = strl_arena_alloc(e->scratch, triangles, sizeof *e->rotation);
+    if (!position || !e->number || !e->vertex || !e->from || !e->triangle_of || !e->rotation || !find_arrivals(e) ||
+        !strl__mesh_init(&e->mesh, vertices, triangles, position, e->scratch))
+        return false;
+    memset(e->triangle_of, 0xff, triangles * sizeof *e->triangle_of);
+    for (uint32_t v = e->pm->vertex_end[0]; v < vertices; v++)
+        e->number[v] = (uint16_t)v;
+    return true;
+}
+
+static void write_head(const strl_pm *pm, strl_writer *writer)
+{
+    strl_writer_u8(writer, 1);
+    strl_writer_u8(writer, (uint8_t)((pm->colour ? 1 : 0) | (pm->palette_index ? 2 : 0)));
+    strl_writer_u16(writer, (uint16_t)pm->vertex_count);
+    strl_writer_u16(writer, (uint16_t)pm->vertex_end[0]);
+    strl_writer_u16(writer, (uint16_t)pm->step_count);
+    strl_writer_u16(writer, (uint16_t)pm->palette_count);
+    strl_writer_u32(writer, pm->triangle_count);
+    strl_writer_u32(writer, pm->triangle_end[0]);
 }
 
 strl_status strl_payload_encode(const strl_pm *pm, strl_arena *scratch, strl_writer *writer, strl_error *err)
 {
-    (void)scratch;
     strl_status status = strl_pm_check(pm, err);
     if (status)
         return status;
-    strl_writer_u8(writer, 0);
-    strl_writer_u8(writer, (uint8_t)((pm->colour ? 1 : 0) | (pm->palette_index ? 2 : 0)));
-    const uint32_t counts[] = {pm->vertex_count, pm->triangle_count, pm->step_count, pm->palette_count, pm->vertex_end[0],
-                               pm->triangle_end[0]};
-    for (size_t i = 0; i < sizeof counts / sizeof *counts; i++)
-        strl_writer_u32(writer, counts[i]);
-    for (size_t i = 0; i < (size_t)pm->vertex_count * 3; i++)
-        strl_writer_u32(writer, (uint32_t)pm->position[i / 3][i % 3]);
-    write_u16s(writer, pm->vertex_count ? pm->normal[0] : NULL, (size_t)pm->vertex_count * 2);
-    for (size_t i = 0; pm->colour && i < pm->vertex_count; i++)
-        strl_writer_u32(writer, pm->colour[i]);
-    if (pm->palette_index)
-        write_u16s(writer, pm->palette_index, pm->vertex_count);
-    write_u16s(writer, pm->parent, pm->vertex_count);
-    write_u16s(writer, pm->triangle_count ? pm->triangle[0] : NULL, (size_t)pm->triangle_count * 3);
-    for (size_t i = 0; i <= pm->step_count; i++) {
-        strl_writer_u32(writer, pm->vertex_end[i]);
-        strl_writer_u32(writer, pm->triangle_end[i]);
-        strl_writer_f32(writer, pm->geometric_error[i]);
-        strl_writer_f32(writer, pm->appearance_error[i]);
-    }
-    for (size_t i = 0; i < pm->palette_count; i++) {
-        strl_writer_u32(writer, pm->palette[i].part);
-        strl_writer_u32(writer, pm->palette[i].material);
-        strl_writer_u32(writer, pm->palette[i].rgba);
-    }
-    return writer->failed ? strl__fail(err, STRL_ERR_MEMORY, "no memory for a node payload") : STRL_OK;
+    struct strl__encoder e = {.pm = pm, .scratch = scratch, .err = err};
+    strl_arena_mark mark = strl_arena_get_mark(scratch);
+    size_t start = writer->size;
+    write_head(pm, writer);
+    if (!init(&e))
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory to encode a node payload");
+    if (!status)
+        status = strl__encode_base(&e);
+    if (!status)
+        status = strl__encode_steps(&e);
+    if (!status)
+        status = strl__encode_attributes(&e);
+    if (!status)
+        status = strl__streams_write(&e.out, start, (uint64_t)pm->vertex_count + pm->triangle_count + pm->palette_count, writer,
+                                     err);
+    if (status && writer->size > start)
+        writer->size = start;
+    strl__streams_deinit(&e.out);
+    strl_arena_rewind(scratch, mark);
+    return status;
 }

@@ -1,0 +1,91 @@
+/* What a node payload says of vertices beside their position, and of states and palette. docs/format-payload.md, "Attributes",
+ * is normative. Runs when the finest state is known. */
+#include "geometry/payload_decode.h"
+
+#include "base/fail.h"
+
+static bool decode_normals(struct strl__decoder *d)
+{
+    uint64_t(*sum)[4] = strl__normal_sums((const int32_t(*)[3])d->mesh.position, d->sizes.vertex_count,
+                                          (const uint16_t(*)[4])d->mesh.triangle, d->sizes.triangle_count, d->scratch);
+    for (uint32_t v = 0; sum && v < d->sizes.vertex_count; v++) {
+        uint32_t predicted[2];
+        strl__normal_predict(sum[v], predicted);
+        for (unsigned k = 0; k < 2; k++)
+            d->pm->normal[v][k] =
+                (uint16_t)((predicted[k] + strl__unzigzag(strl__pull(&d->in, STRL__STREAM_NORMAL + k))) & 1023u);
+    }
+    return sum;
+}
+
+/* The vertex that predicts v's colour and palette index; v itself where there is none. */
+static uint32_t predictor(const struct strl__decoder *d, uint32_t v)
+{
+    return v < d->sizes.base_vertex_count ? d->from[v] : d->pm->parent[v];
+}
+
+static void decode_colours(struct strl__decoder *d)
+{
+    for (uint32_t v = 0; v < d->sizes.vertex_count; v++) {
+        uint32_t before = v ? d->pm->colour[predictor(d, v)] : 0xffffffffu, delta[4];
+        for (unsigned k = 0; k < 4; k++)
+            delta[k] = strl__unzigzag(strl__pull(&d->in, STRL__STREAM_COLOUR + k));
+        uint32_t green = (before >> 8) + delta[0];
+        uint32_t red = before + delta[0] + delta[1];
+        uint32_t blue = (before >> 16) + delta[0] + delta[2];
+        uint32_t alpha = (before >> 24) + delta[3];
+        d->pm->colour[v] = (red & 255) | (green & 255) << 8 | (blue & 255) << 16 | (alpha & 255) << 24;
+    }
+}
+
+static bool decode_palette_indices(struct strl__decoder *d)
+{
+    for (uint32_t v = 0; v < d->sizes.vertex_count; v++) {
+        uint32_t before = v ? d->pm->palette_index[predictor(d, v)] : 0;
+        uint32_t index = before + strl__unzigzag(strl__pull(&d->in, STRL__STREAM_PALETTE_INDEX));
+        if (index >= d->sizes.palette_count)
+            return false;
+        d->pm->palette_index[v] = (uint16_t)index;
+    }
+    return true;
+}
+
+static void decode_palette(struct strl__decoder *d)
+{
+    strl_palette_entry entry = {0};
+    for (uint32_t i = 0; i < d->sizes.palette_count; i++) {
+        entry.part += strl__unzigzag(strl__pull(&d->in, STRL__STREAM_PALETTE));
+        entry.material += strl__unzigzag(strl__pull(&d->in, STRL__STREAM_PALETTE + 1));
+        entry.rgba += strl__unzigzag(strl__pull(&d->in, STRL__STREAM_PALETTE + 2));
+        d->pm->palette[i] = entry;
+    }
+}
+
+/* Codes fall from state to state: the first is given, then by how much. */
+static bool decode_errors(struct strl__decoder *d, unsigned id, float *error)
+{
+    uint32_t code = strl__pull(&d->in, id);
+    for (uint32_t s = 0; s <= d->sizes.step_count; s++) {
+        uint32_t fall = s ? strl__pull(&d->in, id) : 0;
+        if (code > STRL__ERROR_CODE_MAX || fall > code)
+            return false;
+        code -= fall;
+        error[s] = strl__error_of_code(code);
+    }
+    return true;
+}
+
+strl_status strl__decode_attributes(struct strl__decoder *d)
+{
+    if (!decode_normals(d))
+        return strl__fail(d->err, STRL_ERR_MEMORY, "no memory to decode a node payload");
+    if (d->pm->colour)
+        decode_colours(d);
+    if (d->pm->palette_index && !decode_palette_indices(d))
+        return strl__fail(d->err, STRL_ERR_FORMAT, "node payload names an entry past its palette");
+    decode_palette(d);
+    if (!decode_errors(d, STRL__STREAM_GEOMETRIC_ERROR, d->pm->geometric_error) ||
+        !decode_errors(d, STRL__STREAM_APPEARANCE_ERROR, d->pm->appearance_error))
+        return strl__fail(d->err, STRL_ERR_FORMAT, "node payload's errors leave their scale");
+    return STRL_OK;
+}
