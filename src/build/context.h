@@ -22,4 +22,7 @@ strl_status strl__build_report(strl_build_context *context, uint64_t done, uint6
 /* Starts the next stage. */
 void strl__build_stage(strl_build_context *context, const char *stage);
 
+/* The stages of the builder `clusters`. */
+strl_status strl__clusters_run(strl_build_context *context, strl_error *err);
+
 #endif

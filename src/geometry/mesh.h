@@ -17,12 +17,14 @@ typedef struct strl_wedge {
 } strl_wedge;
 
 /* Point flags. */
-#define STRL_POINT_KEPT 1u     /* must not be removed: another node has it too, or the caller says so */
+#define STRL_POINT_KEPT 1u    /* must not be removed: another node has it too, or the caller says so */
+#define STRL_POINT_OUTSIDE 2u /* known to nodes outside the piece: it must not get into parts that do not have it yet */
 
 typedef struct strl_mesh {
     uint32_t point_count, wedge_count, triangle_count;
     int32_t (*position)[3];  /* [point_count] lattice units from an anchor */
     uint8_t *flags;          /* [point_count] STRL_POINT_... */
+    uint8_t *holders;        /* [point_count] a bit for each part of the piece that has the point; NULL = one part */
     strl_wedge *wedge;       /* [wedge_count] */
     uint32_t (*triangle)[3]; /* [triangle_count] wedges, counter-clockwise; three different points */
     float *error;            /* [triangle_count] bound of the distance that this piece of surface has moved so far, lattice units */

@@ -136,7 +136,10 @@ static bool allocate(simplifier *s, const strl_mesh *mesh, strl_arena *arena)
     s->key = strl_arena_alloc(arena, points, sizeof *s->key);
     s->target = strl_arena_alloc(arena, points, sizeof *s->target);
     s->stale = strl_arena_alloc_zero(arena, points, sizeof *s->stale);
-    return s->position && s->normal && s->colour && s->quadrics && s->corner_next && s->head && s->tail && s->dead &&
+    s->holders = mesh->holders ? strl_arena_alloc(arena, points, 1) : NULL;
+    if (mesh->holders && s->holders)
+        memcpy(s->holders, mesh->holders, points);
+    return (s->holders || !mesh->holders) && s->position && s->normal && s->colour && s->quadrics && s->corner_next && s->head && s->tail && s->dead &&
            s->stamp && s->heap && s->heap_at && s->key && s->target && s->stale;
 }
 
@@ -239,6 +242,8 @@ void strl__apply_collapse(simplifier *s, const strl_star *star, const collapse_p
         s->head[u] = s->tail[u] = NO_INDEX;
     }
     strl__quadric_add(&s->quadrics[v], &s->quadrics[u]);
+    if (s->holders)
+        s->holders[v] |= s->holders[u];
     result->geometric = fmaxf(result->geometric, plan->geometric);
     result->appearance = fmaxf(result->appearance, plan->shift);
     result->collapses[result->collapse_count++] =

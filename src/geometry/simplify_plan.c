@@ -132,6 +132,8 @@ static bool wedges_can_follow(simplifier *s, const strl_star *u_star, uint32_t t
 static bool may_collapse(simplifier *s, const strl_star *star, uint32_t to)
 {
     unsigned uses = strl__star_uses(star, to);
+    if (s->holders && (s->mesh->flags[to] & STRL_POINT_OUTSIDE) && (s->holders[star->point] & ~s->holders[to]))
+        return false; /* a node that outsiders do not know would come to share this point with them */
     if (star->on_boundary && !(uses & 1))
         return false; /* the rim collapses along itself only: an open edge then always ends at rim points of the input */
     if (s->rung < STRL_SIMPLIFY_SEAMS && (!star->manifold || !link_is_disk(s, star, to)))

@@ -40,6 +40,7 @@ typedef struct simplifier {
     uint32_t *head, *tail;  /* per point, corners */
     bool *dead;             /* per triangle */
     float *error, *deviation, *shift; /* per triangle */
+    uint8_t *holders;       /* per point, a copy that follows the collapses; NULL where the mesh has none */
     uint32_t *stamp;        /* per point, against `tick` */
     uint32_t tick;
     uint32_t triangles_left;

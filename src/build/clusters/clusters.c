@@ -1,0 +1,208 @@
+/* The builder `clusters`: stages in order, and the container from what they left. */
+#include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "build/clusters/hierarchy.h"
+#include "container/writer.h"
+#include "platform/file.h"
+#include "platform/thread.h"
+
+static strl_status open_level(strl_hierarchy *hierarchy, uint32_t index, strl_error *err)
+{
+    strl_level *level = &hierarchy->levels[index];
+    char name[32];
+    level->count = 1u << (hierarchy->partition->depth - index);
+    level->nodes = strl__alloc_zero(level->count, sizeof *level->nodes);
+    if (!level->nodes)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %u nodes", level->count);
+    snprintf(name, sizeof name, "payload-%02u", index);
+    strl_status status = strl_spill_open(hierarchy->context->spills, name, 0, &level->payloads, err);
+    snprintf(name, sizeof name, "mesh-%02u", index);
+    return status ? status : strl_spill_open(hierarchy->context->spills, name, 0, &level->meshes, err);
+}
+
+static strl_status close_meshes(strl_level *level, strl_error *err)
+{
+    strl_status status = strl_spill_close_and_delete(level->meshes, err);
+    level->meshes = NULL;
+    return status;
+}
+
+static strl_status simplify_levels(strl_hierarchy *hierarchy, strl_error *err)
+{
+    static const char *const names[] = {"level 0", "level 1", "level 2", "level 3", "level 4", "level 5", "level 6",
+                                        "level 7", "level 8", "level 9", "higher levels"};
+    strl_status status = STRL_OK;
+    for (uint32_t level = 0; level <= hierarchy->partition->depth && !status; level++) {
+        strl__build_stage(hierarchy->context, names[level < 10 ? level : 10]);
+        status = open_level(hierarchy, level, err);
+        if (!status)
+            status = level == 0 ? strl_make_leaves(hierarchy, err) : strl_make_level(hierarchy, level, err);
+        if (!status)
+            status = strl_spill_flush(hierarchy->levels[level].meshes, err);
+        if (!status)
+            status = strl_spill_flush(hierarchy->levels[level].payloads, err);
+        if (!status && level > 0)
+            status = close_meshes(&hierarchy->levels[level - 1], err);
+    }
+    if (!status)
+        status = close_meshes(&hierarchy->levels[hierarchy->partition->depth], err);
+    if (!status) {
+        const strl_node *root = &hierarchy->levels[hierarchy->partition->depth].nodes[0].record;
+        if (root->base_triangle_count > STRL_ROOT_MAX_TRIANGLES)
+            status = strl__fail(err, STRL_ERR_INTERNAL, "the root has %" PRIu32 " triangles; the bound is %u",
+                                root->base_triangle_count, STRL_ROOT_MAX_TRIANGLES);
+    }
+    return status;
+}
+
+static void hierarchy_deinit(strl_hierarchy *hierarchy)
+{
+    for (uint32_t i = 0; hierarchy->levels && i <= hierarchy->partition->depth; i++) {
+        strl_spill_close_and_delete(hierarchy->levels[i].payloads, NULL);
+        strl_spill_close_and_delete(hierarchy->levels[i].meshes, NULL);
+        strl__free(hierarchy->levels[i].nodes);
+    }
+    strl__free(hierarchy->levels);
+    strl_adjacency_deinit(&hierarchy->next);
+}
+
+/* Node ids are breadth first: node i of the level at depth d has id 2^d - 1 + i. */
+static void place_in_tree(const strl_hierarchy *hierarchy, uint32_t level, uint32_t index, uint32_t group_base,
+                          strl_node *record)
+{
+    uint32_t depth = hierarchy->partition->depth - level, id = (1u << depth) - 1 + index;
+    record->parent = depth ? (id - 1) / 2 : STRL_NONE;
+    record->first_child = level ? 2 * id + 1 : STRL_NONE;
+    record->child_count = level ? 2 : 0;
+    record->level = level;
+    record->group = group_base + hierarchy->levels[level].nodes[index].group;
+}
+
+static strl_status write_nodes(const strl_hierarchy *hierarchy, strl_container_writer *writer, strl_error *err)
+{
+    uint32_t group_base = 0, depth = hierarchy->partition->depth;
+    uint64_t total = (2ull << depth) - 1, done = 0;
+    void *buffer = NULL;
+    size_t capacity = 0;
+    strl_status status = STRL_OK;
+    strl__build_stage(hierarchy->context, "write");
+    for (uint32_t d = 0; d <= depth && !status; d++) {
+        strl_level *level = &hierarchy->levels[depth - d];
+        for (uint32_t i = 0; i < level->count && !status; i++) {
+            const strl_node_state *state = &level->nodes[i];
+            strl_node record = state->record;
+            place_in_tree(hierarchy, depth - d, i, group_base, &record);
+            if (!strl__grow(&buffer, &capacity, state->payload_bytes, 1))
+                status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a payload of %u bytes", state->payload_bytes);
+            if (!status)
+                status = strl_spill_read(level->payloads, state->payload_at, buffer, state->payload_bytes, err);
+            if (!status)
+                status = strl_container_writer_add_node(writer, &record, buffer, state->payload_bytes, err);
+            if (!status && (++done & 63) == 0)
+                status = strl__build_report(hierarchy->context, done, total, err);
+        }
+        group_base += level->group_count;
+    }
+    hierarchy->context->result->groups = group_base;
+    strl__free(buffer);
+    return status;
+}
+
+static strl_status write_names(const strl_ingest *ingest, strl_container_writer *writer, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    for (size_t i = 0; i < ingest->parts.count && !status; i++)
+        status = strl_container_writer_add_part(writer, ingest->parts.items[i], err);
+    for (size_t i = 0; i < ingest->materials.count && !status; i++)
+        status = strl_container_writer_add_material(writer, ingest->materials.items[i], ingest->materials.rgba[i], err);
+    return status;
+}
+
+static bool shows_colour(const strl_ingest *ingest)
+{
+    bool coloured = ingest->has_colours;
+    for (size_t i = 0; i < ingest->materials.count; i++)
+        coloured |= ingest->materials.rgba[i] != 0xffffffffu;
+    return coloured;
+}
+
+static strl_status write_container(const strl_hierarchy *hierarchy, strl_error *err)
+{
+    const strl_build_context *context = hierarchy->context;
+    const strl_ingest *ingest = hierarchy->ingest;
+    strl_build_result *result = context->result;
+    strl_container_writer_desc desc = {.path = context->desc->output, .scratch_dir = context->scratch_dir};
+    strl_container_writer *writer = NULL;
+    if (context->desc->unit)
+        snprintf(desc.info.unit, sizeof desc.info.unit, "%s", context->desc->unit);
+    desc.info.up_axis = (uint32_t)ingest->up;
+    desc.info.has_colour = shows_colour(ingest);
+    desc.info.triangles_in = result->triangles_in;
+    desc.info.dropped_nonfinite = result->dropped_nonfinite;
+    desc.info.dropped_degenerate = result->dropped_degenerate;
+    desc.info.dropped_lines = result->dropped_lines;
+    desc.info.dropped_points = result->dropped_points;
+    strl_tree tree = {.structure = STRL_STRUCTURE_CLUSTERS, .step = ingest->step, .node_count = (uint32_t)((2ull << hierarchy->partition->depth) - 1),
+                      .level_count = hierarchy->partition->depth + 1, .leaf_geometric = ingest->leaf_error};
+    memcpy(tree.origin, ingest->origin, sizeof tree.origin);
+    for (uint32_t i = 0; i <= hierarchy->partition->depth; i++)
+        tree.group_count += hierarchy->levels[i].group_count;
+    strl_placement identity = {.tree = 0, .transform = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
+    strl_status status = strl_container_writer_create(&desc, &writer, err);
+    if (!status)
+        status = strl_container_writer_begin_tree(writer, &tree, err);
+    if (!status)
+        status = write_nodes(hierarchy, writer, err);
+    if (!status)
+        status = strl_container_writer_end_tree(writer, err);
+    if (!status)
+        status = strl_container_writer_add_placement(writer, &identity, err);
+    if (!status)
+        status = write_names(ingest, writer, err);
+    if (!status)
+        status = strl_container_writer_finish(writer, &result->bytes_out, err);
+    strl_container_writer_destroy(writer);
+    return status;
+}
+
+static void fill_result(const strl_hierarchy *hierarchy, strl_build_result *result)
+{
+    const strl_level *leaves = &hierarchy->levels[0];
+    for (uint32_t i = 0; i < leaves->count; i++) {
+        result->triangles_leaf += leaves->nodes[i].record.triangle_count;
+        result->vertices += leaves->nodes[i].record.vertex_count;
+    }
+    result->nodes = (2ull << hierarchy->partition->depth) - 1;
+    result->levels = hierarchy->partition->depth + 1;
+    result->root_triangles = hierarchy->levels[hierarchy->partition->depth].nodes[0].record.base_triangle_count;
+    result->parts = (uint32_t)hierarchy->ingest->parts.count;
+    result->materials = (uint32_t)hierarchy->ingest->materials.count;
+    result->placements = 1;
+}
+
+strl_status strl__clusters_run(strl_build_context *context, strl_error *err)
+{
+    strl_ingest ingest;
+    strl_partition partition = {0};
+    strl_hierarchy hierarchy = {.context = context, .ingest = &ingest, .partition = &partition};
+    strl_status status = strl_ingest_run(context, &ingest, err);
+    if (!status) {
+        strl__build_stage(context, "partition");
+        status = strl_partition_create(&ingest, &partition, err);
+    }
+    if (!status) {
+        hierarchy.levels = strl__alloc_zero((size_t)partition.depth + 1, sizeof *hierarchy.levels);
+        status = hierarchy.levels ? simplify_levels(&hierarchy, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory");
+    }
+    if (!status) {
+        fill_result(&hierarchy, context->result);
+        status = write_container(&hierarchy, err);
+    }
+    hierarchy_deinit(&hierarchy);
+    strl_partition_deinit(&partition);
+    strl_ingest_deinit(&ingest);
+    return status;
+}

@@ -1,0 +1,100 @@
+/* The cluster hierarchy while it is simplified, level by level from the leaves (Quick-VDR 4.3, 4.4).
+ *
+ *   level 0:  cells of a cluster -> weld, normals -> mesh, shared points locked -> progressive mesh to half
+ *   level k:  base meshes of the children -> groups of nodes -> boundaries within a group simplified on the merged
+ *             mesh -> each node: progressive mesh to half, its shared points locked
+ *
+ * Only one group's meshes per worker are in memory; what stays is one strl_node_state per node. */
+#ifndef STRL_BUILD_CLUSTERS_HIERARCHY_H
+#define STRL_BUILD_CLUSTERS_HIERARCHY_H
+
+#include "base/memory.h"
+#include "build/clusters/node_mesh.h"
+#include "build/clusters/partition.h"
+#include "container/container.h"
+
+#define STRL_GROUP_MAX 4u
+/* Appearance: attribute deviation of a normal turned by one radian, and of black against white. */
+#define STRL_NORMAL_WEIGHT 0.25f
+#define STRL_COLOUR_WEIGHT 1.f
+
+/* What is kept of every node. Nodes of a level are numbered 0 .. count - 1; the children of i are 2i and 2i + 1 one level down. */
+typedef struct strl_node_state {
+    strl_node record;       /* ids, group and page fields are filled in when the container is written */
+    uint64_t payload_at;    /* in the payload spill of its level */
+    uint32_t payload_bytes;
+    uint64_t mesh_at;       /* base mesh, in the mesh spill of its level */
+    uint32_t mesh_bytes;
+    uint32_t point_count;   /* of the base mesh */
+    uint32_t outer_shared;  /* points of the base mesh that a node other than the sibling has too */
+    uint32_t group;         /* index within the level */
+} strl_node_state;
+
+typedef struct strl_level {
+    uint32_t count;         /* nodes */
+    strl_node_state *nodes; /* [count] */
+    uint32_t group_count;
+    strl_spill *payloads;
+    strl_spill *meshes;     /* base meshes; deleted when the next level is done */
+} strl_level;
+
+/* How many points two nodes of the next level share: counted while a level is made. */
+typedef struct strl_adjacency {
+    uint64_t *key;   /* low << 32 | high, + 1; 0 = free */
+    uint32_t *count;
+    size_t size, used;
+} strl_adjacency;
+
+bool strl_adjacency_add(strl_adjacency *adjacency, uint32_t a, uint32_t b, uint32_t count);
+void strl_adjacency_deinit(strl_adjacency *adjacency);
+
+typedef struct strl_hierarchy {
+    strl_build_context *context;
+    const strl_ingest *ingest;
+    const strl_partition *partition;
+    strl_level *levels;     /* [partition->depth + 1] */
+    strl_adjacency next;    /* of the level above the one being made */
+} strl_hierarchy;
+
+/* One node as a worker has made it, before its bytes are put into the spills in order. */
+typedef struct strl_made_node {
+    strl_node_state state;
+    strl_writer payload, mesh;
+    uint32_t *next_neighbour; /* pairs (node of the next level, points shared), owned */
+    size_t neighbour_count, neighbour_capacity;
+} strl_made_node;
+
+void strl_made_node_deinit(strl_made_node *made);
+/* Simplifies to `target` triangles, records the progressive mesh, encodes it, keeps the base mesh with its shares. `self` is the node's index
+ * in its level. Fills all of made but boxes. */
+strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh *node, uint32_t self, uint32_t target,
+                           strl_arena *arena, strl_made_node *made, strl_error *err);
+/* Appends a made node's bytes to its level and counts its neighbours. In node order, one thread. */
+strl_status strl_take_node(strl_hierarchy *hierarchy, strl_level *level, uint32_t self, strl_made_node *made,
+                           strl_error *err);
+
+strl_status strl_make_leaves(strl_hierarchy *hierarchy, strl_error *err);
+strl_status strl_make_level(strl_hierarchy *hierarchy, uint32_t level, strl_error *err);
+
+/* Groups of nodes whose shared boundary may be simplified together (Quick-VDR 4.4, conditions 1 to 3). */
+typedef struct strl_groups {
+    uint32_t count;
+    uint32_t *first;  /* [count + 1] into member */
+    uint32_t *member; /* nodes, ascending within a group; groups ascend by their first member */
+} strl_groups;
+
+strl_status strl_groups_choose(const strl_level *children, const strl_adjacency *adjacency, uint32_t node_count,
+                               uint32_t levels_above, bool single, strl_groups *groups, strl_error *err);
+void strl_groups_deinit(strl_groups *groups);
+
+/* Shared points of the leaves, by cluster: read from ingest, written to streams of cluster ranges. */
+typedef struct strl_leaf_shares {
+    uint32_t bucket_count;
+    uint32_t *bucket_first; /* [bucket_count + 1] clusters */
+    strl_spill **spill;     /* words: cluster x y z clusters n cluster[n] m cell[m] */
+} strl_leaf_shares;
+
+strl_status strl_leaf_shares_create(const strl_hierarchy *hierarchy, strl_leaf_shares *shares, strl_error *err);
+void strl_leaf_shares_deinit(strl_leaf_shares *shares);
+
+#endif

@@ -1,0 +1,328 @@
+/* Level 0: from the cells of a cluster to its node. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/hash.h"
+#include "build/clusters/hierarchy.h"
+#include "build/clusters/normals.h"
+
+/* One shared position of a cluster, in the words of its bucket. */
+typedef struct shared_ref {
+    uint32_t cluster;
+    uint32_t at; /* index of its x */
+} shared_ref;
+
+typedef struct leaf_stage {
+    strl_hierarchy *hierarchy;
+    strl_level *level;
+    uint32_t *words;       /* the bucket of shares at hand */
+    shared_ref *refs;      /* sorted by (cluster, at) */
+    size_t ref_count;
+    uint32_t first_cluster;
+    strl_made_node *slots;
+    strl_arena *arenas;    /* per worker */
+} leaf_stage;
+
+static int compare_refs(const void *a, const void *b)
+{
+    const shared_ref *x = a, *y = b;
+    if (x->cluster != y->cluster)
+        return x->cluster < y->cluster ? -1 : 1;
+    return x->at < y->at ? -1 : x->at > y->at;
+}
+
+static int compare_words(const void *a, const void *b)
+{
+    uint32_t x, y;
+    memcpy(&x, a, sizeof x);
+    memcpy(&y, b, sizeof y);
+    return x < y ? -1 : x > y;
+}
+
+static const shared_ref *refs_of(const leaf_stage *stage, uint32_t cluster, size_t *count)
+{
+    size_t low = 0, high = stage->ref_count;
+    while (low < high) {
+        size_t middle = (low + high) / 2;
+        if (stage->refs[middle].cluster < cluster)
+            low = middle + 1;
+        else
+            high = middle;
+    }
+    for (*count = 0; low + *count < stage->ref_count && stage->refs[low + *count].cluster == cluster;)
+        (*count)++;
+    return stage->refs + low;
+}
+
+/* Cells of other clusters that have one of the cluster's positions, ascending, each once. */
+static uint32_t *halo_cells(const leaf_stage *stage, const shared_ref *refs, size_t ref_count, strl_arena *arena,
+                            uint32_t *count)
+{
+    size_t total = 0, unique = 0;
+    for (int pass = 0; pass < 2; pass++) {
+        uint32_t *cells = pass ? strl_arena_alloc(arena, total, sizeof *cells) : NULL;
+        if (pass && !cells)
+            return NULL;
+        size_t at = 0;
+        for (size_t i = 0; i < ref_count; i++) {
+            const uint32_t *words = stage->words + refs[i].at + 3;
+            const uint32_t *list = words + 1 + words[0];
+            if (pass)
+                memcpy(cells + at, list + 1, list[0] * sizeof *cells);
+            at += list[0];
+        }
+        total = at;
+        if (pass) {
+            qsort(cells, total, sizeof *cells, compare_words);
+            for (size_t i = 0; i < total; i++)
+                if (i == 0 || cells[i] != cells[unique - 1])
+                    cells[unique++] = cells[i];
+            *count = (uint32_t)unique;
+            return cells;
+        }
+    }
+    return NULL;
+}
+
+static uint64_t triangles_in(const strl_ingest *ingest, const uint32_t *cells, uint32_t count)
+{
+    uint64_t sum = 0;
+    for (uint32_t i = 0; i < count; i++)
+        sum += ingest->cells[cells[i]].count;
+    return sum;
+}
+
+static strl_status read_cells(const strl_ingest *ingest, const uint32_t *cells, uint32_t count, void *scratch,
+                              strl_soup_triangle *triangles, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    for (uint32_t i = 0, run; i < count && !status; i += run) { /* neighbours on the curve are read at once */
+        const strl_cell *first = &ingest->cells[cells[i]];
+        uint32_t size = first->count;
+        for (run = 1; i + run < count && cells[i + run] == cells[i] + run; run++)
+            size += ingest->cells[cells[i + run]].count;
+        status = strl_ingest_read(ingest, first->first, size, scratch, triangles, err);
+        triangles += size;
+    }
+    return status;
+}
+
+/* Faces round a position must come in one order everywhere: cells ascend, so own and halo cells are merged for that. */
+static strl_status read_cluster(const leaf_stage *stage, uint32_t cluster, const shared_ref *refs, size_t ref_count,
+                                strl_arena *arena, strl_soup_triangle **triangles, uint32_t *own, strl_error *err)
+{
+    const strl_ingest *ingest = stage->hierarchy->ingest;
+    const strl_partition *partition = stage->hierarchy->partition;
+    const uint32_t *cells = partition->cell + partition->cluster_first[cluster];
+    uint32_t cell_count = partition->cluster_first[cluster + 1] - partition->cluster_first[cluster], halo_count = 0;
+    *own = (uint32_t)triangles_in(ingest, cells, cell_count);
+    uint32_t *halo = halo_cells(stage, refs, ref_count, arena, &halo_count);
+    uint64_t all = *own + triangles_in(ingest, halo, halo_count);
+    void *scratch = strl_arena_alloc(arena, all, strl_soup_bytes(ingest));
+    *triangles = strl_arena_alloc(arena, all, sizeof **triangles);
+    if (!halo || !scratch || !*triangles)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a cluster of %u triangles", *own);
+    strl_status status = read_cells(ingest, cells, cell_count, scratch, *triangles, err);
+    bool missing = false;
+    for (uint32_t t = 0; t < *own && !status; t++)
+        for (int c = 0; c < 3; c++)
+            missing |= (*triangles)[t].corner[c].normal[0] == STRL_NORMAL_MISSING;
+    if (status || !missing)
+        return status;
+    status = read_cells(ingest, halo, halo_count, scratch, *triangles + *own, err);
+    if (!status && !strl__fill_normals(*triangles, *own, (uint32_t)all, arena))
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the normals of %u triangles", *own);
+    return status;
+}
+
+/* Triangles of one corner each are merged by the welding of node_mesh.c: a soup becomes points and wedges. */
+static strl_status weld(const strl_hierarchy *hierarchy, const strl_soup_triangle *triangles, uint32_t count,
+                        strl_arena *arena, strl_node_mesh *node, strl_error *err)
+{
+    strl_node_mesh soup = {0}, *list[1] = {&soup};
+    uint32_t *owner, *point_of;
+    if (!strl_mesh_create(&soup.mesh, 3 * count, 3 * count, count, arena))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a cluster of %u triangles", count);
+    for (int k = 0; k < 3; k++)
+        soup.anchor[k] = triangles[0].corner[0].position[k];
+    for (uint32_t t = 0; t < count; t++) {
+        for (uint32_t c = 0; c < 3; c++) {
+            const strl_soup_corner *corner = &triangles[t].corner[c];
+            uint32_t at = 3 * t + c;
+            for (int k = 0; k < 3; k++)
+                soup.mesh.position[at][k] = (int32_t)((int64_t)corner->position[k] - soup.anchor[k]);
+            soup.mesh.wedge[at] = (strl_wedge){.point = at, .normal = {corner->normal[0], corner->normal[1]},
+                                               .colour = corner->colour, .palette = triangles[t].palette};
+            soup.mesh.triangle[t][c] = at;
+        }
+        soup.mesh.error[t] = hierarchy->ingest->leaf_error;
+        soup.mesh.deviation[t] = soup.mesh.shift[t] = 0;
+    }
+    return strl_node_mesh_merge((const strl_node_mesh *const *)list, 1, arena, node, &owner, &point_of, err);
+}
+
+/* Positions relative to the anchor, in a small table, to find the points that are shared. */
+static uint32_t find_point(const uint32_t *table, uint32_t mask, const strl_mesh *mesh, const int32_t position[3],
+                           uint32_t *slot)
+{
+    uint64_t hash = strl__mix64(((uint64_t)(uint32_t)position[0] << 32 | (uint32_t)position[1]) ^
+                                strl__mix64((uint32_t)position[2]));
+    uint32_t at = (uint32_t)hash & mask;
+    while (table[at] && memcmp(mesh->position[table[at] - 1], position, sizeof *mesh->position))
+        at = (at + 1) & mask;
+    *slot = at;
+    return table[at];
+}
+
+static strl_status mark_shared(const leaf_stage *stage, const shared_ref *refs, size_t ref_count, strl_arena *arena,
+                               strl_node_mesh *node, strl_error *err)
+{
+    strl_mesh *mesh = &node->mesh;
+    uint32_t size = 16, slot, shares = 0;
+    while (size < 2 * mesh->point_count)
+        size *= 2;
+    for (size_t i = 0; i < ref_count; i++)
+        shares += stage->words[refs[i].at + 3];
+    uint32_t *table = strl_arena_alloc_zero(arena, size, sizeof *table);
+    uint32_t *ref_of = strl_arena_alloc_zero(arena, mesh->point_count, sizeof *ref_of); /* index of words + 1 */
+    node->share_first = strl_arena_alloc(arena, (size_t)mesh->point_count + 1, sizeof *node->share_first);
+    node->share = strl_arena_alloc(arena, shares, sizeof *node->share);
+    if (!table || !ref_of || !node->share_first || !node->share)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %u shared positions", shares);
+    for (uint32_t p = 0; p < mesh->point_count; p++) {
+        find_point(table, size - 1, mesh, mesh->position[p], &slot);
+        table[slot] = p + 1;
+    }
+    for (size_t i = 0; i < ref_count; i++) {
+        int32_t position[3];
+        for (int k = 0; k < 3; k++)
+            position[k] = (int32_t)((int64_t)stage->words[refs[i].at + (uint32_t)k] - node->anchor[k]);
+        uint32_t found = find_point(table, size - 1, mesh, position, &slot);
+        if (!found)
+            return strl__fail(err, STRL_ERR_INTERNAL, "a shared position is missing from its cluster");
+        ref_of[found - 1] = refs[i].at + 1;
+    }
+    uint32_t at = 0;
+    for (uint32_t p = 0; p < mesh->point_count; p++) {
+        node->share_first[p] = at;
+        if (!ref_of[p])
+            continue;
+        const uint32_t *list = stage->words + ref_of[p] - 1 + 3;
+        mesh->flags[p] |= STRL_POINT_KEPT;
+        memcpy(node->share + at, list + 1, list[0] * sizeof *list);
+        at += list[0];
+    }
+    node->share_first[mesh->point_count] = at;
+    return STRL_OK;
+}
+
+static void set_box(const strl_node_mesh *node, strl_node *record)
+{
+    for (int k = 0; k < 3; k++) {
+        int32_t least = INT32_MAX, most = INT32_MIN;
+        for (uint32_t p = 0; p < node->mesh.point_count; p++) {
+            least = node->mesh.position[p][k] < least ? node->mesh.position[p][k] : least;
+            most = node->mesh.position[p][k] > most ? node->mesh.position[p][k] : most;
+        }
+        record->box_min[k] = node->anchor[k] + least;
+        record->box_max[k] = node->anchor[k] + most;
+    }
+}
+
+static strl_status make_leaf(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
+{
+    leaf_stage *stage = context;
+    strl_arena *arena = &stage->arenas[worker];
+    strl_made_node *made = &stage->slots[slot];
+    strl_arena_mark mark = strl_arena_get_mark(arena);
+    uint32_t cluster = stage->first_cluster + (uint32_t)index, own = 0;
+    size_t ref_count;
+    const shared_ref *refs = refs_of(stage, cluster, &ref_count);
+    strl_soup_triangle *triangles;
+    strl_node_mesh node;
+    *made = (strl_made_node){0};
+    strl_status status = read_cluster(stage, cluster, refs, ref_count, arena, &triangles, &own, err);
+    if (!status && own == 0)
+        status = strl__fail(err, STRL_ERR_INTERNAL, "cluster %u is empty", cluster);
+    if (!status)
+        status = weld(stage->hierarchy, triangles, own, arena, &node, err);
+    if (!status)
+        status = mark_shared(stage, refs, ref_count, arena, &node, err);
+    if (!status)
+        status = strl_make_node(stage->hierarchy, &node, cluster, (own + 1) / 2, arena, made, err);
+    if (!status) {
+        set_box(&node, &made->state.record);
+        for (int k = 0; k < 3; k++) {
+            made->state.record.group_box_min[k] = made->state.record.box_min[k];
+            made->state.record.group_box_max[k] = made->state.record.box_max[k];
+        }
+        made->state.record.group_geometric = made->state.record.geometric_min;
+        made->state.record.group_appearance = made->state.record.appearance_min;
+        made->state.record.group_size = 1;
+        made->state.group = cluster;
+    }
+    strl_arena_rewind(arena, mark);
+    return status;
+}
+
+static strl_status take_leaf(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
+{
+    leaf_stage *stage = context;
+    uint32_t cluster = stage->first_cluster + (uint32_t)index;
+    (void)worker;
+    strl_status status = strl_take_node(stage->hierarchy, stage->level, cluster, &stage->slots[slot], err);
+    strl_made_node_deinit(&stage->slots[slot]);
+    return status ? status : strl__build_report(stage->hierarchy->context, cluster + 1, stage->level->count, err);
+}
+
+/* Reads one bucket of shares and sorts its records by cluster. */
+static strl_status load_bucket(leaf_stage *stage, strl_spill *spill, strl_error *err)
+{
+    size_t count = (size_t)(strl_spill_bytes(spill) / 4), capacity = 0;
+    stage->words = strl__alloc(count, sizeof *stage->words);
+    stage->refs = NULL;
+    stage->ref_count = 0;
+    strl_status status = stage->words ? strl_spill_read(spill, 0, stage->words, count * 4, err)
+                                      : strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu shared positions", count);
+    for (size_t at = 0; at < count && !status;) {
+        if (!strl__grow(&stage->refs, &capacity, stage->ref_count + 1, sizeof *stage->refs))
+            return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu shared positions", count);
+        stage->refs[stage->ref_count++] = (shared_ref){stage->words[at], (uint32_t)at + 1};
+        at += 5 + stage->words[at + 4];
+        at += 1 + stage->words[at];
+    }
+    if (!status && stage->ref_count)
+        qsort(stage->refs, stage->ref_count, sizeof *stage->refs, compare_refs);
+    return status;
+}
+
+strl_status strl_make_leaves(strl_hierarchy *hierarchy, strl_error *err)
+{
+    strl_pool *pool = hierarchy->context->pool;
+    leaf_stage stage = {.hierarchy = hierarchy, .level = &hierarchy->levels[0]};
+    strl_leaf_shares shares;
+    unsigned workers = strl_pool_workers(pool);
+    strl_status status = strl_leaf_shares_create(hierarchy, &shares, err);
+    stage.slots = strl__alloc_zero(strl_pool_window(pool, 0), sizeof *stage.slots);
+    stage.arenas = strl__alloc_zero(workers, sizeof *stage.arenas);
+    if (!status && (!stage.slots || !stage.arenas))
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for %u workers", workers);
+    for (uint32_t b = 0; b < shares.bucket_count && !status; b++) {
+        status = load_bucket(&stage, shares.spill[b], err);
+        stage.first_cluster = shares.bucket_first[b];
+        if (!status)
+            status = strl_pool_ordered(pool, shares.bucket_first[b + 1] - shares.bucket_first[b], 0, make_leaf,
+                                       take_leaf, &stage, NULL, err);
+        strl__free(stage.words);
+        strl__free(stage.refs);
+    }
+    for (unsigned i = 0; stage.slots && i < strl_pool_window(pool, 0); i++)
+        strl_made_node_deinit(&stage.slots[i]);
+    for (unsigned i = 0; stage.arenas && i < workers; i++)
+        strl_arena_deinit(&stage.arenas[i]);
+    strl__free(stage.slots);
+    strl__free(stage.arenas);
+    strl_leaf_shares_deinit(&shares);
+    return status;
+}

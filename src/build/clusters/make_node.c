@@ -1,0 +1,161 @@
+/* One node: simplify, record, encode, keep the base mesh. */
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "build/clusters/hierarchy.h"
+#include "geometry/payload.h"
+#include "geometry/record.h"
+#include "geometry/simplify.h"
+
+/* Where topology, seams and locked borders leave more than this, the lower rungs of the ladder take over. */
+#define LADDER_TRIANGLES 6144u
+
+void strl_made_node_deinit(strl_made_node *made)
+{
+    strl__free(made->payload.data);
+    strl__free(made->mesh.data);
+    strl__free(made->next_neighbour);
+    *made = (strl_made_node){0};
+}
+
+static strl_status simplify(const strl_mesh *mesh, uint32_t target, strl_arena *arena, strl_simplified *result,
+                            strl_error *err)
+{
+    strl_simplify_desc desc = {.target_triangles = target, .error_limit = INFINITY, .last_rung = STRL_SIMPLIFY_SEAMS,
+                               .normal_weight = STRL_NORMAL_WEIGHT, .colour_weight = STRL_COLOUR_WEIGHT};
+    strl_arena_mark mark = strl_arena_get_mark(arena);
+    strl_status status = strl_simplify(mesh, &desc, arena, result, err);
+    if (status || result->triangles_left <= LADDER_TRIANGLES || result->triangles_left <= target)
+        return status;
+    strl_arena_rewind(arena, mark);
+    desc.last_rung = STRL_SIMPLIFY_CLUSTERING;
+    desc.target_triangles = target > LADDER_TRIANGLES ? target : LADDER_TRIANGLES;
+    return strl_simplify(mesh, &desc, arena, result, err);
+}
+
+static void fill_record(strl_node *record, const strl_node_mesh *node, const strl_simplified *simplified,
+                        const strl_pm *pm)
+{
+    memcpy(record->anchor, node->anchor, sizeof record->anchor);
+    record->geometric_min = pm->geometric_error[pm->step_count];
+    record->geometric_max = pm->geometric_error[0];
+    record->appearance_min = pm->appearance_error[pm->step_count];
+    record->appearance_max = pm->appearance_error[0];
+    record->vertex_count = pm->vertex_count;
+    record->base_vertex_count = pm->vertex_end[0];
+    record->triangle_count = pm->triangle_count;
+    record->base_triangle_count = pm->triangle_end[0];
+    record->step_count = pm->step_count;
+    record->rung = simplified->rung;
+    record->decode_parent = STRL_NONE;
+}
+
+/* The shares of the points that are left. */
+static bool keep_shares(const strl_node_mesh *node, const uint32_t *point_map, strl_node_mesh *base, strl_arena *arena)
+{
+    const strl_mesh *mesh = &node->mesh;
+    if (!node->share_first)
+        return true;
+    base->share_first = strl_arena_alloc(arena, (size_t)base->mesh.point_count + 1, sizeof *base->share_first);
+    base->share = strl_arena_alloc(arena, node->share_first[mesh->point_count], sizeof *base->share);
+    if (!base->share_first || !base->share)
+        return false;
+    uint32_t at = 0, next = 0;
+    for (uint32_t p = 0; p < mesh->point_count; p++) {
+        if (point_map[p] == UINT32_MAX)
+            continue;
+        base->share_first[next++] = at;
+        for (uint32_t i = node->share_first[p]; i < node->share_first[p + 1]; i++)
+            base->share[at++] = node->share[i];
+    }
+    base->share_first[next] = at;
+    return true;
+}
+
+static bool count_neighbour(strl_made_node *made, uint32_t other)
+{
+    for (size_t i = 0; i < made->neighbour_count; i++)
+        if (made->next_neighbour[2 * i] == other) {
+            made->next_neighbour[2 * i + 1]++;
+            return true;
+        }
+    if (!strl__grow(&made->next_neighbour, &made->neighbour_capacity, 2 * made->neighbour_count + 2,
+                    sizeof *made->next_neighbour))
+        return false;
+    made->next_neighbour[2 * made->neighbour_count] = other;
+    made->next_neighbour[2 * made->neighbour_count++ + 1] = 1;
+    return true;
+}
+
+/* Which nodes of the next level this one's parent will share points with. */
+static bool count_neighbours(const strl_node_mesh *base, uint32_t self, strl_made_node *made)
+{
+    made->state.record.shared_vertices = 0;
+    for (uint32_t p = 0; base->share_first && p < base->mesh.point_count; p++) {
+        uint32_t begin = base->share_first[p], end = base->share_first[p + 1], last = UINT32_MAX;
+        made->state.record.shared_vertices += end > begin;
+        for (uint32_t i = begin; i < end; i++) {
+            uint32_t other = base->share[i] >> 1;
+            if (other == self >> 1 || other == last)
+                continue;
+            made->state.outer_shared += last == UINT32_MAX;
+            last = other;
+            if (!count_neighbour(made, other))
+                return false;
+        }
+    }
+    return true;
+}
+
+strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh *node, uint32_t self, uint32_t target,
+                           strl_arena *arena, strl_made_node *made, strl_error *err)
+{
+    const strl_ingest *ingest = hierarchy->ingest;
+    strl_arena_mark mark = strl_arena_get_mark(arena);
+    strl_simplified simplified;
+    strl_pm pm;
+    strl_node_mesh base = {0};
+    uint32_t *point_map = strl_arena_alloc(arena, node->mesh.point_count, sizeof *point_map);
+    strl_status status = point_map ? simplify(&node->mesh, target, arena, &simplified, err)
+                                   : strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
+    if (!status)
+        status = strl_pm_record(&node->mesh, &simplified, ingest->palette, (uint32_t)ingest->palette_count, arena, &pm, err);
+    if (!status)
+        status = strl_payload_encode(&pm, arena, &made->payload, err);
+    if (!status)
+        status = strl_mesh_after(&node->mesh, &simplified, point_map, arena, &base.mesh, err);
+    if (status)
+        goto done;
+    memcpy(base.anchor, node->anchor, sizeof base.anchor);
+    fill_record(&made->state.record, node, &simplified, &pm);
+    made->state.point_count = base.mesh.point_count;
+    if (!keep_shares(node, point_map, &base, arena) || !count_neighbours(&base, self, made)) {
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
+        goto done;
+    }
+    strl_node_mesh_write(&base, &made->mesh);
+    if (made->mesh.failed || made->payload.failed)
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
+done:
+    strl_arena_rewind(arena, mark);
+    return status;
+}
+
+strl_status strl_take_node(strl_hierarchy *hierarchy, strl_level *level, uint32_t self, strl_made_node *made,
+                           strl_error *err)
+{
+    strl_node_state *state = &level->nodes[self];
+    *state = made->state;
+    state->payload_at = strl_spill_bytes(level->payloads);
+    state->payload_bytes = (uint32_t)made->payload.size;
+    state->mesh_at = strl_spill_bytes(level->meshes);
+    state->mesh_bytes = (uint32_t)made->mesh.size;
+    strl_status status = strl_spill_append(level->payloads, made->payload.data, made->payload.size, err);
+    if (!status)
+        status = strl_spill_append(level->meshes, made->mesh.data, made->mesh.size, err);
+    for (size_t i = 0; i < made->neighbour_count && !status; i++)
+        if (!strl_adjacency_add(&hierarchy->next, self >> 1, made->next_neighbour[2 * i], made->next_neighbour[2 * i + 1]))
+            status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the neighbours of a level");
+    return status;
+}
