@@ -10,7 +10,8 @@
 
 strl_status strl__opened_fail(const strl_container *container, strl_status status, strl_error *err)
 {
-    if (status == STRL_OK || !err || !container->name || strncmp(err->message, container->name, strlen(container->name)) == 0)
+    if (status == STRL_OK || !err || !container->name ||
+        strncmp(err->message, container->name, strlen(container->name)) == 0)
         return status;
     strl__fail_context(err, status, "%s", container->name);
     return status;
@@ -21,7 +22,8 @@ static strl_status read_header(strl_container *container, strl_error *err)
     uint8_t bytes[STRL__HEADER_BYTES];
     uint64_t source_bytes = container->source->bytes;
     if (source_bytes < STRL__HEADER_BYTES)
-        return strl__fail(err, STRL_ERR_FORMAT, "the file has %" PRIu64 " bytes, expected at least the %u of a container's header",
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "the file has %" PRIu64 " bytes, expected at least the %u of a container's header",
                           source_bytes, STRL__HEADER_BYTES);
     strl_status status = strl_source_read(container->source, 0, bytes, sizeof bytes, err);
     if (status != STRL_OK)
@@ -51,8 +53,9 @@ static strl_status read_trees(strl_container *container, strl_error *err)
     strl_status status = strl_source_read(container->source, ref->offset, bytes, ref->bytes, err);
     uint64_t found = status == STRL_OK ? strl__checksum(bytes, ref->bytes) : 0;
     if (status == STRL_OK && found != ref->checksum)
-        status = strl__fail(err, STRL_ERR_FORMAT, "section trees at byte %" PRIu64 ": checksum is %016" PRIx64 ", expected %016"
-                            PRIx64, ref->offset, found, ref->checksum);
+        status = strl__fail(err, STRL_ERR_FORMAT,
+                            "section trees at byte %" PRIu64 ": checksum is %016" PRIx64 ", expected %016" PRIx64,
+                            ref->offset, found, ref->checksum);
     if (status == STRL_OK)
         status = decode_trees(container, bytes, err);
     strl__free(bytes);
@@ -106,9 +109,9 @@ void strl_container_close(strl_container *container)
     if (!container)
         return;
     strl__opened_forget_nodes(container);
-    strl__table_deinit(&container->placements);
-    strl__table_deinit(&container->parts);
-    strl__table_deinit(&container->materials);
+    strl__page_table_deinit(&container->placements);
+    strl__page_table_deinit(&container->parts);
+    strl__page_table_deinit(&container->materials);
     strl__free(container->trees);
     strl__free(container->page);
     strl__free(container->name);
@@ -116,16 +119,23 @@ void strl_container_close(strl_container *container)
     strl__free(container);
 }
 
-const strl_container_info *strl_container_get_info(const strl_container *container) { return &container->header.info; }
+const strl_container_info *strl_container_get_info(const strl_container *container)
+{
+    return &container->header.info;
+}
 
 const strl_tree *strl_container_tree(const strl_container *container, uint32_t tree)
 {
     return tree < container->header.info.tree_count ? &container->trees[tree].facts : NULL;
 }
 
-strl_source *strl_container_source(strl_container *container) { return container->source; }
+strl_source *strl_container_source(strl_container *container)
+{
+    return container->source;
+}
 
-strl_status strl_container_root_treelet(const strl_container *container, uint32_t tree, strl_treelet_ref *ref, strl_error *err)
+strl_status strl_container_root_treelet(const strl_container *container, uint32_t tree, strl_treelet_ref *ref,
+                                        strl_error *err)
 {
     *ref = (strl_treelet_ref){0};
     if (tree >= container->header.info.tree_count)

@@ -17,7 +17,11 @@
 #define STRL_NODE_MAX_CHILDREN 8u
 #define STRL_PAGE_BYTES (128u << 10) /* a page is closed when it reaches this; one payload is never divided */
 
-typedef enum strl_structure { STRL_STRUCTURE_CLUSTERS = 1, STRL_STRUCTURE_HLOD = 2, STRL_STRUCTURE_SAMPLES = 3 } strl_structure;
+typedef enum strl_structure {
+    STRL_STRUCTURE_CLUSTERS = 1,
+    STRL_STRUCTURE_HLOD = 2,
+    STRL_STRUCTURE_SAMPLES = 3
+} strl_structure;
 
 /* Which rung of the simplification ladder a node's mesh needed (docs/algorithms/clusters.md); errors hold on all of them. */
 typedef enum strl_rung { STRL_RUNG_TOPOLOGY, STRL_RUNG_SEAMS, STRL_RUNG_DISJOINT, STRL_RUNG_CLUSTERING } strl_rung;
@@ -41,19 +45,21 @@ typedef struct strl_node {
     int64_t anchor[3];   /* lattice cell that the payload's positions are relative to */
     int64_t box_min[3];  /* lattice; encloses the node's geometry in every state and the boxes of its children */
     int64_t box_max[3];
-    int64_t group_box_min[3]; /* encloses the boxes of all members and the group boxes of all groups of their children */
+    int64_t
+        group_box_min[3]; /* encloses the boxes of all members and the group boxes of all groups of their children */
     int64_t group_box_max[3];
     float geometric_min, geometric_max;   /* error range in lattice units: finest state, base mesh */
     float appearance_min, appearance_max; /* the same for appearance */
-    float group_geometric, group_appearance; /* largest minimum error of the group; at least that of their children's groups */
+    float group_geometric,
+        group_appearance; /* largest minimum error of the group; at least that of their children's groups */
     uint32_t vertex_count, base_vertex_count;     /* finest state, base mesh */
     uint32_t triangle_count, base_triangle_count; /* finest state, base mesh */
     uint32_t step_count;
-    uint32_t boundary_steps; /* collapses of shared vertices made in the group before this node's mesh began */
+    uint32_t boundary_steps;  /* collapses of shared vertices made in the group before this node's mesh began */
     uint32_t shared_vertices; /* vertices of the base mesh that another node of the level has too (locked ones) */
-    uint32_t rung;           /* strl_rung, the highest used in this node or its boundary steps */
-    strl_page_ref page;      /* the page that holds the payload */
-    uint32_t payload_offset; /* within the page */
+    uint32_t rung;            /* strl_rung, the highest used in this node or its boundary steps */
+    strl_page_ref page;       /* the page that holds the payload */
+    uint32_t payload_offset;  /* within the page */
     uint32_t payload_bytes;
     uint32_t decode_parent; /* STRL_NONE: the payload is self-contained (always so in this version's writer) */
 } strl_node;
@@ -62,7 +68,7 @@ typedef struct strl_node {
 typedef struct strl_tree {
     strl_structure structure;
     double origin[3];
-    double step;          /* a power of two */
+    double step;                    /* a power of two */
     int64_t box_min[3], box_max[3]; /* lattice, of the leaf geometry */
     uint32_t node_count;
     uint32_t level_count; /* levels are 0 .. level_count - 1; the root's is level_count - 1 */
@@ -77,15 +83,15 @@ typedef struct strl_container_info {
     uint32_t version;
     uint8_t model_id[16]; /* from the content: equal for equal input and options */
     uint64_t file_bytes;
-    char unit[16];        /* "m", "mm", ..., "" = unknown */
-    uint32_t up_axis;     /* 0 x, 1 y, 2 z */
-    bool has_colour;      /* some vertex or material is not white */
-    double bounds[6];     /* of all placements, world units: min xyz, max xyz; filled in by the writer */
+    char unit[16];    /* "m", "mm", ..., "" = unknown */
+    uint32_t up_axis; /* 0 x, 1 y, 2 z */
+    bool has_colour;  /* some vertex or material is not white */
+    double bounds[6]; /* of all placements, world units: min xyz, max xyz; filled in by the writer */
     uint32_t tree_count, part_count, material_count;
     uint64_t placement_count;
-    uint64_t triangles_in;            /* triangles that the readers announced */
+    uint64_t triangles_in; /* triangles that the readers announced */
     uint64_t dropped_nonfinite, dropped_degenerate, dropped_lines, dropped_points;
-    uint64_t closed_hint;             /* 1 where the input is watertight (every edge in an even number of triangles) */
+    uint64_t closed_hint; /* 1 where the input is watertight (every edge in an even number of triangles) */
 } strl_container_info;
 
 /* tree and row-major affine 3x4, model to world */
@@ -102,19 +108,21 @@ strl_status strl_container_open(strl_source *source, strl_container **container,
 strl_status strl_container_open_path(const char *path, strl_container **container, strl_error *err);
 void strl_container_close(strl_container *container);
 
-const strl_container_info *strl_container_get_info(const strl_container *container); /* borrowed */
+const strl_container_info *strl_container_get_info(const strl_container *container);  /* borrowed */
 const strl_tree *strl_container_tree(const strl_container *container, uint32_t tree); /* borrowed; NULL out of range */
-strl_source *strl_container_source(strl_container *container);                       /* borrowed */
+strl_source *strl_container_source(strl_container *container);                        /* borrowed */
 
 /* Blocking calls, for tools. A few treelets are cached. */
-strl_status strl_container_node(strl_container *container, uint32_t tree, uint32_t node, strl_node *record, strl_error *err);
-strl_status strl_container_placement(strl_container *container, uint64_t index, strl_placement *placement, strl_error *err);
+strl_status strl_container_node(strl_container *container, uint32_t tree, uint32_t node, strl_node *record,
+                                strl_error *err);
+strl_status strl_container_placement(strl_container *container, uint64_t index, strl_placement *placement,
+                                     strl_error *err);
 /* Reads and decodes a node's mesh into arena; the page's checksum is checked. */
 strl_status strl_container_mesh(strl_container *container, uint32_t tree, const strl_node *record, strl_arena *arena,
                                 strl_pm *mesh, strl_error *err);
 /* Copies a name (cut to fit, zero-terminated). */
 strl_status strl_container_part(strl_container *container, uint32_t part, char *name, size_t size, strl_error *err);
-strl_status strl_container_material(strl_container *container, uint32_t material, char *name, size_t size, uint32_t *rgba,
-                                    strl_error *err);
+strl_status strl_container_material(strl_container *container, uint32_t material, char *name, size_t size,
+                                    uint32_t *rgba, strl_error *err);
 
 #endif

@@ -80,7 +80,8 @@ double strl_transform_stretch(const double transform[12])
     double a[3][3];
     for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
-            a[i][j] = transform[i] * transform[j] + transform[4 + i] * transform[4 + j] + transform[8 + i] * transform[8 + j];
+            a[i][j] =
+                transform[i] * transform[j] + transform[4 + i] * transform[4 + j] + transform[8 + i] * transform[8 + j];
     for (int sweep = 0; sweep < 12; sweep++) {
         rotate(a, 0, 1);
         rotate(a, 0, 2);

@@ -18,9 +18,9 @@
 typedef struct strl_cut {
     strl_container *container; /* borrowed */
     uint32_t tree;
-    double limit;     /* lattice units */
-    uint32_t next;    /* id to look at next */
-    uint32_t parent;  /* whose group's decision `splits` is; STRL_NONE at first */
+    double limit;    /* lattice units */
+    uint32_t next;   /* id to look at next */
+    uint32_t parent; /* whose group's decision `splits` is; STRL_NONE at first */
     bool splits;
 } strl_cut;
 

@@ -65,14 +65,16 @@ static strl_status check_identity(const uint8_t bytes[STRL__HEADER_BYTES], strl_
         return strl__fail(err, STRL_ERR_FORMAT, "not a Stroll container: the first 8 bytes are not its magic number");
     uint32_t version = (uint32_t)strl__load_le(bytes + STRL__AT_VERSION, 4);
     if (version != STRL__VERSION)
-        return strl__fail(err, STRL_ERR_UNSUPPORTED, "container version is %" PRIu32 ", expected %u", version, STRL__VERSION);
+        return strl__fail(err, STRL_ERR_UNSUPPORTED, "container version is %" PRIu32 ", expected %u", version,
+                          STRL__VERSION);
     uint8_t copy[STRL__HEADER_BYTES];
     memcpy(copy, bytes, sizeof copy);
     uint64_t stored = strl__load_le(copy + STRL__AT_CHECKSUM, 8);
     memset(copy + STRL__AT_CHECKSUM, 0, 8);
     uint64_t found = strl__checksum(copy, sizeof copy);
     if (found != stored)
-        return strl__fail(err, STRL_ERR_FORMAT, "header: checksum is %016" PRIx64 ", expected %016" PRIx64, found, stored);
+        return strl__fail(err, STRL_ERR_FORMAT, "header: checksum is %016" PRIx64 ", expected %016" PRIx64, found,
+                          stored);
     uint8_t id[16];
     memset(copy + STRL__AT_MODEL_ID, 0, 16);
     compute_model_id(copy, id);
@@ -102,7 +104,8 @@ static strl_status decode_facts(strl_cursor *in, strl_container_info *info, strl
     for (int i = 0; i < 6; i++)
         info->bounds[i] = strl_cursor_f64(in);
     if (header_bytes != STRL__HEADER_BYTES)
-        return strl__fail(err, STRL_ERR_FORMAT, "header: its size is %" PRIu32 ", expected %u", header_bytes, STRL__HEADER_BYTES);
+        return strl__fail(err, STRL_ERR_FORMAT, "header: its size is %" PRIu32 ", expected %u", header_bytes,
+                          STRL__HEADER_BYTES);
     if (info->unit[sizeof info->unit - 1] != 0)
         return strl__fail(err, STRL_ERR_FORMAT, "header: the unit is not terminated within 16 bytes");
     if (info->up_axis > 2)
@@ -111,7 +114,8 @@ static strl_status decode_facts(strl_cursor *in, strl_container_info *info, strl
         return strl__fail(err, STRL_ERR_FORMAT, "header: flags are 0x%" PRIx32 ", expected 0x0 to 0x3", flags);
     for (int i = 0; i < 3; i++)
         if (!isfinite(info->bounds[i]) || !isfinite(info->bounds[i + 3]) || info->bounds[i] > info->bounds[i + 3])
-            return strl__fail(err, STRL_ERR_FORMAT, "header: bounds on axis %d are %g to %g, expected finite and in order", i,
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "header: bounds on axis %d are %g to %g, expected finite and in order", i,
                               info->bounds[i], info->bounds[i + 3]);
     return STRL_OK;
 }
@@ -123,21 +127,22 @@ static strl_status check_known_section(const strl__section *section, uint64_t fi
     const char *name = section_names[section->kind - 1];
     bool table = section->kind != STRL__SECTION_TREES;
     /* An item of a table takes at least 4 bytes; that bounds what any later count can claim. */
-    uint64_t most = !table ? STRL__MAX_TREES
+    uint64_t most = !table                                      ? STRL__MAX_TREES
                     : section->kind == STRL__SECTION_PLACEMENTS ? file_bytes / STRL__PLACEMENT_BYTES
-                    : file_bytes / 4 < STRL_NONE - 1 ? file_bytes / 4 : STRL_NONE - 1;
+                    : file_bytes / 4 < STRL_NONE - 1            ? file_bytes / 4
+                                                                : STRL_NONE - 1;
     if (section->item_count < 1 || section->item_count > most)
         return strl__fail(err, STRL_ERR_FORMAT, "section %s: %" PRIu64 " items, expected 1 to %" PRIu64, name,
                           section->item_count, most);
     if (section->depth > (table ? STRL__TABLE_MAX_DEPTH : 0))
-        return strl__fail(err, STRL_ERR_FORMAT, "section %s: depth is %" PRIu32 ", expected at most %u", name, section->depth,
-                          table ? STRL__TABLE_MAX_DEPTH : 0);
+        return strl__fail(err, STRL_ERR_FORMAT, "section %s: depth is %" PRIu32 ", expected at most %u", name,
+                          section->depth, table ? STRL__TABLE_MAX_DEPTH : 0);
     if (table && section->ref.bytes > STRL__TABLE_PAGE_BYTES)
         return strl__fail(err, STRL_ERR_FORMAT, "section %s: its page has %" PRIu32 " bytes, expected at most %u", name,
                           section->ref.bytes, STRL__TABLE_PAGE_BYTES);
     if (!table && section->ref.bytes != section->item_count * STRL__TREE_BYTES)
-        return strl__fail(err, STRL_ERR_FORMAT, "section %s: %" PRIu32 " bytes, expected %" PRIu64, name, section->ref.bytes,
-                          section->item_count * STRL__TREE_BYTES);
+        return strl__fail(err, STRL_ERR_FORMAT, "section %s: %" PRIu32 " bytes, expected %" PRIu64, name,
+                          section->ref.bytes, section->item_count * STRL__TREE_BYTES);
     char what[32];
     snprintf(what, sizeof what, "section %s", name);
     return strl__ref_check(&section->ref, file_bytes, what, err);
@@ -147,7 +152,8 @@ static strl_status decode_sections(strl_cursor *in, strl__header *header, strl_e
 {
     uint32_t count = strl_cursor_u32(in), reserved = strl_cursor_u32(in), last_kind = 0, known = 0;
     if (count > STRL__MAX_SECTIONS || reserved)
-        return strl__fail(err, STRL_ERR_FORMAT, "header: %" PRIu32 " sections, expected at most %u", count, STRL__MAX_SECTIONS);
+        return strl__fail(err, STRL_ERR_FORMAT, "header: %" PRIu32 " sections, expected at most %u", count,
+                          STRL__MAX_SECTIONS);
     for (uint32_t i = 0; i < count; i++) {
         strl__section section;
         section.kind = strl_cursor_u32(in);
@@ -158,8 +164,10 @@ static strl_status decode_sections(strl_cursor *in, strl__header *header, strl_e
         reserved = strl_cursor_u32(in);
         section.ref.checksum = strl_cursor_u64(in);
         if (section.kind <= last_kind || reserved)
-            return strl__fail(err, STRL_ERR_FORMAT, "header: section %" PRIu32 " of kind %" PRIu32
-                              " is out of order or uses a reserved field", i, section.kind);
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "header: section %" PRIu32 " of kind %" PRIu32
+                              " is out of order or uses a reserved field",
+                              i, section.kind);
         last_kind = section.kind;
         if (section.kind >= STRL__SECTION_OPTIONAL)
             continue;

@@ -15,6 +15,7 @@ enum strl__header_at {
     STRL__AT_VERSION = 8,
     STRL__AT_MODEL_ID = 16,
     STRL__AT_CHECKSUM = 32,
+    STRL__AT_FILE_BYTES = 40,
     STRL__AT_SECTIONS = 168,
 };
 #define STRL__FLAG_COLOUR 1u
@@ -42,7 +43,7 @@ enum strl__section_kind {
 /* 128 nodes have at most 1024 children, which touch at most 9 treelets. */
 #define STRL__MAX_CHILD_REFS 9u
 #define STRL__MIN_TREELET_BYTES (STRL__TREELET_HEAD_BYTES + STRL__NODE_BYTES)
-#define STRL__MAX_TREELET_BYTES                                                                  \
+#define STRL__MAX_TREELET_BYTES                                                                                        \
     (STRL__TREELET_HEAD_BYTES + 128u * STRL__NODE_BYTES + STRL__MAX_CHILD_REFS * STRL__CHILD_REF_BYTES)
 
 #define STRL__MAX_PAGE_BYTES (16u << 20)

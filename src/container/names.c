@@ -18,8 +18,8 @@ unsigned strl__utf8_length(const uint8_t *text, size_t left)
         if ((text[i] & 0xc0) != 0x80)
             return 0;
     /* Overlong forms, surrogates, and what lies past U+10FFFF. */
-    if ((text[0] == 0xe0 && text[1] < 0xa0) || (text[0] == 0xed && text[1] > 0x9f) || (text[0] == 0xf0 && text[1] < 0x90) ||
-        (text[0] == 0xf4 && text[1] > 0x8f))
+    if ((text[0] == 0xe0 && text[1] < 0xa0) || (text[0] == 0xed && text[1] > 0x9f) ||
+        (text[0] == 0xf0 && text[1] < 0x90) || (text[0] == 0xf4 && text[1] > 0x8f))
         return 0;
     return length;
 }
@@ -69,18 +69,20 @@ static void copy_cut(const uint8_t *text, size_t bytes, char *name, size_t size)
     }
 }
 
-static strl_status get_name(strl_container *container, strl__table *table, uint32_t index, uint32_t head_bytes, uint8_t *head,
-                            char *name, size_t size, strl_error *err)
+static strl_status get_name(strl_container *container, strl__table *table, uint32_t index, uint32_t head_bytes,
+                            uint8_t *head, char *name, size_t size, strl_error *err)
 {
     const uint8_t *item;
     uint32_t bytes;
     if (size)
         name[0] = 0;
-    strl_status status = strl__table_get(table, container->source, index, &item, &bytes, err);
+    strl_status status = strl__page_table_get(table, container->source, index, &item, &bytes, err);
     if (status == STRL_OK && (bytes < head_bytes || bytes > head_bytes + STRL__MAX_NAME_BYTES ||
                               !strl__utf8_is_name(item + head_bytes, bytes - head_bytes)))
-        status = strl__fail(err, STRL_ERR_FORMAT, "table of %s: item %" PRIu32 " of %" PRIu32
-                            " bytes is not a name in UTF-8 of at most %u bytes", table->name, index, bytes, STRL__MAX_NAME_BYTES);
+        status =
+            strl__fail(err, STRL_ERR_FORMAT,
+                       "table of %s: item %" PRIu32 " of %" PRIu32 " bytes is not a name in UTF-8 of at most %u bytes",
+                       table->name, index, bytes, STRL__MAX_NAME_BYTES);
     if (status != STRL_OK)
         return strl__opened_fail(container, status, err);
     if (head_bytes)
@@ -94,8 +96,8 @@ strl_status strl_container_part(strl_container *container, uint32_t part, char *
     return get_name(container, &container->parts, part, 0, NULL, name, size, err);
 }
 
-strl_status strl_container_material(strl_container *container, uint32_t material, char *name, size_t size, uint32_t *rgba,
-                                    strl_error *err)
+strl_status strl_container_material(strl_container *container, uint32_t material, char *name, size_t size,
+                                    uint32_t *rgba, strl_error *err)
 {
     uint8_t head[STRL__MATERIAL_HEAD_BYTES] = {0};
     strl_status status = get_name(container, &container->materials, material, sizeof head, head, name, size, err);

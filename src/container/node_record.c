@@ -37,9 +37,11 @@ void strl__node_encode(const strl_node *node, uint8_t bytes[STRL__NODE_BYTES])
                             node->appearance_max, node->group_geometric, node->group_appearance};
     for (unsigned i = 0; i < sizeof errors / sizeof *errors; i++)
         strl_writer_f32(&out, errors[i]);
-    const uint32_t counts[] = {node->vertex_count,   node->base_vertex_count, node->triangle_count, node->base_triangle_count,
-                               node->step_count,     node->boundary_steps,    node->shared_vertices,
-                               node->payload_offset, node->payload_bytes,     0};
+    const uint32_t counts[] = {node->vertex_count,    node->base_vertex_count,
+                               node->triangle_count,  node->base_triangle_count,
+                               node->step_count,      node->boundary_steps,
+                               node->shared_vertices, node->payload_offset,
+                               node->payload_bytes,   0};
     for (unsigned i = 0; i < sizeof counts / sizeof *counts; i++)
         strl_writer_u32(&out, counts[i]);
     strl_writer_u64(&out, node->page.offset);
@@ -69,9 +71,9 @@ strl_status strl__node_decode(const uint8_t bytes[STRL__NODE_BYTES], uint32_t id
                              &node->appearance_max, &node->group_geometric, &node->group_appearance};
     for (unsigned i = 0; i < sizeof errors / sizeof *errors; i++)
         *errors[i] = strl_cursor_f32(&in);
-    uint32_t *const counts[] = {&node->vertex_count,   &node->base_vertex_count, &node->triangle_count,
-                                &node->base_triangle_count, &node->step_count,   &node->boundary_steps,
-                                &node->shared_vertices, &node->payload_offset,   &node->payload_bytes};
+    uint32_t *const counts[] = {&node->vertex_count,        &node->base_vertex_count, &node->triangle_count,
+                                &node->base_triangle_count, &node->step_count,        &node->boundary_steps,
+                                &node->shared_vertices,     &node->payload_offset,    &node->payload_bytes};
     for (unsigned i = 0; i < sizeof counts / sizeof *counts; i++)
         *counts[i] = strl_cursor_u32(&in);
     uint32_t reserved = strl_cursor_u32(&in);
@@ -88,32 +90,37 @@ static strl_status check_at_most(uint32_t id, const char *what, uint64_t value, 
 {
     if (value <= most)
         return STRL_OK;
-    return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": %s is %" PRIu64 ", expected at most %" PRIu64, id, what, value,
-                      most);
+    return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": %s is %" PRIu64 ", expected at most %" PRIu64, id, what,
+                      value, most);
 }
 
 static strl_status check_kinship(const strl_node *node, uint32_t id, const strl_tree *tree, strl_error *err)
 {
     bool root = id == 0;
     if (root ? node->parent != STRL_NONE : node->parent >= id)
-        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": parent is %" PRIu32 ", expected %s", id, node->parent,
-                          root ? "none for the root" : "a lower id");
+        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": parent is %" PRIu32 ", expected %s", id,
+                          node->parent, root ? "none for the root" : "a lower id");
     if (root && node->level != tree->level_count - 1)
-        return strl__fail(err, STRL_ERR_FORMAT, "node 0: level is %" PRIu32 ", expected %" PRIu32 " for the root of %" PRIu32
-                          " levels", node->level, tree->level_count - 1, tree->level_count);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node 0: level is %" PRIu32 ", expected %" PRIu32 " for the root of %" PRIu32 " levels",
+                          node->level, tree->level_count - 1, tree->level_count);
     if (node->child_count == 0)
-        return node->first_child == STRL_NONE ? STRL_OK
-               : strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": first child is %" PRIu32 ", expected none for a leaf", id,
-                            node->first_child);
+        return node->first_child == STRL_NONE
+                   ? STRL_OK
+                   : strl__fail(err, STRL_ERR_FORMAT,
+                                "node %" PRIu32 ": first child is %" PRIu32 ", expected none for a leaf", id,
+                                node->first_child);
     strl_status status = check_at_most(id, "the number of children", node->child_count, STRL_NODE_MAX_CHILDREN, err);
     if (status != STRL_OK)
         return status;
     if (node->level == 0)
-        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": level is 0, expected at least 1 for a node with children", id);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node %" PRIu32 ": level is 0, expected at least 1 for a node with children", id);
     if (node->first_child <= id || (uint64_t)node->first_child + node->child_count > tree->node_count)
-        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": children are %" PRIu32 " to %" PRIu64
-                          ", expected ids above its own and below %" PRIu32, id, node->first_child,
-                          (uint64_t)node->first_child + node->child_count - 1, tree->node_count);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node %" PRIu32 ": children are %" PRIu32 " to %" PRIu64
+                          ", expected ids above its own and below %" PRIu32,
+                          id, node->first_child, (uint64_t)node->first_child + node->child_count - 1, tree->node_count);
     return STRL_OK;
 }
 
@@ -133,17 +140,21 @@ static bool range_is_legal(float least, float most)
 static strl_status check_errors(const strl_node *node, uint32_t id, strl_error *err)
 {
     if (!range_is_legal(node->geometric_min, node->geometric_max))
-        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": geometric errors are %g to %g, expected 0 <= min <= max", id,
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node %" PRIu32 ": geometric errors are %g to %g, expected 0 <= min <= max", id,
                           (double)node->geometric_min, (double)node->geometric_max);
     if (!range_is_legal(node->appearance_min, node->appearance_max))
-        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": appearance errors are %g to %g, expected 0 <= min <= max", id,
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node %" PRIu32 ": appearance errors are %g to %g, expected 0 <= min <= max", id,
                           (double)node->appearance_min, (double)node->appearance_max);
     if (!range_is_legal(node->geometric_min, node->group_geometric))
-        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": its group's geometric error is %g, expected at least its own, %g",
-                          id, (double)node->group_geometric, (double)node->geometric_min);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node %" PRIu32 ": its group's geometric error is %g, expected at least its own, %g", id,
+                          (double)node->group_geometric, (double)node->geometric_min);
     if (!range_is_legal(node->appearance_min, node->group_appearance))
-        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": its group's appearance error is %g, expected at least its own, %g",
-                          id, (double)node->group_appearance, (double)node->appearance_min);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node %" PRIu32 ": its group's appearance error is %g, expected at least its own, %g", id,
+                          (double)node->group_appearance, (double)node->appearance_min);
     return STRL_OK;
 }
 
@@ -172,7 +183,8 @@ static strl_status check_counts(const strl_node *node, uint32_t id, const strl_t
     if (node->group_size == 0)
         return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": the group's size is 0, expected at least 1", id);
     if (node->decode_parent != STRL_NONE && node->decode_parent >= id)
-        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": decode parent is %" PRIu32 ", expected none or a lower id", id,
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node %" PRIu32 ": decode parent is %" PRIu32 ", expected none or a lower id", id,
                           node->decode_parent);
     return STRL_OK;
 }
@@ -188,7 +200,8 @@ strl_status strl__node_check(const strl_node *node, uint32_t id, const strl_tree
         return status;
     if (!box_is_legal(node->box_min, node->box_max) || !box_is_legal(node->group_box_min, node->group_box_max) ||
         !box_is_legal(node->anchor, node->anchor))
-        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": a box or the anchor is out of order or beyond 2^62 cells", id);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node %" PRIu32 ": a box or the anchor is out of order or beyond 2^62 cells", id);
     return STRL_OK;
 }
 
@@ -209,6 +222,6 @@ void strl__child_treelets(uint32_t index, uint64_t first, uint64_t end, uint32_t
 
 uint64_t strl_node_decoded_bytes(const strl_node *record)
 {
-    return 26 * (uint64_t)record->vertex_count + 24 * (uint64_t)record->triangle_count + 16 * ((uint64_t)record->step_count + 1) +
-           4 * ((uint64_t)record->vertex_count + 1);
+    return 26 * (uint64_t)record->vertex_count + 24 * (uint64_t)record->triangle_count +
+           16 * ((uint64_t)record->step_count + 1) + 4 * ((uint64_t)record->vertex_count + 1);
 }

@@ -56,16 +56,19 @@ static strl_status learn_refs(strl__opened_tree *tree, uint32_t index, const str
     for (uint32_t i = 0; i < treelet->child_ref_count; i++) {
         strl_treelet_ref *known = &tree->refs[treelet->first_child_treelet + i]; /* decode has checked the range */
         const strl_treelet_ref *found = &treelet->child_refs[i];
-        if (known->bytes && (known->offset != found->offset || known->bytes != found->bytes || known->checksum != found->checksum))
-            return strl__fail(err, STRL_ERR_FORMAT, "treelet %" PRIu32 ": names treelet %" PRIu32
-                              " otherwise than a treelet before it", index, treelet->first_child_treelet + i);
+        if (known->bytes &&
+            (known->offset != found->offset || known->bytes != found->bytes || known->checksum != found->checksum))
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "treelet %" PRIu32 ": names treelet %" PRIu32 " otherwise than a treelet before it",
+                              index, treelet->first_child_treelet + i);
         *known = *found;
     }
     return STRL_OK;
 }
 
 /* The treelet, whose reference is known. */
-static strl_status get_known(strl_container *container, uint32_t tree, uint32_t index, strl_treelet **treelet, strl_error *err)
+static strl_status get_known(strl_container *container, uint32_t tree, uint32_t index, strl_treelet **treelet,
+                             strl_error *err)
 {
     bool held;
     strl__cached_treelet *slot = find_slot(container, tree, index, &held);
@@ -96,14 +99,15 @@ static strl_status get_treelet(strl_container *container, uint32_t tree, uint32_
         /* The header's check bounds node_count by the size of the file. */
         opened->refs = strl__alloc_zero(treelet_count(opened), sizeof *opened->refs);
         if (!opened->refs)
-            return strl__fail(err, STRL_ERR_MEMORY, "no memory for the places of %" PRIu32 " treelets", treelet_count(opened));
+            return strl__fail(err, STRL_ERR_MEMORY, "no memory for the places of %" PRIu32 " treelets",
+                              treelet_count(opened));
         opened->refs[0] = opened->root;
     }
     while (!opened->refs[index].bytes) {
         uint32_t next = opened->scanned;
         if (next >= index || !opened->refs[next].bytes)
-            return strl__fail(err, STRL_ERR_FORMAT, "tree %" PRIu32 ": no treelet before treelet %" PRIu32 " names it", tree,
-                              next >= index ? index : next);
+            return strl__fail(err, STRL_ERR_FORMAT, "tree %" PRIu32 ": no treelet before treelet %" PRIu32 " names it",
+                              tree, next >= index ? index : next);
         strl_status status = get_known(container, tree, next, treelet, err);
         if (status != STRL_OK)
             return status;
@@ -112,7 +116,8 @@ static strl_status get_treelet(strl_container *container, uint32_t tree, uint32_
     return get_known(container, tree, index, treelet, err);
 }
 
-strl_status strl_container_node(strl_container *container, uint32_t tree, uint32_t node, strl_node *record, strl_error *err)
+strl_status strl_container_node(strl_container *container, uint32_t tree, uint32_t node, strl_node *record,
+                                strl_error *err)
 {
     *record = (strl_node){0};
     const strl_tree *facts = strl_container_tree(container, tree);
@@ -151,13 +156,17 @@ static strl_status load_page(strl_container *container, const strl_page_ref *pag
     return status;
 }
 
-static strl_status check_palette(const strl_container *container, const strl_pm *mesh, strl_error *err)
+static strl_status check_palette(const strl_container *container, const strl_node *record, const strl_pm *mesh,
+                                 strl_error *err)
 {
     const strl_container_info *info = &container->header.info;
     for (uint32_t i = 0; i < mesh->palette_count; i++)
         if (mesh->palette[i].part >= info->part_count || mesh->palette[i].material >= info->material_count)
-            return strl__fail(err, STRL_ERR_FORMAT, "payload: palette entry %" PRIu32 " names part %" PRIu32 " and material %" PRIu32
-                              ", expected less than %" PRIu32 " and %" PRIu32, i, mesh->palette[i].part,
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "page at byte %" PRIu64 ", payload at its byte %" PRIu32 ": palette entry %" PRIu32
+                              " names part %" PRIu32 " and material %" PRIu32 ", expected less than %" PRIu32
+                              " and %" PRIu32,
+                              record->page.offset, record->payload_offset, i, mesh->palette[i].part,
                               mesh->palette[i].material, info->part_count, info->material_count);
     return STRL_OK;
 }
@@ -172,6 +181,6 @@ strl_status strl_container_mesh(strl_container *container, uint32_t tree, const 
     if (status == STRL_OK)
         status = strl_page_mesh(record, container->page, record->page.bytes, arena, mesh, err);
     if (status == STRL_OK)
-        status = check_palette(container, mesh, err);
+        status = check_palette(container, record, mesh, err);
     return strl__opened_fail(container, status, err);
 }

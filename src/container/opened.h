@@ -16,7 +16,7 @@ typedef struct strl__opened_tree {
 
 typedef struct strl__cached_treelet {
     uint32_t tree, index;
-    uint64_t last_use; /* 0 = empty */
+    uint64_t last_use;     /* 0 = empty */
     strl_treelet *treelet; /* owned */
 } strl__cached_treelet;
 

@@ -9,12 +9,13 @@
 strl_status strl_page_check(const strl_page_ref *ref, const void *data, size_t size, strl_error *err)
 {
     if (size != ref->bytes)
-        return strl__fail(err, STRL_ERR_FORMAT, "page at byte %" PRIu64 ": %zu bytes, expected %" PRIu32, ref->offset, size,
-                          ref->bytes);
+        return strl__fail(err, STRL_ERR_FORMAT, "page at byte %" PRIu64 ": %zu bytes, expected %" PRIu32, ref->offset,
+                          size, ref->bytes);
     uint64_t found = strl__checksum(data, size);
     if (found != ref->checksum)
-        return strl__fail(err, STRL_ERR_FORMAT, "page at byte %" PRIu64 ": checksum is %016" PRIx64 ", expected %016" PRIx64,
-                          ref->offset, found, ref->checksum);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "page at byte %" PRIu64 ": checksum is %016" PRIx64 ", expected %016" PRIx64, ref->offset,
+                          found, ref->checksum);
     return STRL_OK;
 }
 
@@ -28,8 +29,9 @@ static strl_status check_sizes(const strl_node *record, const uint8_t *payload, 
     if (sizes.vertex_count != record->vertex_count || sizes.base_vertex_count != record->base_vertex_count ||
         sizes.triangle_count != record->triangle_count || sizes.base_triangle_count != record->base_triangle_count ||
         sizes.step_count != record->step_count)
-        return strl__fail(err, STRL_ERR_FORMAT, "payload has %" PRIu32 " vertices, %" PRIu32 " triangles and %" PRIu32
-                          " steps, expected %" PRIu32 ", %" PRIu32 " and %" PRIu32 " from its node's record, or other base counts",
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "it has %" PRIu32 " vertices, %" PRIu32 " triangles and %" PRIu32 " steps, expected %" PRIu32
+                          ", %" PRIu32 " and %" PRIu32 " from its node's record, or other base counts",
                           sizes.vertex_count, sizes.triangle_count, sizes.step_count, record->vertex_count,
                           record->triangle_count, record->step_count);
     return STRL_OK;
@@ -41,9 +43,10 @@ static strl_status check_positions(const strl_node *record, const strl_pm *mesh,
         for (int axis = 0; axis < 3; axis++) {
             int64_t at = record->anchor[axis] + mesh->position[v][axis]; /* both far below 2^63 */
             if (at < record->box_min[axis] || at > record->box_max[axis])
-                return strl__fail(err, STRL_ERR_FORMAT, "payload: vertex %" PRIu32 " lies at %" PRId64
-                                  " on axis %d, expected within its node's box, %" PRId64 " to %" PRId64, v, at, axis,
-                                  record->box_min[axis], record->box_max[axis]);
+                return strl__fail(err, STRL_ERR_FORMAT,
+                                  "vertex %" PRIu32 " lies at %" PRId64
+                                  " on axis %d, expected within its node's box, %" PRId64 " to %" PRId64,
+                                  v, at, axis, record->box_min[axis], record->box_max[axis]);
         }
     return STRL_OK;
 }
@@ -52,8 +55,8 @@ static strl_status check_claim(const char *what, float base, float finest, float
 {
     if (base <= most && finest <= least)
         return STRL_OK;
-    return strl__fail(err, STRL_ERR_FORMAT, "payload: %s errors are %g to %g, expected at most %g to %g from its node's record", what,
-                      (double)finest, (double)base, (double)least, (double)most);
+    return strl__fail(err, STRL_ERR_FORMAT, "%s errors are %g to %g, expected at most %g to %g from its node's record",
+                      what, (double)finest, (double)base, (double)least, (double)most);
 }
 
 static strl_status check_mesh(const strl_node *record, const strl_pm *mesh, strl_error *err)
@@ -64,33 +67,38 @@ static strl_status check_mesh(const strl_node *record, const strl_pm *mesh, strl
         status = check_claim("geometric", mesh->geometric_error[0], mesh->geometric_error[last], record->geometric_max,
                              record->geometric_min, err);
     if (status == STRL_OK)
-        status = check_claim("appearance", mesh->appearance_error[0], mesh->appearance_error[last], record->appearance_max,
-                             record->appearance_min, err);
+        status = check_claim("appearance", mesh->appearance_error[0], mesh->appearance_error[last],
+                             record->appearance_max, record->appearance_min, err);
     return status;
+}
+
+static strl_status decode(const strl_node *record, const uint8_t *page, size_t size, strl_arena *arena, strl_pm *mesh,
+                          strl_error *err)
+{
+    if (record->decode_parent != STRL_NONE)
+        return strl__fail(err, STRL_ERR_UNSUPPORTED,
+                          "it needs the decoded node %" PRIu32 ", which this version does not support",
+                          record->decode_parent);
+    if (record->payload_offset > size || record->payload_bytes > size - record->payload_offset)
+        return strl__fail(err, STRL_ERR_FORMAT, "its %" PRIu32 " bytes pass the end of a page of %zu bytes",
+                          record->payload_bytes, size);
+    const uint8_t *payload = page + record->payload_offset;
+    strl_status status = check_sizes(record, payload, err);
+    if (status == STRL_OK)
+        status = strl_payload_decode(payload, record->payload_bytes, arena, mesh, err);
+    return status == STRL_OK ? check_mesh(record, mesh, err) : status;
 }
 
 strl_status strl_page_mesh(const strl_node *record, const void *page, size_t size, strl_arena *arena, strl_pm *mesh,
                            strl_error *err)
 {
     *mesh = (strl_pm){0};
-    if (record->decode_parent != STRL_NONE)
-        return strl__fail(err, STRL_ERR_UNSUPPORTED, "payload needs the decoded node %" PRIu32
-                          ", which this version does not support", record->decode_parent);
-    if (record->payload_offset > size || record->payload_bytes > size - record->payload_offset)
-        return strl__fail(err, STRL_ERR_FORMAT, "payload of %" PRIu32 " bytes at byte %" PRIu32 " of a page of %zu bytes",
-                          record->payload_bytes, record->payload_offset, size);
-    const uint8_t *payload = (const uint8_t *)page + record->payload_offset;
     strl_arena_mark mark = strl_arena_get_mark(arena);
-    strl_status status = check_sizes(record, payload, err);
+    strl_status status = decode(record, page, size, arena, mesh, err);
     if (status == STRL_OK)
-        status = strl_payload_decode(payload, record->payload_bytes, arena, mesh, err);
-    if (status == STRL_OK)
-        status = check_mesh(record, mesh, err);
-    if (status != STRL_OK) {
-        strl_arena_rewind(arena, mark);
-        *mesh = (strl_pm){0};
-        strl__fail_context(err, status, "page at byte %" PRIu64 ", payload at its byte %" PRIu32, record->page.offset,
-                           record->payload_offset);
-    }
-    return status;
+        return STRL_OK;
+    strl_arena_rewind(arena, mark);
+    *mesh = (strl_pm){0};
+    return strl__fail_context(err, status, "page at byte %" PRIu64 ", payload at its byte %" PRIu32,
+                              record->page.offset, record->payload_offset);
 }

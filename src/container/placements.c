@@ -14,23 +14,27 @@ static strl_status decode(const strl_container *container, uint64_t index, const
     for (int i = 0; i < 12; i++)
         placement->transform[i] = strl_cursor_f64(&in);
     if (in.failed || strl_cursor_left(&in) || reserved)
-        return strl__fail(err, STRL_ERR_FORMAT, "placement %" PRIu64 ": %" PRIu32 " bytes or a reserved field, expected %u bytes",
-                          index, bytes, STRL__PLACEMENT_BYTES);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "placement %" PRIu64 ": %" PRIu32 " bytes or a reserved field, expected %u bytes", index,
+                          bytes, STRL__PLACEMENT_BYTES);
     if (placement->tree >= container->header.info.tree_count)
-        return strl__fail(err, STRL_ERR_FORMAT, "placement %" PRIu64 ": tree is %" PRIu32 ", expected less than %" PRIu32, index,
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "placement %" PRIu64 ": tree is %" PRIu32 ", expected less than %" PRIu32, index,
                           placement->tree, container->header.info.tree_count);
     for (int i = 0; i < 12; i++)
         if (!isfinite(placement->transform[i]))
-            return strl__fail(err, STRL_ERR_FORMAT, "placement %" PRIu64 ": number %d of its transform is not finite", index, i);
+            return strl__fail(err, STRL_ERR_FORMAT, "placement %" PRIu64 ": number %d of its transform is not finite",
+                              index, i);
     return STRL_OK;
 }
 
-strl_status strl_container_placement(strl_container *container, uint64_t index, strl_placement *placement, strl_error *err)
+strl_status strl_container_placement(strl_container *container, uint64_t index, strl_placement *placement,
+                                     strl_error *err)
 {
     const uint8_t *item;
     uint32_t bytes;
     *placement = (strl_placement){0};
-    strl_status status = strl__table_get(&container->placements, container->source, index, &item, &bytes, err);
+    strl_status status = strl__page_table_get(&container->placements, container->source, index, &item, &bytes, err);
     if (status == STRL_OK)
         status = decode(container, index, item, bytes, placement, err);
     return strl__opened_fail(container, status, err);

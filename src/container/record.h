@@ -29,8 +29,8 @@ strl_status strl__header_decode(const uint8_t bytes[STRL__HEADER_BYTES], uint64_
                                 strl_error *err);
 
 void strl__tree_encode(const strl_tree *tree, const strl_treelet_ref *root, uint8_t bytes[STRL__TREE_BYTES]);
-strl_status strl__tree_decode(const uint8_t bytes[STRL__TREE_BYTES], uint32_t index, uint64_t file_bytes, strl_tree *tree,
-                              strl_treelet_ref *root, strl_error *err);
+strl_status strl__tree_decode(const uint8_t bytes[STRL__TREE_BYTES], uint32_t index, uint64_t file_bytes,
+                              strl_tree *tree, strl_treelet_ref *root, strl_error *err);
 /* Ranges only, file_bytes bounds the counts. */
 strl_status strl__tree_check(const strl_tree *tree, uint32_t index, uint64_t file_bytes, strl_error *err);
 

@@ -12,35 +12,37 @@ typedef struct strl__sink {
 } strl__sink;
 
 /* *ref: where the piece lies, with its checksum. */
-strl_status strl__sink_append(strl__sink *sink, const void *data, uint32_t bytes, strl_treelet_ref *ref, strl_error *err);
+strl_status strl__sink_append(strl__sink *sink, const void *data, uint32_t bytes, strl_treelet_ref *ref,
+                              strl_error *err);
 
 /* Builds a table from its items in order. All memory is taken at create: adding never allocates. */
-typedef struct strl__table_writer strl__table_writer;
-strl_status strl__table_writer_create(strl__table_writer **table, strl_error *err);
-void strl__table_writer_destroy(strl__table_writer *table); /* NULL is legal */
-uint64_t strl__table_writer_count(const strl__table_writer *table);
+typedef struct strl__page_table_writer strl__page_table_writer;
+strl_status strl__page_table_writer_create(strl__page_table_writer **table, strl_error *err);
+void strl__page_table_writer_destroy(strl__page_table_writer *table); /* NULL is legal */
+uint64_t strl__page_table_writer_count(const strl__page_table_writer *table);
 /* The item is head followed by body; together at most STRL__MAX_NAME_BYTES + 4. */
-strl_status strl__table_writer_add(strl__table_writer *table, strl__sink *sink, const void *head, uint32_t head_bytes,
+strl_status strl__page_table_writer_add(strl__page_table_writer *table, strl__sink *sink, const void *head, uint32_t head_bytes,
                                    const void *body, uint32_t body_bytes, strl_error *err);
 /* Writes what is pending; section gets depth, count and root. At least one item was added. */
-strl_status strl__table_writer_finish(strl__table_writer *table, strl__sink *sink, strl__section *section, strl_error *err);
+strl_status strl__page_table_writer_finish(strl__page_table_writer *table, strl__sink *sink, strl__section *section,
+                                      strl_error *err);
 
 /* Looks items up, keeping one page of each depth. Zero-initialise but for name and section. */
-typedef struct strl__table_page {
+typedef struct strl__page_table_page {
     uint8_t *data; /* owned, STRL__TABLE_PAGE_BYTES */
     strl_treelet_ref ref;
     uint64_t first, end; /* items that the page stands for; end 0: nothing is held */
-} strl__table_page;
+} strl__page_table_page;
 
 typedef struct strl__table {
     const char *name; /* "parts"; static */
     strl__section section;
-    strl__table_page pages[STRL__TABLE_MAX_DEPTH + 1]; /* by depth; 0 = leaf */
+    strl__page_table_page pages[STRL__TABLE_MAX_DEPTH + 1]; /* by depth; 0 = leaf */
 } strl__table;
 
 /* *item is borrowed until the next call. */
-strl_status strl__table_get(strl__table *table, strl_source *source, uint64_t index, const uint8_t **item, uint32_t *bytes,
-                            strl_error *err);
-void strl__table_deinit(strl__table *table);
+strl_status strl__page_table_get(strl__table *table, strl_source *source, uint64_t index, const uint8_t **item,
+                            uint32_t *bytes, strl_error *err);
+void strl__page_table_deinit(strl__table *table);
 
 #endif

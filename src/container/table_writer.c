@@ -14,18 +14,19 @@ typedef struct ref_list {
     uint64_t first_item; /* of the first reference */
 } ref_list;
 
-struct strl__table_writer {
+struct strl__page_table_writer {
     uint64_t item_count;
-    uint64_t leaf_first;   /* number of the pending leaf's first item */
-    uint32_t leaf_count;   /* items of the pending leaf */
-    uint32_t leaf_bytes;   /* bytes of these items */
+    uint64_t leaf_first; /* number of the pending leaf's first item */
+    uint32_t leaf_count; /* items of the pending leaf */
+    uint32_t leaf_bytes; /* bytes of these items */
     uint8_t ends[STRL__TABLE_PAGE_BYTES];
     uint8_t items[STRL__TABLE_PAGE_BYTES];
     uint8_t page[STRL__TABLE_PAGE_BYTES];
     ref_list lists[LEVELS];
 };
 
-strl_status strl__sink_append(strl__sink *sink, const void *data, uint32_t bytes, strl_treelet_ref *ref, strl_error *err)
+strl_status strl__sink_append(strl__sink *sink, const void *data, uint32_t bytes, strl_treelet_ref *ref,
+                              strl_error *err)
 {
     /* The gap up to the alignment is never written: a file's holes read as zeros. */
     uint64_t offset = (sink->end + STRL__ALIGNMENT - 1) / STRL__ALIGNMENT * STRL__ALIGNMENT;
@@ -37,20 +38,28 @@ strl_status strl__sink_append(strl__sink *sink, const void *data, uint32_t bytes
     return STRL_OK;
 }
 
-strl_status strl__table_writer_create(strl__table_writer **table, strl_error *err)
+strl_status strl__page_table_writer_create(strl__page_table_writer **table, strl_error *err)
 {
     *table = strl__alloc_zero(1, sizeof **table);
-    return *table ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for a table of the container (%zu bytes)", sizeof **table);
+    return *table
+               ? STRL_OK
+               : strl__fail(err, STRL_ERR_MEMORY, "no memory for a table of the container (%zu bytes)", sizeof **table);
 }
 
-void strl__table_writer_destroy(strl__table_writer *table) { strl__free(table); }
-uint64_t strl__table_writer_count(const strl__table_writer *table) { return table->item_count; }
+void strl__page_table_writer_destroy(strl__page_table_writer *table)
+{
+    strl__free(table);
+}
+uint64_t strl__page_table_writer_count(const strl__page_table_writer *table)
+{
+    return table->item_count;
+}
 
-static strl_status add_ref(strl__table_writer *table, strl__sink *sink, unsigned level, const strl_treelet_ref *ref,
+static strl_status add_ref(strl__page_table_writer *table, strl__sink *sink, unsigned level, const strl_treelet_ref *ref,
                            uint64_t first_item, strl_error *err);
 
 /* Turns the pending references of `level` into one index page. */
-static strl_status flush_list(strl__table_writer *table, strl__sink *sink, unsigned level, strl_error *err)
+static strl_status flush_list(strl__page_table_writer *table, strl__sink *sink, unsigned level, strl_error *err)
 {
     ref_list *list = &table->lists[level];
     uint32_t bytes = list->count * STRL__TABLE_REF_BYTES;
@@ -66,12 +75,13 @@ static strl_status flush_list(strl__table_writer *table, strl__sink *sink, unsig
     return add_ref(table, sink, level + 1, &ref, first_item, err);
 }
 
-static strl_status add_ref(strl__table_writer *table, strl__sink *sink, unsigned level, const strl_treelet_ref *ref,
+static strl_status add_ref(strl__page_table_writer *table, strl__sink *sink, unsigned level, const strl_treelet_ref *ref,
                            uint64_t first_item, strl_error *err)
 {
     ref_list *list = &table->lists[level];
     if (level == LEVELS - 1 && list->count)
-        return strl__fail(err, STRL_ERR_LIMIT, "a table of the container would need more than %u levels of pages", LEVELS);
+        return strl__fail(err, STRL_ERR_LIMIT, "a table of the container would need more than %u levels of pages",
+                          LEVELS);
     if (list->count == STRL__TABLE_MAX_REFS) {
         strl_status status = flush_list(table, sink, level, err);
         if (status != STRL_OK)
@@ -88,7 +98,7 @@ static strl_status add_ref(strl__table_writer *table, strl__sink *sink, unsigned
     return STRL_OK;
 }
 
-static strl_status flush_leaf(strl__table_writer *table, strl__sink *sink, strl_error *err)
+static strl_status flush_leaf(strl__page_table_writer *table, strl__sink *sink, strl_error *err)
 {
     uint32_t ends = table->leaf_count * 4;
     strl__store_le(table->page, 4, table->leaf_count);
@@ -105,7 +115,7 @@ static strl_status flush_leaf(strl__table_writer *table, strl__sink *sink, strl_
     return STRL_OK;
 }
 
-strl_status strl__table_writer_add(strl__table_writer *table, strl__sink *sink, const void *head, uint32_t head_bytes,
+strl_status strl__page_table_writer_add(strl__page_table_writer *table, strl__sink *sink, const void *head, uint32_t head_bytes,
                                    const void *body, uint32_t body_bytes, strl_error *err)
 {
     uint64_t used = 4 + 4 * ((uint64_t)table->leaf_count + 1) + table->leaf_bytes;
@@ -132,7 +142,8 @@ static void read_only_ref(const ref_list *list, strl_treelet_ref *ref)
     ref->bytes = (uint32_t)strl__load_le(list->refs + 24, 4);
 }
 
-strl_status strl__table_writer_finish(strl__table_writer *table, strl__sink *sink, strl__section *section, strl_error *err)
+strl_status strl__page_table_writer_finish(strl__page_table_writer *table, strl__sink *sink, strl__section *section,
+                                      strl_error *err)
 {
     strl_status status = table->leaf_count ? flush_leaf(table, sink, err) : STRL_OK;
     for (unsigned level = 0; status == STRL_OK && level < LEVELS; level++) {

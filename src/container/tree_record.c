@@ -7,11 +7,12 @@
 
 strl_status strl__ref_check(const strl_treelet_ref *ref, uint64_t file_bytes, const char *what, strl_error *err)
 {
-    if (ref->bytes == 0 || ref->offset < STRL__HEADER_BYTES || ref->offset % STRL__ALIGNMENT || ref->offset > file_bytes ||
-        ref->bytes > file_bytes - ref->offset)
-        return strl__fail(err, STRL_ERR_FORMAT, "%s: reference to %" PRIu32 " bytes at byte %" PRIu64
-                          ", expected a multiple of %u from %u on that ends within the file (%" PRIu64 ")", what, ref->bytes,
-                          ref->offset, STRL__ALIGNMENT, STRL__HEADER_BYTES, file_bytes);
+    if (ref->bytes == 0 || ref->offset < STRL__HEADER_BYTES || ref->offset % STRL__ALIGNMENT ||
+        ref->offset > file_bytes || ref->bytes > file_bytes - ref->offset)
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "%s: reference to %" PRIu32 " bytes at byte %" PRIu64
+                          ", expected a multiple of %u from %u on that ends within the file (%" PRIu64 ")",
+                          what, ref->bytes, ref->offset, STRL__ALIGNMENT, STRL__HEADER_BYTES, file_bytes);
     return STRL_OK;
 }
 
@@ -49,18 +50,23 @@ static bool step_is_legal(double step)
 static strl_status check_lattice(const strl_tree *tree, uint32_t index, strl_error *err)
 {
     if (!step_is_legal(tree->step))
-        return strl__fail(err, STRL_ERR_FORMAT, "tree %" PRIu32 ": the lattice step is %g, expected a power of two from 2^-%d to 2^%d",
-                          index, tree->step, STRL__MAX_STEP_EXPONENT, STRL__MAX_STEP_EXPONENT);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "tree %" PRIu32 ": the lattice step is %g, expected a power of two from 2^-%d to 2^%d", index,
+                          tree->step, STRL__MAX_STEP_EXPONENT, STRL__MAX_STEP_EXPONENT);
     for (int axis = 0; axis < 3; axis++) {
         if (!isfinite(tree->origin[axis]))
-            return strl__fail(err, STRL_ERR_FORMAT, "tree %" PRIu32 ": the origin on axis %d is not finite", index, axis);
+            return strl__fail(err, STRL_ERR_FORMAT, "tree %" PRIu32 ": the origin on axis %d is not finite", index,
+                              axis);
         if (tree->box_min[axis] > tree->box_max[axis] || tree->box_min[axis] < -STRL__LATTICE_LIMIT ||
             tree->box_max[axis] > STRL__LATTICE_LIMIT)
-            return strl__fail(err, STRL_ERR_FORMAT, "tree %" PRIu32 ": the box on axis %d is %" PRId64 " to %" PRId64
-                              ", expected min <= max within 2^62", index, axis, tree->box_min[axis], tree->box_max[axis]);
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "tree %" PRIu32 ": the box on axis %d is %" PRId64 " to %" PRId64
+                              ", expected min <= max within 2^62",
+                              index, axis, tree->box_min[axis], tree->box_max[axis]);
     }
     if (!isfinite(tree->leaf_geometric) || tree->leaf_geometric < 0)
-        return strl__fail(err, STRL_ERR_FORMAT, "tree %" PRIu32 ": the leaves' geometric error is %g, expected finite and >= 0", index,
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "tree %" PRIu32 ": the leaves' geometric error is %g, expected finite and >= 0", index,
                           (double)tree->leaf_geometric);
     return STRL_OK;
 }
@@ -74,10 +80,12 @@ strl_status strl__tree_check(const strl_tree *tree, uint32_t index, uint64_t fil
     if (most_nodes > STRL_NONE - 1)
         most_nodes = STRL_NONE - 1;
     if (tree->node_count < 1 || tree->node_count > most_nodes)
-        return strl__fail(err, STRL_ERR_FORMAT, "tree %" PRIu32 ": %" PRIu32 " nodes, expected 1 to %" PRIu64 " in a file of its size",
-                          index, tree->node_count, most_nodes);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "tree %" PRIu32 ": %" PRIu32 " nodes, expected 1 to %" PRIu64 " in a file of its size", index,
+                          tree->node_count, most_nodes);
     if (tree->level_count < 1 || tree->level_count > tree->node_count || tree->level_count > STRL__MAX_LEVELS)
-        return strl__fail(err, STRL_ERR_FORMAT, "tree %" PRIu32 ": %" PRIu32 " levels, expected 1 to %" PRIu32 " for its nodes", index,
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "tree %" PRIu32 ": %" PRIu32 " levels, expected 1 to %" PRIu32 " for its nodes", index,
                           tree->level_count, tree->node_count < STRL__MAX_LEVELS ? tree->node_count : STRL__MAX_LEVELS);
     if (tree->group_count < 1 || tree->group_count > tree->node_count)
         return strl__fail(err, STRL_ERR_FORMAT, "tree %" PRIu32 ": %" PRIu32 " groups, expected 1 to %" PRIu32, index,
@@ -85,8 +93,8 @@ strl_status strl__tree_check(const strl_tree *tree, uint32_t index, uint64_t fil
     return check_lattice(tree, index, err);
 }
 
-strl_status strl__tree_decode(const uint8_t bytes[STRL__TREE_BYTES], uint32_t index, uint64_t file_bytes, strl_tree *tree,
-                              strl_treelet_ref *root, strl_error *err)
+strl_status strl__tree_decode(const uint8_t bytes[STRL__TREE_BYTES], uint32_t index, uint64_t file_bytes,
+                              strl_tree *tree, strl_treelet_ref *root, strl_error *err)
 {
     strl_cursor in = strl_cursor_make(bytes, STRL__TREE_BYTES);
     tree->structure = (strl_structure)strl_cursor_u32(&in);
@@ -114,7 +122,8 @@ strl_status strl__tree_decode(const uint8_t bytes[STRL__TREE_BYTES], uint32_t in
     if (reserved)
         return strl__fail(err, STRL_ERR_FORMAT, "tree %" PRIu32 ": a reserved field is not zero", index);
     if (root->bytes < STRL__MIN_TREELET_BYTES || root->bytes > STRL__MAX_TREELET_BYTES)
-        return strl__fail(err, STRL_ERR_FORMAT, "tree %" PRIu32 ": its first treelet has %" PRIu32 " bytes, expected %u to %u", index,
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "tree %" PRIu32 ": its first treelet has %" PRIu32 " bytes, expected %u to %u", index,
                           root->bytes, STRL__MIN_TREELET_BYTES, STRL__MAX_TREELET_BYTES);
     return strl__ref_check(root, file_bytes, "first treelet", err);
 }

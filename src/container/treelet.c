@@ -21,12 +21,14 @@ static strl_status check_page(const strl_node *node, uint32_t id, uint64_t file_
                           STRL__MAX_PAGE_BYTES);
     if (node->payload_bytes == 0 || node->payload_offset > node->page.bytes ||
         node->payload_bytes > node->page.bytes - node->payload_offset)
-        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": payload of %" PRIu32 " bytes at byte %" PRIu32
-                          " of its page, expected within its %" PRIu32 " bytes", id, node->payload_bytes, node->payload_offset,
-                          node->page.bytes);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node %" PRIu32 ": payload of %" PRIu32 " bytes at byte %" PRIu32
+                          " of its page, expected within its %" PRIu32 " bytes",
+                          id, node->payload_bytes, node->payload_offset, node->page.bytes);
     if (node->page.decoded_bytes < strl_node_decoded_bytes(node))
-        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": its page decodes to %" PRIu32 " bytes, expected at least its own %"
-                          PRIu64, id, node->page.decoded_bytes, strl_node_decoded_bytes(node));
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node %" PRIu32 ": its page decodes to %" PRIu32 " bytes, expected at least its own %" PRIu64,
+                          id, node->page.decoded_bytes, strl_node_decoded_bytes(node));
     return STRL_OK;
 }
 
@@ -36,21 +38,25 @@ static strl_status check_order(const strl_treelet *treelet, uint32_t i, uint64_t
     const strl_node *node = &treelet->nodes[i];
     uint32_t id = treelet->first_node + i;
     if (i > 0 && (node->level > node[-1].level || (id > 1 && node->parent < node[-1].parent)))
-        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": level %" PRIu32 " and parent %" PRIu32
-                          " are not in breadth-first order after level %" PRIu32 " and parent %" PRIu32, id, node->level,
-                          node->parent, node[-1].level, node[-1].parent);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node %" PRIu32 ": level %" PRIu32 " and parent %" PRIu32
+                          " are not in breadth-first order after level %" PRIu32 " and parent %" PRIu32,
+                          id, node->level, node->parent, node[-1].level, node[-1].parent);
     if (id > 0 && node->parent >= treelet->first_node) {
         const strl_node *parent = &treelet->nodes[node->parent - treelet->first_node];
         if (parent->child_count == 0 || id < parent->first_child || id - parent->first_child >= parent->child_count ||
             parent->level != node->level + 1)
-            return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": its parent %" PRIu32
-                              " does not name it as a child of the level below", id, node->parent);
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "node %" PRIu32 ": its parent %" PRIu32 " does not name it as a child of the level below",
+                              id, node->parent);
     }
     if (node->child_count == 0)
         return STRL_OK;
     if (*next_child && node->first_child != *next_child)
-        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": first child is %" PRIu32 ", expected %" PRIu64
-                          ", right after the children before", id, node->first_child, *next_child);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node %" PRIu32 ": first child is %" PRIu32 ", expected %" PRIu64
+                          ", right after the children before",
+                          id, node->first_child, *next_child);
     *next_child = (uint64_t)node->first_child + node->child_count;
     return STRL_OK;
 }
@@ -88,7 +94,8 @@ static strl_status decode_child_refs(strl_cursor *in, uint64_t file_bytes, uint3
     for (uint32_t i = 0; i < treelet->child_ref_count; i++) {
         strl_treelet_ref *ref = &treelet->child_refs[i];
         char what[64];
-        snprintf(what, sizeof what, "treelet %" PRIu32 ", child treelet %" PRIu32, index, treelet->first_child_treelet + i);
+        snprintf(what, sizeof what, "treelet %" PRIu32 ", child treelet %" PRIu32, index,
+                 treelet->first_child_treelet + i);
         ref->offset = strl_cursor_u64(in);
         ref->bytes = strl_cursor_u32(in);
         uint32_t reserved = strl_cursor_u32(in);
@@ -103,7 +110,8 @@ static strl_status decode_child_refs(strl_cursor *in, uint64_t file_bytes, uint3
     return STRL_OK;
 }
 
-static strl_status decode_head(strl_cursor *in, const strl_tree *tree, uint32_t index, strl_treelet *treelet, strl_error *err)
+static strl_status decode_head(strl_cursor *in, const strl_tree *tree, uint32_t index, strl_treelet *treelet,
+                               strl_error *err)
 {
     treelet->first_node = strl_cursor_u32(in);
     treelet->node_count = strl_cursor_u32(in);
@@ -114,19 +122,22 @@ static strl_status decode_head(strl_cursor *in, const strl_tree *tree, uint32_t 
     if (count > STRL_TREELET_NODES)
         count = STRL_TREELET_NODES;
     if (count == 0 || treelet->first_node != first || treelet->node_count != count)
-        return strl__fail(err, STRL_ERR_FORMAT, "treelet %" PRIu32 ": %" PRIu32 " nodes from %" PRIu32 " on, expected %" PRIu64
-                          " from %" PRIu64 " on", index, treelet->node_count, treelet->first_node, count, first);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "treelet %" PRIu32 ": %" PRIu32 " nodes from %" PRIu32 " on, expected %" PRIu64
+                          " from %" PRIu64 " on",
+                          index, treelet->node_count, treelet->first_node, count, first);
     uint64_t bytes = STRL__TREELET_HEAD_BYTES + count * STRL__NODE_BYTES +
                      (uint64_t)treelet->child_ref_count * STRL__CHILD_REF_BYTES;
     if (treelet->child_ref_count > STRL__MAX_CHILD_REFS || in->size != bytes)
-        return strl__fail(err, STRL_ERR_FORMAT, "treelet %" PRIu32 ": %zu bytes for %" PRIu64 " nodes and %" PRIu32
-                          " child treelets, expected %" PRIu64 " and at most %u", index, in->size, count,
-                          treelet->child_ref_count, bytes, STRL__MAX_CHILD_REFS);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "treelet %" PRIu32 ": %zu bytes for %" PRIu64 " nodes and %" PRIu32
+                          " child treelets, expected %" PRIu64 " and at most %u",
+                          index, in->size, count, treelet->child_ref_count, bytes, STRL__MAX_CHILD_REFS);
     return STRL_OK;
 }
 
-static strl_status decode(const strl_tree *tree, uint64_t file_bytes, uint32_t index, strl_cursor *in, strl_treelet *treelet,
-                          strl_error *err)
+static strl_status decode(const strl_tree *tree, uint64_t file_bytes, uint32_t index, strl_cursor *in,
+                          strl_treelet *treelet, strl_error *err)
 {
     strl_status status = decode_head(in, tree, index, treelet, err);
     uint64_t children[2];
@@ -137,14 +148,16 @@ static strl_status decode(const strl_tree *tree, uint64_t file_bytes, uint32_t i
     uint32_t first, count;
     strl__child_treelets(index, children[0], children[1], &first, &count);
     if (treelet->first_child_treelet != first || treelet->child_ref_count != count)
-        return strl__fail(err, STRL_ERR_FORMAT, "treelet %" PRIu32 ": names %" PRIu32 " child treelets from %" PRIu32
-                          " on, expected %" PRIu32 " from %" PRIu32 " on", index, treelet->child_ref_count,
-                          treelet->first_child_treelet, count, first);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "treelet %" PRIu32 ": names %" PRIu32 " child treelets from %" PRIu32 " on, expected %" PRIu32
+                          " from %" PRIu32 " on",
+                          index, treelet->child_ref_count, treelet->first_child_treelet, count, first);
     return decode_child_refs(in, file_bytes, index, treelet, err);
 }
 
-strl_status strl_treelet_decode(const strl_container *container, uint32_t tree, uint32_t index, const strl_treelet_ref *ref,
-                                const void *data, size_t size, strl_treelet *treelet, strl_error *err)
+strl_status strl_treelet_decode(const strl_container *container, uint32_t tree, uint32_t index,
+                                const strl_treelet_ref *ref, const void *data, size_t size, strl_treelet *treelet,
+                                strl_error *err)
 {
     treelet->child_refs = NULL;
     treelet->child_ref_count = treelet->node_count = 0;
@@ -153,8 +166,10 @@ strl_status strl_treelet_decode(const strl_container *container, uint32_t tree, 
         return strl__fail(err, STRL_ERR_ARGUMENT, "there is no tree %" PRIu32, tree);
     uint64_t found = size == ref->bytes ? strl__checksum(data, size) : 0;
     if (size != ref->bytes || found != ref->checksum)
-        return strl__fail(err, STRL_ERR_FORMAT, "treelet %" PRIu32 " at byte %" PRIu64 ": checksum of %zu bytes is %016" PRIx64
-                          ", expected %016" PRIx64 " of %" PRIu32, index, ref->offset, size, found, ref->checksum, ref->bytes);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "treelet %" PRIu32 " at byte %" PRIu64 ": checksum of %zu bytes is %016" PRIx64
+                          ", expected %016" PRIx64 " of %" PRIu32,
+                          index, ref->offset, size, found, ref->checksum, ref->bytes);
     strl_cursor in = strl_cursor_make(data, size);
     strl_status status = decode(facts, strl_container_get_info(container)->file_bytes, index, &in, treelet, err);
     if (status != STRL_OK)

@@ -13,7 +13,7 @@ typedef struct strl_treelet_ref {
 } strl_treelet_ref;
 
 typedef struct strl_treelet {
-    uint32_t first_node;  /* id of nodes[0] */
+    uint32_t first_node; /* id of nodes[0] */
     uint32_t node_count;
     strl_node nodes[STRL_TREELET_NODES];
     uint32_t first_child_treelet; /* index of the treelet that child_refs[0] names; STRL_NONE where there is none */
@@ -21,10 +21,12 @@ typedef struct strl_treelet {
     strl_treelet_ref *child_refs; /* owned (strl__free) */
 } strl_treelet;
 
-strl_status strl_container_root_treelet(const strl_container *container, uint32_t tree, strl_treelet_ref *ref, strl_error *err);
+strl_status strl_container_root_treelet(const strl_container *container, uint32_t tree, strl_treelet_ref *ref,
+                                        strl_error *err);
 /* Checks the checksum and every field (ids against tree, ranges, finite and ordered errors, boxes). treelet is the caller's. */
-strl_status strl_treelet_decode(const strl_container *container, uint32_t tree, uint32_t index, const strl_treelet_ref *ref,
-                                const void *data, size_t size, strl_treelet *treelet, strl_error *err);
+strl_status strl_treelet_decode(const strl_container *container, uint32_t tree, uint32_t index,
+                                const strl_treelet_ref *ref, const void *data, size_t size, strl_treelet *treelet,
+                                strl_error *err);
 void strl_treelet_deinit(strl_treelet *treelet);
 
 /* Checks a page's bytes against its reference. */

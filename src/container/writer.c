@@ -27,7 +27,8 @@ static strl_status check_desc(const strl_container_writer_desc *desc, strl_error
     if (!desc->path || !desc->scratch_dir)
         return strl__fail(err, STRL_ERR_ARGUMENT, "a container's writer needs a path and a scratch folder");
     if (!memchr(desc->info.unit, 0, sizeof desc->info.unit))
-        return strl__fail(err, STRL_ERR_ARGUMENT, "the unit's name is not terminated within %zu bytes", sizeof desc->info.unit);
+        return strl__fail(err, STRL_ERR_ARGUMENT, "the unit's name is not terminated within %zu bytes",
+                          sizeof desc->info.unit);
     if (desc->info.up_axis > 2)
         return strl__fail(err, STRL_ERR_ARGUMENT, "up axis is %" PRIu32 ", expected 0 to 2", desc->info.up_axis);
     return STRL_OK;
@@ -77,11 +78,11 @@ strl_status strl_container_writer_create(const strl_container_writer_desc *desc,
     /* A unit's bytes after its end are the caller's garbage; the file's are zero. */
     size_t unit_length = strlen(desc->info.unit);
     memset(made->header.info.unit + unit_length, 0, sizeof made->header.info.unit - unit_length);
-    status = strl__table_writer_create(&made->placements, err);
+    status = strl__page_table_writer_create(&made->placements, err);
     if (status == STRL_OK)
-        status = strl__table_writer_create(&made->parts, err);
+        status = strl__page_table_writer_create(&made->parts, err);
     if (status == STRL_OK)
-        status = strl__table_writer_create(&made->materials, err);
+        status = strl__page_table_writer_create(&made->materials, err);
     if (status == STRL_OK)
         status = open_files(made, desc, err);
     if (status != STRL_OK)
@@ -116,8 +117,9 @@ static void add_bounds(strl_container_writer *writer, const strl_placement *plac
 static strl_status add_placement(strl_container_writer *writer, const strl_placement *placement, strl_error *err)
 {
     if (placement->tree >= writer->header.info.tree_count)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "a placement of tree %" PRIu32 ", but %" PRIu32 " trees have ended so far",
-                          placement->tree, writer->header.info.tree_count);
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "a placement of tree %" PRIu32 ", but %" PRIu32 " trees have ended so far", placement->tree,
+                          writer->header.info.tree_count);
     uint8_t bytes[STRL__PLACEMENT_BYTES];
     strl_writer out = {.data = bytes, .capacity = sizeof bytes};
     strl_writer_u32(&out, placement->tree);
@@ -128,7 +130,7 @@ static strl_status add_placement(strl_container_writer *writer, const strl_place
         strl_writer_f64(&out, placement->transform[i]);
     }
     add_bounds(writer, placement);
-    return strl__table_writer_add(writer->placements, &writer->sink, bytes, sizeof bytes, NULL, 0, err);
+    return strl__page_table_writer_add(writer->placements, &writer->sink, bytes, sizeof bytes, NULL, 0, err);
 }
 
 strl_status strl_container_writer_add_placement(strl_container_writer *writer, const strl_placement *placement,
@@ -139,8 +141,8 @@ strl_status strl_container_writer_add_placement(strl_container_writer *writer, c
     return status;
 }
 
-static strl_status add_name(strl_container_writer *writer, strl__table_writer *table, const void *head, uint32_t head_bytes,
-                            const char *name, strl_error *err)
+static strl_status add_name(strl_container_writer *writer, strl__page_table_writer *table, const void *head,
+                            uint32_t head_bytes, const char *name, strl_error *err)
 {
     uint8_t clean[STRL__MAX_NAME_BYTES];
     size_t bytes = 0;
@@ -148,10 +150,11 @@ static strl_status add_name(strl_container_writer *writer, strl__table_writer *t
     if (name && !strl__utf8_clean(name, clean, sizeof clean, &bytes))
         status = strl__fail(err, STRL_ERR_LIMIT, "the name that begins with \"%.40s\" is longer than %u bytes", name,
                             STRL__MAX_NAME_BYTES);
-    else if (strl__table_writer_count(table) >= STRL_NONE - 1)
-        status = strl__fail(err, STRL_ERR_LIMIT, "a container holds at most %" PRIu32 " names of a kind", STRL_NONE - 1);
+    else if (strl__page_table_writer_count(table) >= STRL_NONE - 1)
+        status =
+            strl__fail(err, STRL_ERR_LIMIT, "a container holds at most %" PRIu32 " names of a kind", STRL_NONE - 1);
     else
-        status = strl__table_writer_add(table, &writer->sink, head, head_bytes, clean, (uint32_t)bytes, err);
+        status = strl__page_table_writer_add(table, &writer->sink, head, head_bytes, clean, (uint32_t)bytes, err);
     writer->failed |= status != STRL_OK;
     return status;
 }
@@ -161,7 +164,8 @@ strl_status strl_container_writer_add_part(strl_container_writer *writer, const 
     return add_name(writer, writer->parts, NULL, 0, name, err);
 }
 
-strl_status strl_container_writer_add_material(strl_container_writer *writer, const char *name, uint32_t rgba, strl_error *err)
+strl_status strl_container_writer_add_material(strl_container_writer *writer, const char *name, uint32_t rgba,
+                                               strl_error *err)
 {
     uint8_t head[STRL__MATERIAL_HEAD_BYTES];
     strl__store_le(head, sizeof head, rgba);
@@ -171,14 +175,14 @@ strl_status strl_container_writer_add_material(strl_container_writer *writer, co
 static strl_status add_defaults(strl_container_writer *writer, strl_error *err)
 {
     strl_status status = STRL_OK;
-    bool none_placed = strl__table_writer_count(writer->placements) == 0;
+    bool none_placed = strl__page_table_writer_count(writer->placements) == 0;
     for (uint32_t tree = 0; status == STRL_OK && none_placed && tree < writer->header.info.tree_count; tree++) {
         const strl_placement as_it_is = {tree, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
         status = add_placement(writer, &as_it_is, err);
     }
-    if (status == STRL_OK && strl__table_writer_count(writer->parts) == 0)
+    if (status == STRL_OK && strl__page_table_writer_count(writer->parts) == 0)
         status = strl_container_writer_add_part(writer, "", err);
-    if (status == STRL_OK && strl__table_writer_count(writer->materials) == 0)
+    if (status == STRL_OK && strl__page_table_writer_count(writer->materials) == 0)
         status = strl_container_writer_add_material(writer, "", 0xffffffff, err);
     return status;
 }
@@ -203,11 +207,12 @@ static strl_status write_sections(strl_container_writer *writer, strl_error *err
     for (uint32_t i = 0; i < STRL__KNOWN_SECTIONS; i++)
         sections[i] = (strl__section){.kind = i + 1};
     strl__sink *sink = &writer->sink;
-    strl_status status = strl__table_writer_finish(writer->placements, sink, &sections[STRL__SECTION_PLACEMENTS - 1], err);
+    strl_status status =
+        strl__page_table_writer_finish(writer->placements, sink, &sections[STRL__SECTION_PLACEMENTS - 1], err);
     if (status == STRL_OK)
-        status = strl__table_writer_finish(writer->parts, sink, &sections[STRL__SECTION_PARTS - 1], err);
+        status = strl__page_table_writer_finish(writer->parts, sink, &sections[STRL__SECTION_PARTS - 1], err);
     if (status == STRL_OK)
-        status = strl__table_writer_finish(writer->materials, sink, &sections[STRL__SECTION_MATERIALS - 1], err);
+        status = strl__page_table_writer_finish(writer->materials, sink, &sections[STRL__SECTION_MATERIALS - 1], err);
     if (status == STRL_OK)
         status = write_trees(writer, &sections[STRL__SECTION_TREES - 1], err);
     return status;
@@ -217,7 +222,8 @@ static strl_status check_bounds(const strl_container_info *info, strl_error *err
 {
     for (int i = 0; i < 6; i++)
         if (!isfinite(info->bounds[i]))
-            return strl__fail(err, STRL_ERR_LIMIT, "the placed model reaches beyond the numbers of a double on axis %d", i % 3);
+            return strl__fail(err, STRL_ERR_LIMIT, "the placed model reaches beyond the numbers of a double on axis %d",
+                              i % 3);
     return STRL_OK;
 }
 
@@ -271,9 +277,9 @@ void strl_container_writer_destroy(strl_container_writer *writer)
         strl_path_remove(writer->part_path, NULL);
     if (writer->spill_path)
         strl_path_remove(writer->spill_path, NULL);
-    strl__table_writer_destroy(writer->placements);
-    strl__table_writer_destroy(writer->parts);
-    strl__table_writer_destroy(writer->materials);
+    strl__page_table_writer_destroy(writer->placements);
+    strl__page_table_writer_destroy(writer->parts);
+    strl__page_table_writer_destroy(writer->materials);
     strl__free(writer->trees);
     strl__free(writer->page.data);
     strl__free(writer->path);

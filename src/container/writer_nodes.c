@@ -36,8 +36,8 @@ strl_status strl__writing_close_page(strl_container_writer *writer, strl_error *
 }
 
 /* Reads records [first, first + count) from the spill into the treelet at `bytes`; children: ids [begin, end) of their children. */
-static strl_status gather(strl_container_writer *writer, uint32_t first, uint32_t count, uint8_t *bytes, uint64_t children[2],
-                          strl_error *err)
+static strl_status gather(strl_container_writer *writer, uint32_t first, uint32_t count, uint8_t *bytes,
+                          uint64_t children[2], strl_error *err)
 {
     uint8_t *records = bytes + STRL__TREELET_HEAD_BYTES;
     children[0] = children[1] = 0;
@@ -55,8 +55,8 @@ static strl_status gather(strl_container_writer *writer, uint32_t first, uint32_
     return status;
 }
 
-static strl_status write_treelet(strl_container_writer *writer, uint32_t index, uint32_t node_count, strl_treelet_ref *refs,
-                                 strl_error *err)
+static strl_status write_treelet(strl_container_writer *writer, uint32_t index, uint32_t node_count,
+                                 strl_treelet_ref *refs, strl_error *err)
 {
     uint8_t bytes[STRL__MAX_TREELET_BYTES];
     uint32_t first = index * STRL_TREELET_NODES, first_child_treelet, ref_count;
@@ -81,7 +81,8 @@ static strl_status write_treelet(strl_container_writer *writer, uint32_t index, 
     return strl__sink_append(&writer->sink, bytes, (uint32_t)(at - bytes), &refs[index], err);
 }
 
-strl_status strl__writing_treelets(strl_container_writer *writer, uint32_t node_count, strl_treelet_ref *root, strl_error *err)
+strl_status strl__writing_treelets(strl_container_writer *writer, uint32_t node_count, strl_treelet_ref *root,
+                                   strl_error *err)
 {
     uint32_t count = (node_count - 1) / STRL_TREELET_NODES + 1;
     strl_treelet_ref *refs = strl__alloc(count, sizeof *refs); /* 24 bytes for 128 nodes */
@@ -101,7 +102,8 @@ strl_status strl_container_writer_begin_tree(strl_container_writer *writer, cons
     uint32_t index = writer->header.info.tree_count;
     strl_status status = STRL_OK;
     if (writer->in_tree)
-        status = strl__fail(err, STRL_ERR_ARGUMENT, "tree %" PRIu32 " begins before the one before it has ended", index + 1);
+        status =
+            strl__fail(err, STRL_ERR_ARGUMENT, "tree %" PRIu32 " begins before the one before it has ended", index + 1);
     else if (index == STRL__MAX_TREES)
         status = strl__fail(err, STRL_ERR_LIMIT, "a container holds at most %u trees", STRL__MAX_TREES);
     else if (!strl__grow(&writer->trees, &writer->tree_capacity, (size_t)index + 1, sizeof *writer->trees))
@@ -128,16 +130,19 @@ static strl_status check_order(const strl_container_writer *writer, const strl_n
 {
     uint32_t id = writer->next_id;
     if (id > 0 && (node->level > writer->last_level || (id > 1 && node->parent < writer->last_parent)))
-        return strl__fail(err, STRL_ERR_ARGUMENT, "node %" PRIu32 ": level %" PRIu32 " and parent %" PRIu32
-                          " are not in breadth-first order after level %" PRIu32 " and parent %" PRIu32, id, node->level,
-                          node->parent, writer->last_level, writer->last_parent);
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "node %" PRIu32 ": level %" PRIu32 " and parent %" PRIu32
+                          " are not in breadth-first order after level %" PRIu32 " and parent %" PRIu32,
+                          id, node->level, node->parent, writer->last_level, writer->last_parent);
     if (node->child_count && node->first_child != writer->next_child)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "node %" PRIu32 ": first child is %" PRIu32 ", expected %" PRIu64
-                          " in breadth-first order", id, node->first_child, writer->next_child);
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "node %" PRIu32 ": first child is %" PRIu32 ", expected %" PRIu64 " in breadth-first order",
+                          id, node->first_child, writer->next_child);
     return STRL_OK;
 }
 
-static strl_status check_node(strl_container_writer *writer, const strl_node *node, uint32_t payload_bytes, strl_error *err)
+static strl_status check_node(strl_container_writer *writer, const strl_node *node, uint32_t payload_bytes,
+                              strl_error *err)
 {
     uint32_t id = writer->next_id;
     if (!writer->in_tree || id >= writer->trees[writer->header.info.tree_count].facts.node_count)
@@ -145,7 +150,8 @@ static strl_status check_node(strl_container_writer *writer, const strl_node *no
     strl_tree *facts = &writer->trees[writer->header.info.tree_count].facts;
     if (id == 0) {
         if (node->level >= STRL__MAX_LEVELS || node->level >= facts->node_count)
-            return strl__fail(err, STRL_ERR_ARGUMENT, "node 0: level is %" PRIu32 ", expected less than its tree's %" PRIu32 " nodes",
+            return strl__fail(err, STRL_ERR_ARGUMENT,
+                              "node 0: level is %" PRIu32 ", expected less than its tree's %" PRIu32 " nodes",
                               node->level, facts->node_count);
         facts->level_count = node->level + 1;
     }
@@ -155,8 +161,8 @@ static strl_status check_node(strl_container_writer *writer, const strl_node *no
     if (status == STRL_OK)
         status = check_order(writer, node, err);
     if (status == STRL_OK && (payload_bytes == 0 || payload_bytes > MAX_PAYLOAD_BYTES))
-        status = strl__fail(err, STRL_ERR_LIMIT, "node %" PRIu32 ": payload of %" PRIu32 " bytes, expected 1 to %u", id, payload_bytes,
-                            MAX_PAYLOAD_BYTES);
+        status = strl__fail(err, STRL_ERR_LIMIT, "node %" PRIu32 ": payload of %" PRIu32 " bytes, expected 1 to %u", id,
+                            payload_bytes, MAX_PAYLOAD_BYTES);
     return status;
 }
 
@@ -188,8 +194,8 @@ static void round_errors(strl_node *node)
         *errors[i] = strl__error_of_code(strl__code_of_error(*errors[i]));
 }
 
-static strl_status add_node(strl_container_writer *writer, const strl_node *record, const void *payload, uint32_t payload_bytes,
-                            strl_error *err)
+static strl_status add_node(strl_container_writer *writer, const strl_node *record, const void *payload,
+                            uint32_t payload_bytes, strl_error *err)
 {
     strl_status status = check_node(writer, record, payload_bytes, err);
     if (status != STRL_OK)
@@ -232,9 +238,10 @@ static strl_status end_tree(strl_container_writer *writer, strl_error *err)
         return strl__fail(err, STRL_ERR_ARGUMENT, "no tree has begun that could end");
     strl__written_tree *tree = &writer->trees[index];
     if (writer->next_id != tree->facts.node_count || writer->next_child != tree->facts.node_count)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "tree %" PRIu32 " ends after %" PRIu32 " nodes and %" PRIu64
-                          " announced by their parents, expected %" PRIu32, index, writer->next_id, writer->next_child,
-                          tree->facts.node_count);
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "tree %" PRIu32 " ends after %" PRIu32 " nodes and %" PRIu64
+                          " announced by their parents, expected %" PRIu32,
+                          index, writer->next_id, writer->next_child, tree->facts.node_count);
     strl_status status = strl__writing_close_page(writer, err);
     if (status == STRL_OK)
         status = strl__tree_check(&tree->facts, index, UINT64_MAX, err);

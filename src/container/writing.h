@@ -16,7 +16,7 @@ struct strl_container_writer {
     strl__sink sink;                     /* PATH.part */
     strl_file *spill;                    /* node records of the tree at hand, by id */
     strl__header header;
-    strl__table_writer *placements, *parts, *materials;
+    strl__page_table_writer *placements, *parts, *materials;
     strl__written_tree *trees; /* [tree_count], owned, up to STRL__MAX_TREES */
     size_t tree_capacity;
     bool bounds_begun;
@@ -27,7 +27,7 @@ struct strl_container_writer {
     uint32_t next_id;
     uint64_t next_child; /* first child that the next node with children must have */
     uint32_t last_level, last_parent;
-    strl_writer page;    /* payloads of the pending nodes */
+    strl_writer page; /* payloads of the pending nodes */
     uint32_t pending_count;
     uint32_t pending_decoded_bytes;
     strl_node pending[STRL__MAX_PAGE_NODES];
@@ -36,6 +36,7 @@ struct strl_container_writer {
 /* Writes the pending page and spills its records. */
 strl_status strl__writing_close_page(strl_container_writer *writer, strl_error *err);
 /* Reads the spilled records back and writes the treelets, last to first; root: the first one's place. */
-strl_status strl__writing_treelets(strl_container_writer *writer, uint32_t node_count, strl_treelet_ref *root, strl_error *err);
+strl_status strl__writing_treelets(strl_container_writer *writer, uint32_t node_count, strl_treelet_ref *root,
+                                   strl_error *err);
 
 #endif
