@@ -35,8 +35,21 @@ typedef struct fixture {
 static inline void fixture_mesh(const strl_node *node, uint32_t id, strl_arena *arena, strl_pm *pm)
 {
     uint32_t vertices = node->vertex_count, states = node->step_count + 1;
-    *pm = (strl_pm){vertices, node->triangle_count, node->step_count, 1 + id % 2, NULL, NULL, NULL, NULL,
-                    NULL,     NULL,                 NULL,             NULL,       NULL, NULL, NULL};
+    *pm = (strl_pm){vertices,
+                    node->triangle_count,
+                    node->step_count,
+                    1 + id % 2,
+                    NULL,
+                    NULL,
+                    NULL,
+                    NULL,
+                    NULL,
+                    NULL,
+                    NULL,
+                    NULL,
+                    NULL,
+                    NULL,
+                    NULL};
     pm->position = strl_arena_alloc_zero(arena, vertices, sizeof *pm->position);
     pm->normal = strl_arena_alloc_zero(arena, vertices, sizeof *pm->normal);
     pm->colour = id % 3 == 0 ? strl_arena_alloc_zero(arena, vertices, 4) : NULL;
@@ -161,11 +174,15 @@ static inline unsigned fixture_files(const fixture *self)
 
 static inline strl_tree fixture_tree(uint32_t node_count)
 {
-    return (strl_tree){.structure = STRL_STRUCTURE_CLUSTERS, .origin = {10, 20, 30}, .step = 0.25, .node_count = node_count,
+    return (strl_tree){.structure = STRL_STRUCTURE_CLUSTERS,
+                       .origin = {10, 20, 30},
+                       .step = 0.25,
+                       .node_count = node_count,
                        .leaf_geometric = 0.5f};
 }
 
-static inline strl_status fixture_add_node(strl_container_writer *writer, const strl_node *node, uint32_t id, strl_error *err)
+static inline strl_status fixture_add_node(strl_container_writer *writer, const strl_node *node, uint32_t id,
+                                           strl_error *err)
 {
     strl_arena arena;
     strl_arena_init(&arena, 0);
@@ -214,7 +231,12 @@ static inline strl_container_writer_desc fixture_desc(const fixture *self)
     return (strl_container_writer_desc){
         .path = self->path,
         .scratch_dir = self->folder,
-        .info = {.unit = "mm", .up_axis = 2, .has_colour = true, .triangles_in = 1234, .dropped_degenerate = 3, .closed_hint = 1},
+        .info = {.unit = "mm",
+                 .up_axis = 2,
+                 .has_colour = true,
+                 .triangles_in = 1234,
+                 .dropped_degenerate = 3,
+                 .closed_hint = 1},
     };
 }
 

@@ -63,8 +63,8 @@ static inline void reseal__table(reseal *self, uint64_t offset, uint32_t bytes, 
     if (!reseal__range(self, offset, bytes))
         return;
     uint64_t end = offset + bytes;
-    for (uint64_t at = offset + STRL__INDEX_HEAD_BYTES; depth && depth < 4 && at < end && end - at >= STRL__TABLE_REF_BYTES;
-         at += STRL__TABLE_REF_BYTES)
+    for (uint64_t at = offset + STRL__INDEX_HEAD_BYTES;
+         depth && depth < 4 && at < end && end - at >= STRL__TABLE_REF_BYTES; at += STRL__TABLE_REF_BYTES)
         reseal__table(self, reseal__get(self, at, 8), (uint32_t)reseal__get(self, at + 24, 4), at + 16, depth - 1);
     reseal__store(self, checksum_at, offset, bytes);
 }
@@ -74,8 +74,8 @@ static inline void reseal__trees(reseal *self, uint64_t offset, uint32_t bytes, 
     if (!reseal__range(self, offset, bytes))
         return;
     for (uint32_t at = 0; bytes - at >= STRL__TREE_BYTES; at += STRL__TREE_BYTES)
-        reseal__treelet(self, reseal__get(self, offset + at + 120, 8), (uint32_t)reseal__get(self, offset + at + 128, 4),
-                        offset + at + 136, 8);
+        reseal__treelet(self, reseal__get(self, offset + at + 120, 8),
+                        (uint32_t)reseal__get(self, offset + at + 128, 4), offset + at + 136, 8);
     reseal__store(self, checksum_at, offset, bytes);
 }
 

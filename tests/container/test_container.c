@@ -445,7 +445,11 @@ static void long_and_broken_names_are_stored_as_utf8(void **state)
     assert_ok(strl_container_writer_end_tree(writer, &err), &err);
     for (int i = 0; i < 5000; i++)
         assert_ok(strl_container_writer_add_part(writer, longest, &err), &err);
-    assert_ok(strl_container_writer_add_part(writer, "a\xff" "b\xc3(\xed\xa0\x80\xf0\x9f\x8f\xa0", &err), &err);
+    assert_ok(strl_container_writer_add_part(writer,
+                                             "a\xff"
+                                             "b\xc3(\xed\xa0\x80\xf0\x9f\x8f\xa0",
+                                             &err),
+              &err);
     assert_ok(strl_container_writer_finish(writer, &bytes, &err), &err);
     strl_container_writer_destroy(writer);
     strl_container *container = open_fixture(&self);
@@ -544,7 +548,8 @@ static void a_cut_draws_the_coarsest_state_within_the_length(void **state)
     uint32_t vertex_end[] = {3, 4, 5};
     float errors[] = {4, 2, 1};
     uint16_t parent[] = {0, 0, 0, 2, 3}, map[5];
-    const strl_pm mesh = {.vertex_count = 5, .step_count = 2, .vertex_end = vertex_end, .geometric_error = errors, .parent = parent};
+    const strl_pm mesh = {
+        .vertex_count = 5, .step_count = 2, .vertex_end = vertex_end, .geometric_error = errors, .parent = parent};
     strl_cut cut = {.limit = 4};
     assert_int_equal(strl_cut_state(&cut, &mesh), 0);
     cut.limit = 3.9;
