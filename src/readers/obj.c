@@ -282,6 +282,9 @@ static strl_status name_face(strl_reader *reader, strl_error *err)
 
 static strl_status index_fail(strl_reader *reader, const char *what, int64_t found, uint64_t count, strl_error *err)
 {
+    strl_status failed = strl__input_status(&reader->input, err);
+    if (failed)
+        return failed;
     return strl__fail(err, STRL_ERR_FORMAT, "%s, line %" PRIu64 ": expected the index of one of %" PRIu64
                       " %s, found %" PRId64, reader->path, reader->input.line, count, what, found);
 }

@@ -93,6 +93,9 @@ static strl_status value_fail(strl_reader *reader, const char *what, uint64_t li
 {
     ply_state *ply = reader->state;
     uint64_t place = ply->header.ascii ? reader->input.line : strl__input_offset(&reader->input);
+    strl_status failed = strl__input_status(&reader->input, err);
+    if (failed)
+        return failed;
     return strl__fail(err, STRL_ERR_FORMAT, "%s, %s %" PRIu64 ": expected %s below %" PRIu64 ", found %.17g",
                       reader->path, ply->header.ascii ? "line" : "before byte", place, what, limit, found);
 }

@@ -226,5 +226,6 @@ strl_status strl__ply_header_read(strl__ply_header *header, strl__input *input, 
     end_header(input, first_line_end);
     header->data_offset = strl__input_offset(input);
     header->data_line = input->line;
-    return check_counts(header, input, err);
+    strl_status failed = strl__input_status(input, err);
+    return failed ? failed : check_counts(header, input, err);
 }
