@@ -164,6 +164,7 @@ static strl_status check_counts(const strl_node *node, uint32_t id, const strl_t
         const char *what;
         uint64_t value, most;
     } rules[] = {
+        {"the level", node->level, tree->level_count - 1},
         {"the group", node->group, tree->group_count - 1},
         {"the group's size", node->group_size, tree->node_count},
         {"the rung", node->rung, STRL_RUNG_CLUSTERING},

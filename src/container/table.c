@@ -6,7 +6,8 @@
 #include "base/fail.h"
 #include "base/hash.h"
 
-static strl_status page_fault(const strl__table *table, const strl__page_table_page *page, const char *what, strl_error *err)
+static strl_status page_fault(const strl__table *table, const strl__page_table_page *page, const char *what,
+                              strl_error *err)
 {
     return strl__fail(err, STRL_ERR_FORMAT,
                       "table of %s, page at byte %" PRIu64 " of %" PRIu32 " bytes for items %" PRIu64 " to %" PRIu64
@@ -83,7 +84,8 @@ static strl_status load(strl__table *table, unsigned depth, strl_source *source,
 }
 
 /* The reference of an index page that leads to item `index`; narrows [*first, *end) to what lies below it. */
-static void descend(const strl__page_table_page *page, uint64_t index, strl_treelet_ref *ref, uint64_t *first, uint64_t *end)
+static void descend(const strl__page_table_page *page, uint64_t index, strl_treelet_ref *ref, uint64_t *first,
+                    uint64_t *end)
 {
     uint64_t low = 0, high = strl__load_le(page->data, 4);
     while (high - low > 1) {
@@ -103,7 +105,7 @@ static void descend(const strl__page_table_page *page, uint64_t index, strl_tree
 }
 
 strl_status strl__page_table_get(strl__table *table, strl_source *source, uint64_t index, const uint8_t **item,
-                            uint32_t *bytes, strl_error *err)
+                                 uint32_t *bytes, strl_error *err)
 {
     *item = NULL;
     *bytes = 0;

@@ -21,11 +21,11 @@ strl_status strl__page_table_writer_create(strl__page_table_writer **table, strl
 void strl__page_table_writer_destroy(strl__page_table_writer *table); /* NULL is legal */
 uint64_t strl__page_table_writer_count(const strl__page_table_writer *table);
 /* The item is head followed by body; together at most STRL__MAX_NAME_BYTES + 4. */
-strl_status strl__page_table_writer_add(strl__page_table_writer *table, strl__sink *sink, const void *head, uint32_t head_bytes,
-                                   const void *body, uint32_t body_bytes, strl_error *err);
+strl_status strl__page_table_writer_add(strl__page_table_writer *table, strl__sink *sink, const void *head,
+                                        uint32_t head_bytes, const void *body, uint32_t body_bytes, strl_error *err);
 /* Writes what is pending; section gets depth, count and root. At least one item was added. */
 strl_status strl__page_table_writer_finish(strl__page_table_writer *table, strl__sink *sink, strl__section *section,
-                                      strl_error *err);
+                                           strl_error *err);
 
 /* Looks items up, keeping one page of each depth. Zero-initialise but for name and section. */
 typedef struct strl__page_table_page {
@@ -42,7 +42,7 @@ typedef struct strl__table {
 
 /* *item is borrowed until the next call. */
 strl_status strl__page_table_get(strl__table *table, strl_source *source, uint64_t index, const uint8_t **item,
-                            uint32_t *bytes, strl_error *err);
+                                 uint32_t *bytes, strl_error *err);
 void strl__page_table_deinit(strl__table *table);
 
 #endif

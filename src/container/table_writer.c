@@ -55,8 +55,8 @@ uint64_t strl__page_table_writer_count(const strl__page_table_writer *table)
     return table->item_count;
 }
 
-static strl_status add_ref(strl__page_table_writer *table, strl__sink *sink, unsigned level, const strl_treelet_ref *ref,
-                           uint64_t first_item, strl_error *err);
+static strl_status add_ref(strl__page_table_writer *table, strl__sink *sink, unsigned level,
+                           const strl_treelet_ref *ref, uint64_t first_item, strl_error *err);
 
 /* Turns the pending references of `level` into one index page. */
 static strl_status flush_list(strl__page_table_writer *table, strl__sink *sink, unsigned level, strl_error *err)
@@ -75,8 +75,8 @@ static strl_status flush_list(strl__page_table_writer *table, strl__sink *sink, 
     return add_ref(table, sink, level + 1, &ref, first_item, err);
 }
 
-static strl_status add_ref(strl__page_table_writer *table, strl__sink *sink, unsigned level, const strl_treelet_ref *ref,
-                           uint64_t first_item, strl_error *err)
+static strl_status add_ref(strl__page_table_writer *table, strl__sink *sink, unsigned level,
+                           const strl_treelet_ref *ref, uint64_t first_item, strl_error *err)
 {
     ref_list *list = &table->lists[level];
     if (level == LEVELS - 1 && list->count)
@@ -115,8 +115,8 @@ static strl_status flush_leaf(strl__page_table_writer *table, strl__sink *sink, 
     return STRL_OK;
 }
 
-strl_status strl__page_table_writer_add(strl__page_table_writer *table, strl__sink *sink, const void *head, uint32_t head_bytes,
-                                   const void *body, uint32_t body_bytes, strl_error *err)
+strl_status strl__page_table_writer_add(strl__page_table_writer *table, strl__sink *sink, const void *head,
+                                        uint32_t head_bytes, const void *body, uint32_t body_bytes, strl_error *err)
 {
     uint64_t used = 4 + 4 * ((uint64_t)table->leaf_count + 1) + table->leaf_bytes;
     if (used + head_bytes + body_bytes > STRL__TABLE_PAGE_BYTES) {
@@ -143,7 +143,7 @@ static void read_only_ref(const ref_list *list, strl_treelet_ref *ref)
 }
 
 strl_status strl__page_table_writer_finish(strl__page_table_writer *table, strl__sink *sink, strl__section *section,
-                                      strl_error *err)
+                                           strl_error *err)
 {
     strl_status status = table->leaf_count ? flush_leaf(table, sink, err) : STRL_OK;
     for (unsigned level = 0; status == STRL_OK && level < LEVELS; level++) {

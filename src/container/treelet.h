@@ -34,8 +34,9 @@ strl_status strl_page_check(const strl_page_ref *ref, const void *data, size_t s
 /* Decodes one node's mesh from its page (already checked) and checks it against the record (counts, box, errors). */
 strl_status strl_page_mesh(const strl_node *record, const void *page, size_t size, strl_arena *arena, strl_pm *mesh,
                            strl_error *err);
-/* Bytes that the decoded mesh of a node takes in a walk: vertices (20 B), indices of the finest state, parents, steps and corner lists.
- * A pure function of the record's counts, used for budgets before anything is fetched. */
+/* Bytes that the decoded mesh of a node takes in a walk: per vertex 20 for itself and 10 for its parent and the corners that it
+ * moves, per triangle 6 for its corners, 6 for indices and 12 for lists of corners, 16 per state. A pure function of the record's
+ * counts (docs/format.md has it), used for budgets before anything is fetched. */
 uint64_t strl_node_decoded_bytes(const strl_node *record);
 
 #endif

@@ -301,6 +301,7 @@ static void update_golden(void)
     assert_non_null(copy);
     json_t *refused = json_object(), *expected = json_pack("{s:o}", "v1-small.stroll", describe(bytes, size));
     store("v1-small.stroll", bytes, size);
+    store("../../../fuzz/corpus/container/v1-small.stroll", bytes, size);
     for (size_t i = 0; i < DAMAGES; i++) {
         const damage *what = &damages[i];
         memcpy(copy, bytes, size);
@@ -317,6 +318,7 @@ static void update_golden(void)
     free(bytes);
     bytes = make_container(6, &size); /* 136 nodes: two treelets */
     store("v1-treelets.stroll", bytes, size);
+    store("../../../fuzz/corpus/container/v1-treelets.stroll", bytes, size);
     json_object_set_new(expected, "v1-treelets.stroll", describe(bytes, size));
     char path[512];
     golden_path(path, "expected.json");

@@ -1,0 +1,348 @@
+/* stroll extract: a uniform cut as one PLY file. Vertices stream into the file, triangles into a spill beside it, because PLY
+ * wants all vertices first; then the triangles follow and the counts are put into the header's reserved places. */
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/cursor.h"
+#include "base/fail.h"
+#include "container/container.h"
+#include "container/cut.h"
+#include "geometry/octahedral.h"
+#include "options.h"
+#include "platform/file.h"
+#include "progress.h"
+
+#define COPY_BYTES ((size_t)1 << 20)
+#define TRIANGLE_BYTES 13u /* u8 count, 3 u32 */
+
+typedef struct extraction {
+    strl_container *container; /* owned, as all below */
+    char *part_path, *spill_path;
+    strl_file *out, *spill;
+    strl_writer vertices, triangles; /* of the node at hand */
+    uint16_t *map;
+    strl_arena arena;
+    const char *path;
+    double length;
+    bool wide; /* positions as double */
+    bool colour;
+    bool part_made; /* the file under its temporary name is ours to remove */
+    uint64_t out_bytes, spill_bytes, vertex_count, triangle_count, node_count;
+    strl_cli_progress line;
+} extraction;
+
+/* Floats do where they tell neighbouring lattice cells apart, everywhere in the placed model. */
+static bool needs_doubles(strl_container *container)
+{
+    const double *bounds = strl_container_get_info(container)->bounds;
+    double reach = 0, step = INFINITY;
+    for (int i = 0; i < 6; i++)
+        reach = fmax(reach, fabs(bounds[i]));
+    for (uint32_t tree = 0; tree < strl_container_get_info(container)->tree_count; tree++)
+        step = fmin(step, strl_container_tree(container, tree)->step);
+    return reach > step * 0x1p23;
+}
+
+/* Written twice: with placeholders to reserve the room, then with the counts, padded by a comment to the same length. */
+static strl_status write_header(extraction *self, uint64_t *bytes, strl_error *err)
+{
+    char text[1024], fill[64];
+    const char *type = self->wide ? "double" : "float";
+    int digits = snprintf(NULL, 0, "%" PRIu64 "%" PRIu64, self->vertex_count, self->triangle_count);
+    memset(fill, '.', sizeof fill);
+    int length = snprintf(
+        text, sizeof text,
+        "ply\nformat binary_little_endian 1.0\ncomment extracted by stroll %.*s\nelement vertex %" PRIu64
+        "\nproperty %s x\nproperty %s y\nproperty %s z\n"
+        "property float nx\nproperty float ny\nproperty float nz\n%selement face %" PRIu64
+        "\nproperty list uchar uint vertex_indices\nend_header\n",
+        40 - digits, fill, self->vertex_count, type, type, type,
+        self->colour ? "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\n" : "",
+        self->triangle_count);
+    *bytes = (uint64_t)length;
+    return strl_file_write(self->out, 0, text, (size_t)length, err);
+}
+
+static strl_status open_output(extraction *self, strl_error *err)
+{
+    size_t length = strlen(self->path);
+    self->part_path = malloc(length + 8);
+    self->spill_path = malloc(length + 8);
+    if (!self->part_path || !self->spill_path)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory to write %s", self->path);
+    snprintf(self->part_path, length + 8, "%s.part", self->path);
+    snprintf(self->spill_path, length + 8, "%s.faces", self->path);
+    strl_status status = strl_file_create(self->part_path, &self->out, err);
+    self->part_made = status == STRL_OK;
+    if (status == STRL_OK)
+        status = strl_file_create(self->spill_path, &self->spill, err);
+    if (status == STRL_OK)
+        status = write_header(self, &self->out_bytes, err);
+    return status;
+}
+
+/* What a vertex of this placement needs beside the mesh. */
+typedef struct frame_facts {
+    const strl_tree *tree;
+    const double *transform;
+    double normal[3][3]; /* cofactors: turns normals as the transform turns planes, up to length */
+    bool mirrors;        /* the transform turns triangles over */
+    bool as_it_is;       /* the transform is the identity */
+} frame_facts;
+
+static void prepare_frame(frame_facts *frame, const strl_tree *tree, const double transform[12])
+{
+    static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    frame->tree = tree;
+    frame->transform = transform;
+    frame->as_it_is = true;
+    for (int i = 0; i < 12; i++)
+        frame->as_it_is = frame->as_it_is && transform[i] == identity[i];
+    double determinant = 0;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+            int a = (i + 1) % 3, b = (i + 2) % 3, c = (j + 1) % 3, d = (j + 2) % 3;
+            frame->normal[i][j] =
+                transform[4 * a + c] * transform[4 * b + d] - transform[4 * a + d] * transform[4 * b + c];
+            determinant += i == 0 ? transform[j] * frame->normal[0][j] : 0;
+        }
+    frame->mirrors = determinant < 0;
+}
+
+static void put_position(extraction *self, const frame_facts *frame, const int64_t cell[3])
+{
+    double model[3], world[3];
+    for (int axis = 0; axis < 3; axis++)
+        model[axis] = frame->tree->origin[axis] + frame->tree->step * (double)cell[axis];
+    for (int axis = 0; axis < 3; axis++) {
+        const double *row = frame->transform + (ptrdiff_t)4 * axis;
+        world[axis] =
+            frame->as_it_is ? model[axis] : row[0] * model[0] + row[1] * model[1] + row[2] * model[2] + row[3];
+        if (self->wide)
+            strl_writer_f64(&self->vertices, world[axis]);
+        else
+            strl_writer_f32(&self->vertices, (float)world[axis]);
+    }
+}
+
+static void put_normal(extraction *self, const frame_facts *frame, const uint16_t code[2])
+{
+    float normal[3];
+    strl_oct_decode(code, normal);
+    double turned[3], length = 0, sign = frame->mirrors ? -1 : 1;
+    for (int i = 0; i < 3; i++) {
+        turned[i] = sign * (frame->normal[i][0] * (double)normal[0] + frame->normal[i][1] * (double)normal[1] +
+                            frame->normal[i][2] * (double)normal[2]);
+        length += turned[i] * turned[i];
+    }
+    length = length > 0 ? sqrt(length) : 1;
+    for (int i = 0; i < 3; i++)
+        strl_writer_f32(&self->vertices, frame->as_it_is ? normal[i] : (float)(turned[i] / length));
+}
+
+static void put_colour(extraction *self, const strl_pm *mesh, uint32_t vertex)
+{
+    uint32_t own = mesh->colour ? mesh->colour[vertex] : 0xffffffff;
+    uint32_t material = mesh->palette[mesh->palette_index ? mesh->palette_index[vertex] : 0].rgba;
+    for (unsigned shift = 0; shift < 32; shift += 8) {
+        uint32_t product = (own >> shift & 255) * (material >> shift & 255);
+        strl_writer_u8(&self->vertices, (uint8_t)((product + 127) / 255));
+    }
+}
+
+static void put_triangle(extraction *self, const frame_facts *frame, const strl_pm *mesh, uint32_t triangle)
+{
+    strl_writer_u8(&self->triangles, 3);
+    for (unsigned k = 0; k < 3; k++) {
+        uint16_t corner = mesh->triangle[triangle][frame->mirrors ? 2 - k : k];
+        strl_writer_u32(&self->triangles, (uint32_t)self->vertex_count + self->map[corner]);
+    }
+}
+
+static strl_status flush(strl_writer *writer, strl_file *file, uint64_t *bytes, strl_error *err)
+{
+    if (writer->failed)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node's part of %s", strl_file_path(file));
+    strl_status status = strl_file_write(file, *bytes, writer->data, writer->size, err);
+    *bytes += writer->size;
+    writer->size = 0;
+    return status;
+}
+
+static strl_status write_state(extraction *self, const frame_facts *frame, const strl_node *node, const strl_pm *mesh,
+                               uint32_t state, strl_error *err)
+{
+    uint32_t vertices = mesh->vertex_end[state], triangles = mesh->triangle_end[state];
+    if (self->vertex_count + vertices > UINT32_MAX)
+        return strl__fail(err, STRL_ERR_LIMIT,
+                          "the cut has more vertices than a PLY file can number (2^32); ask for a larger error");
+    strl_cut_resolve(mesh, state, self->map);
+    for (uint32_t vertex = 0; vertex < vertices; vertex++) {
+        int64_t cell[3];
+        for (int axis = 0; axis < 3; axis++)
+            cell[axis] = node->anchor[axis] + mesh->position[vertex][axis];
+        put_position(self, frame, cell);
+        put_normal(self, frame, mesh->normal[vertex]);
+        if (self->colour)
+            put_colour(self, mesh, vertex);
+    }
+    for (uint32_t triangle = 0; triangle < triangles; triangle++)
+        put_triangle(self, frame, mesh, triangle);
+    self->vertex_count += vertices;
+    self->triangle_count += triangles;
+    self->node_count++;
+    strl_status status = flush(&self->vertices, self->out, &self->out_bytes, err);
+    return status == STRL_OK ? flush(&self->triangles, self->spill, &self->spill_bytes, err) : status;
+}
+
+static strl_status extract_placement(extraction *self, const strl_placement *placement, strl_error *err)
+{
+    const strl_tree *tree = strl_container_tree(self->container, placement->tree);
+    double stretch = strl_transform_stretch(placement->transform);
+    frame_facts frame;
+    strl_cut cut;
+    prepare_frame(&frame, tree, placement->transform);
+    strl_cut_init(&cut, self->container, placement->tree, stretch > 0 ? self->length / stretch : self->length);
+    for (;;) {
+        uint32_t id;
+        strl_node node;
+        strl_pm mesh;
+        strl_arena_mark mark = strl_arena_get_mark(&self->arena);
+        strl_status status = strl_cut_next(&cut, &id, &node, err);
+        if (status != STRL_OK || id == STRL_NONE)
+            return status;
+        status = strl_container_mesh(self->container, placement->tree, &node, &self->arena, &mesh, err);
+        if (status == STRL_OK)
+            status = write_state(self, &frame, &node, &mesh, strl_cut_state(&cut, &mesh), err);
+        strl_arena_rewind(&self->arena, mark);
+        if (status != STRL_OK)
+            return status;
+        strl_cli_progress_update(&self->line, "extract", id + 1, tree->node_count, "nodes");
+    }
+}
+
+static strl_status append_triangles(extraction *self, strl_error *err)
+{
+    uint8_t *buffer = malloc(COPY_BYTES);
+    strl_status status =
+        buffer ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory to copy triangles into %s", self->path);
+    for (uint64_t at = 0; status == STRL_OK && at < self->spill_bytes;) {
+        uint64_t left = self->spill_bytes - at;
+        size_t step = left < COPY_BYTES ? (size_t)left : COPY_BYTES;
+        status = strl_file_read(self->spill, at, buffer, step, err);
+        if (status == STRL_OK)
+            status = strl_file_write(self->out, self->out_bytes + at, buffer, step, err);
+        strl_file_punch(self->spill, at, step);
+        at += step;
+        strl_cli_progress_update(&self->line, "triangles", at / TRIANGLE_BYTES, self->triangle_count, "triangles");
+    }
+    free(buffer);
+    return status;
+}
+
+static strl_status finish(extraction *self, strl_error *err)
+{
+    uint64_t header_bytes;
+    strl_status status = append_triangles(self, err);
+    if (status == STRL_OK)
+        status = write_header(self, &header_bytes, err);
+    if (status == STRL_OK) {
+        strl_file *file = self->out;
+        self->out = NULL;
+        status = strl_file_close(file, err);
+    }
+    return status == STRL_OK ? strl_path_rename(self->part_path, self->path, err) : status;
+}
+
+static strl_status extract(extraction *self, strl_error *err)
+{
+    const strl_container_info *info = strl_container_get_info(self->container);
+    self->wide = needs_doubles(self->container);
+    self->colour = info->has_colour;
+    self->map = malloc(STRL_PM_MAX_VERTICES * sizeof *self->map);
+    strl_status status = self->map ? open_output(self, err)
+                                   : strl__fail(err, STRL_ERR_MEMORY, "no memory to extract into %s", self->path);
+    for (uint64_t i = 0; status == STRL_OK && i < info->placement_count; i++) {
+        strl_placement placement;
+        status = strl_container_placement(self->container, i, &placement, err);
+        if (status == STRL_OK)
+            status = extract_placement(self, &placement, err);
+    }
+    return status == STRL_OK ? finish(self, err) : status;
+}
+
+static void release(extraction *self, bool failed)
+{
+    strl_cli_progress_end(&self->line);
+    if (failed && self->part_made)
+        strl_path_remove(self->part_path, NULL);
+    if (self->spill)
+        strl_path_remove(self->spill_path, NULL);
+    strl_file_close(self->out, NULL);
+    strl_file_close(self->spill, NULL);
+    strl__free(self->vertices.data);
+    strl__free(self->triangles.data);
+    strl_arena_deinit(&self->arena);
+    strl_container_close(self->container);
+    free(self->map);
+    free(self->part_path);
+    free(self->spill_path);
+}
+
+static strl_status refuse_own_input(const char *model, const char *path, strl_error *err)
+{
+    strl_file_info input, output;
+    if (strl_path_stat(model, &input, NULL) == STRL_OK && strl_path_stat(path, &output, NULL) == STRL_OK &&
+        input.device == output.device && input.inode == output.inode)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "%s is the model itself and would be overwritten", path);
+    return STRL_OK;
+}
+
+static int run(strl_cli_args *args)
+{
+    extraction self = {0};
+    strl_cli_list models;
+    const strl_cli_option options[] = {
+        {.name = "error",
+         .letter = 'e',
+         .kind = STRL_CLI_REAL,
+         .value = &self.length,
+         .argument = "LENGTH",
+         .required = true,
+         .help = "largest geometric error, model units; 0 = the finest level",
+         .least = 0,
+         .most = 1e300},
+        {.name = "output",
+         .letter = 'o',
+         .kind = STRL_CLI_STRING,
+         .value = &self.path,
+         .argument = "FILE.ply",
+         .required = true,
+         .help = "the PLY file to write"},
+    };
+    const strl_cli_usage usage = {
+        .positional = "MODEL", .least = 1, .most = 1, .options = options, .option_count = STRL_CLI_COUNT_OF(options)};
+    int stop = strl_cli_parse(args, &usage, &models);
+    if (stop >= 0)
+        return stop;
+    strl_error err;
+    strl_arena_init(&self.arena, 0);
+    strl_cli_progress_init(&self.line, args->quiet);
+    strl_status status = refuse_own_input(models.items[0], self.path, &err);
+    if (status == STRL_OK)
+        status = strl_container_open_path(models.items[0], &self.container, &err);
+    if (status == STRL_OK)
+        status = extract(&self, &err);
+    release(&self, status != STRL_OK);
+    if (status != STRL_OK)
+        return strl_cli_fail(&err);
+    if (!args->quiet)
+        printf("%s: %" PRIu64 " triangles, %" PRIu64 " vertices from %" PRIu64 " nodes\n", self.path,
+               self.triangle_count, self.vertex_count, self.node_count);
+    return 0;
+}
+
+STRL_CLI_COMMAND(extract, "writes the coarsest mesh within an error as PLY", run);
