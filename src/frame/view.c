@@ -10,6 +10,17 @@
 /* Factor on a pixel error that covers the rounding of its own arithmetic. */
 #define ROUND_UP (1 + 1e-12)
 
+/* fmin and fmax without their care for NaN, which costs a call: boxes and cameras are finite here. */
+static double lesser(double a, double b)
+{
+    return a < b ? a : b;
+}
+
+static double greater(double a, double b)
+{
+    return a > b ? a : b;
+}
+
 static double dot(const double a[3], const double b[3])
 {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -82,13 +93,14 @@ bool strl_view_init(strl_view *view, const strl_camera *camera)
 }
 
 /* The least and largest of dot(axis, p - eye) over the box. */
-static void extent_along(const strl_view *view, const strl_box *box, const double axis[3], double *least, double *largest)
+static void extent_along(const strl_view *view, const strl_box *box, const double axis[3], double *least,
+                         double *largest)
 {
     *least = *largest = 0;
     for (int i = 0; i < 3; i++) {
         double a = axis[i] * (box->min[i] - view->eye[i]), b = axis[i] * (box->max[i] - view->eye[i]);
-        *least += fmin(a, b);
-        *largest += fmax(a, b);
+        *least += lesser(a, b);
+        *largest += greater(a, b);
     }
 }
 
@@ -114,7 +126,8 @@ bool strl_view_sees(const strl_view *view, const strl_box *box)
     if (largest < 0)
         return false;
     if (!view->orthographic)
-        return !beyond_side(view, box, view->right, 1, view->tan_x) && !beyond_side(view, box, view->right, -1, view->tan_x) &&
+        return !beyond_side(view, box, view->right, 1, view->tan_x) &&
+               !beyond_side(view, box, view->right, -1, view->tan_x) &&
                !beyond_side(view, box, view->up, 1, view->tan_y) && !beyond_side(view, box, view->up, -1, view->tan_y);
     extent_along(view, box, view->right, &least, &largest);
     double half_width = view->half_width * (1 + WIDEN), half_height = view->half_height * (1 + WIDEN);
@@ -132,9 +145,9 @@ typedef struct seen {
 
 static void see(seen *all, const double p[3])
 {
-    all->least_z = fmin(all->least_z, p[2]);
+    all->least_z = lesser(all->least_z, p[2]);
     if (p[2] > 0)
-        all->largest_slope = fmax(all->largest_slope, (p[0] * p[0] + p[1] * p[1]) / (p[2] * p[2]));
+        all->largest_slope = greater(all->largest_slope, (p[0] * p[0] + p[1] * p[1]) / (p[2] * p[2]));
 }
 
 /* Cuts the parameter range [*t0, *t1] to where a + t (b - a) >= 0. False where nothing is left. */
@@ -143,9 +156,9 @@ static bool cut(double a, double b, double *t0, double *t1)
     if (a < 0 && b < 0)
         return false;
     if (a < 0)
-        *t0 = fmax(*t0, a / (a - b));
+        *t0 = greater(*t0, a / (a - b));
     else if (b < 0)
-        *t1 = fmin(*t1, a / (a - b));
+        *t1 = lesser(*t1, a / (a - b));
     return *t0 <= *t1;
 }
 
@@ -153,8 +166,10 @@ static bool cut(double a, double b, double *t0, double *t1)
 static void see_segment(const strl_view *view, const double p[3], const double q[3], seen *all)
 {
     double t0 = 0, t1 = 1, wide_x = view->tan_x * (1 + WIDEN), wide_y = view->tan_y * (1 + WIDEN);
-    if (!cut(wide_x * p[2] - p[0], wide_x * q[2] - q[0], &t0, &t1) || !cut(wide_x * p[2] + p[0], wide_x * q[2] + q[0], &t0, &t1) ||
-        !cut(wide_y * p[2] - p[1], wide_y * q[2] - q[1], &t0, &t1) || !cut(wide_y * p[2] + p[1], wide_y * q[2] + q[1], &t0, &t1))
+    if (!cut(wide_x * p[2] - p[0], wide_x * q[2] - q[0], &t0, &t1) ||
+        !cut(wide_x * p[2] + p[0], wide_x * q[2] + q[0], &t0, &t1) ||
+        !cut(wide_y * p[2] - p[1], wide_y * q[2] - q[1], &t0, &t1) ||
+        !cut(wide_y * p[2] + p[1], wide_y * q[2] + q[1], &t0, &t1))
         return;
     const double ends[2] = {t0, t1};
     for (int e = 0; e < 2; e++) {
@@ -177,8 +192,8 @@ static void see_corner_ray(const strl_view *view, const strl_box *box, double x,
                 return;
             continue;
         }
-        t0 = fmax(t0, fmin(a / way, b / way));
-        t1 = fmin(t1, fmax(a / way, b / way));
+        t0 = greater(t0, lesser(a / way, b / way));
+        t1 = lesser(t1, greater(a / way, b / way));
     }
     if (t0 > t1)
         return;
@@ -226,17 +241,33 @@ static seen see_box(const strl_view *view, const strl_box *box)
 
 /* error focal |p| / (z (z - error)) is at most focal error x max(|p| / z) / (min z - error). |p| / z is convex in the image plane, so its
  * largest value over a polytope is at a vertex; min z is too. Both only shrink with the box: nested boxes have ordered bounds. */
+strl_sight strl_view_sight(const strl_view *view, const strl_box *box)
+{
+    strl_sight sight = {
+        .seen = strl_view_sees(view, box), .orthographic = view->orthographic, .focal_px = view->focal_px};
+    sight.empty = !sight.seen;
+    if (!sight.seen || view->orthographic)
+        return sight;
+    seen all = see_box(view, box);
+    sight.empty = all.least_z == INFINITY;
+    sight.nearest = all.least_z;
+    sight.slope = lesser(sqrt(1 + all.largest_slope), view->corner * (1 + WIDEN));
+    return sight;
+}
+
+double strl_sight_error_px(const strl_sight *sight, double error)
+{
+    if (sight->empty)
+        return 0;
+    if (sight->orthographic)
+        return error * sight->focal_px;
+    if (!(sight->nearest - error > 0))
+        return INFINITY;
+    return error * sight->focal_px * sight->slope / (sight->nearest - error) * ROUND_UP;
+}
+
 double strl_view_error_px(const strl_view *view, const strl_box *box, double error)
 {
-    if (!strl_view_sees(view, box))
-        return 0;
-    if (view->orthographic)
-        return error * view->focal_px;
-    seen all = see_box(view, box);
-    if (all.least_z == INFINITY)
-        return 0;
-    if (!(all.least_z - error > 0))
-        return INFINITY;
-    double slope = fmin(sqrt(1 + all.largest_slope), view->corner * (1 + WIDEN));
-    return error * view->focal_px * slope / (all.least_z - error) * ROUND_UP;
+    const strl_sight sight = strl_view_sight(view, box);
+    return strl_sight_error_px(&sight, error);
 }

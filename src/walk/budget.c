@@ -1,12 +1,14 @@
-/* The allowed error under a tight budget. It moves on a geometric scale of quarter octaves: up at once where the wanted cut
- * does not fit, down by a step a frame where the finer cut would leave some room, so that it does not swing. All bytes
- * are known from records, before anything is fetched. */
+/* The allowed error under a tight budget. It moves on a geometric scale of quarter octaves: up at
+ * once where the wanted cut does not fit, down by a step a frame where the finer cut would leave
+ * some room, so that it does not swing. All bytes are known from records, before anything is
+ * fetched. */
 #include "walk/internal.h"
 
 #include <math.h>
 
 #define STEPS_PER_OCTAVE 4.0
-/* Beyond 2^16 times the error the cut simply stops where memory does: next to the eye the error has no bound. */
+/* Beyond 2^16 times the error the cut simply stops where memory does: next to the eye the error has
+ * no bound. */
 #define MOST_COARSENING 64u
 /* A finer cut must fit into this share of what there is. */
 #define REFINE_SHARE 0.9
@@ -18,11 +20,13 @@ static double allowed_px(const strl_walk *walk, uint32_t coarsening)
     return walk->error_px * exp2(coarsening / STEPS_PER_OCTAVE);
 }
 
-static strl_status run_at(strl_walk *walk, const strl_view *view, strl__cut_kind kind, uint32_t coarsening, double share,
-                          strl__cut *cut, strl_error *err)
+static strl_status run_at(strl_walk *walk, const strl_view *view, strl__cut_kind kind, uint32_t coarsening,
+                          double share, strl__cut *cut, strl_error *err)
 {
     uint64_t capacity = walk->memory_bytes - walk->treelet_bytes;
-    *cut = (strl__cut){.kind = kind, .view = view, .allowed_px = allowed_px(walk, coarsening),
+    *cut = (strl__cut){.kind = kind,
+                       .view = view,
+                       .allowed_px = allowed_px(walk, coarsening),
                        .capacity_bytes = share < 1 ? (uint64_t)(share * (double)capacity) : capacity,
                        .stop_at_capacity = kind == STRL__CUT_FRONT && coarsening == MOST_COARSENING};
     return strl__cut_run(walk, cut, err);

@@ -9,7 +9,7 @@
 /* The eye may stand inside a box; the depth buffer still wants a near plane before it. */
 #define LEAST_NEAR 1e-6
 
-static strl_draw_item make_item(const strl_walk *walk, const strl_view *view, const strl__active *active)
+static strl_draw_item make_item(const strl_walk *walk, const strl__active *active)
 {
     const strl__node *node = active->node;
     const strl_node *record = node->record;
@@ -21,13 +21,19 @@ static strl_draw_item make_item(const strl_walk *walk, const strl_view *view, co
         .key = node->load << PLACEMENT_BITS | active->placement,
         .placement = active->placement,
         .node = node->treelet->data.first_node + (uint32_t)(node - node->treelet->nodes),
-        .level = record->level, .group = record->group, .state = mesh->state, .visible = active->visible,
-        .vertices = mesh->vertices, .vertex_count = mesh->vertex_count,
-        .indices = mesh->indices, .index_count = 3 * mesh->triangle_end[mesh->state],
-        .dirty_first = node->dirty_first, .dirty_count = node->dirty_end - node->dirty_first,
+        .level = record->level,
+        .group = record->group,
+        .state = mesh->state,
+        .visible = active->sight.seen,
+        .vertices = mesh->vertices,
+        .vertex_count = mesh->vertex_count,
+        .indices = mesh->indices,
+        .index_count = 3 * mesh->triangle_end[mesh->state],
+        .dirty_first = node->dirty_first,
+        .dirty_count = node->dirty_end - node->dirty_first,
         .step = tree->step,
         .error = (float)(error * tree->step),
-        .error_px = (float)strl_view_error_px(view, &active->box, error * placement->length_scale),
+        .error_px = (float)strl_sight_error_px(&active->sight, error * placement->length_scale),
     };
     memcpy(item.anchor, record->anchor, sizeof item.anchor);
     memcpy(item.box_min, record->box_min, sizeof item.box_min);
@@ -56,9 +62,9 @@ strl_status strl__draw_list(strl_walk *walk, const strl_view *view, strl_draw_li
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a draw list of %zu items", walk->front.count);
     for (size_t i = 0; i < walk->front.count; i++) {
         const strl__active *active = &walk->front.items[i];
-        walk->items[i] = make_item(walk, view, active);
+        walk->items[i] = make_item(walk, active);
         count_item(walk, &walk->items[i]);
-        if (!active->visible)
+        if (!active->sight.seen)
             continue;
         double near_depth, far_depth;
         strl_view_depth_range(view, &active->box, &near_depth, &far_depth);

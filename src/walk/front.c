@@ -1,6 +1,7 @@
-/* The cut through the trees (Quick-VDR 5.1, 5.2), found anew from the roots in each frame, level by level, dependency group by
- * dependency group. A group's error and box hold those of its children's groups, so what a level decides the next one never
- * contradicts; should a file say otherwise, a group that is not complete stays coarse, and the cut is whole all the same. */
+/* The cut through the trees (Quick-VDR 5.1, 5.2), found anew from the roots in each frame, level by
+ * level, dependency group by dependency group. A group's error and box hold those of its children's
+ * groups, so what a level decides the next one never contradicts; should a file say otherwise, a
+ * group that is not complete stays coarse, and the cut is whole all the same. */
 #include "walk/internal.h"
 
 #include <math.h>
@@ -8,7 +9,8 @@
 
 #include "base/hash.h"
 
-/* Urgencies: records come before the nodes that they describe; what may be wanted later comes after all that is wanted now. */
+/* Urgencies: records come before the nodes that they describe; what may be wanted later comes after
+ * all that is wanted now. */
 #define RECORDS_FIRST 4.0
 #define PREFETCH_SHARE 1e-3
 #define MOST_URGENT 1e30
@@ -29,7 +31,8 @@ static strl_status no_memory(strl_error *err)
 
 /* ---- projected errors */
 
-strl_box strl__world_box(const strl_tree *tree, const strl__placement *placement, const int64_t min[3], const int64_t max[3])
+strl_box strl__world_box(const strl_tree *tree, const strl__placement *placement, const int64_t min[3],
+                         const int64_t max[3])
 {
     strl_box box;
     for (int row = 0; row < 3; row++) {
@@ -38,8 +41,8 @@ strl_box strl__world_box(const strl_tree *tree, const strl__placement *placement
         for (int i = 0; i < 3; i++) {
             double a = m[i] * (tree->origin[i] + tree->step * (double)min[i]);
             double b = m[i] * (tree->origin[i] + tree->step * (double)max[i]);
-            box.min[row] += fmin(a, b);
-            box.max[row] += fmax(a, b);
+            box.min[row] += a < b ? a : b;
+            box.max[row] += a < b ? b : a;
         }
     }
     return box;
@@ -112,7 +115,8 @@ static void check_child(strl_walk *walk, const strl__node *parent, strl__node *c
 }
 
 /* The records of one child, or a candidate for the treelet that has them. */
-static outlook find_child(context *c, strl__node *parent, uint32_t id, double urgency, strl__candidates *to, strl__node **child)
+static outlook find_child(context *c, strl__node *parent, uint32_t id, double urgency, strl__candidates *to,
+                          strl__node **child)
 {
     strl_walk *walk = c->walk;
     *child = strl__node_find(walk, parent->treelet->tree, id);
@@ -134,7 +138,8 @@ static outlook find_child(context *c, strl__node *parent, uint32_t id, double ur
 }
 
 /* Collects the children of all members in walk->children. The worst outlook of any. */
-static strl_status find_children(context *c, const strl__group *group, double urgency, strl__candidates *to, outlook *worst)
+static strl_status find_children(context *c, const strl__group *group, double urgency, strl__candidates *to,
+                                 outlook *worst)
 {
     strl_walk *walk = c->walk;
     walk->children.count = 0;
@@ -202,7 +207,7 @@ static strl_status add_active(context *c, strl__node *node)
     strl__active *active = &front->items[front->count++];
     *active = (strl__active){.node = node, .placement = c->index};
     active->box = strl__world_box(c->tree, c->placement, node->record->box_min, node->record->box_max);
-    active->visible = strl_view_sees(c->cut->view, &active->box);
+    active->sight = strl_view_sight(c->cut->view, &active->box);
     return STRL_OK;
 }
 
@@ -234,7 +239,8 @@ static uint32_t count_inactive(const strl_walk *walk, const strl__group *group)
     return inactive;
 }
 
-/* The group is not split: those of its members that are active are the front. `missing` of the wanted nodes are not there. */
+/* The group is not split: those of its members that are active are the front. `missing` of the
+ * wanted nodes are not there. */
 static strl_status stay(context *c, const strl__group *group, uint32_t missing)
 {
     strl_walk *walk = c->walk;
@@ -336,8 +342,8 @@ static strl_status visit_group(context *c, const strl__group *group)
     if (!complete || !(px > cut->allowed_px))
         return keep(c, group, complete, px);
     outlook worst;
-    strl_status status = find_children(c, group, front ? px : PREFETCH_SHARE * px, front ? &walk->missing : &walk->prefetch,
-                                       &worst);
+    strl_status status =
+        find_children(c, group, front ? px : PREFETCH_SHARE * px, front ? &walk->missing : &walk->prefetch, &worst);
     if (status != STRL_OK)
         return status;
     cut->records_missing |= worst == RECORDS_ABSENT;

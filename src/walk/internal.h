@@ -1,13 +1,15 @@
 /* What the files of walk/ share.
  *
- * A frame runs: answers and finished decodes (requests.c) -> the cut that the camera wants and the part of it that residency
- * allows (front.c, under budget.c's allowed error) -> states of the front's meshes (refine.c) -> reads for what is missing
- * (requests.c over residency.c) -> draw list (draw.c).
+ * A frame runs: answers and finished decodes (requests.c) -> the cut that the camera wants and the
+ * part of it that residency allows (front.c, under budget.c's allowed error) -> states of the
+ * front's meshes (refine.c) -> reads for what is missing (requests.c over residency.c) -> draw list
+ * (draw.c).
  *
- * Invariants: (1) a group splits as a whole, only when all its members are active and all children of all members are
- * resident, so that the front is a cut without cracks whatever is resident; (2) nodes of the wanted cut and all their
- * ancestors carry wanted_frame = this frame and are not evicted, so that collapsing never waits; (3) resident_bytes counts
- * meshes, records and reservations of reads under way, and never exceeds memory_bytes. */
+ * Invariants: (1) a group splits as a whole, only when all its members are active and all children
+ * of all members are resident, so that the front is a cut without cracks whatever is resident; (2)
+ * nodes of the wanted cut and all their ancestors carry wanted_frame = this frame and are not
+ * evicted, so that collapsing never waits; (3) resident_bytes counts meshes, records and
+ * reservations of reads under way, and never exceeds memory_bytes. */
 #ifndef STRL_WALK_INTERNAL_H
 #define STRL_WALK_INTERNAL_H
 
@@ -18,9 +20,9 @@
 #include "frame/view.h"
 #include "stroll/walk.h"
 
-#define STRL__REQUEST_NODES 32u          /* most nodes that one page is read for at a time */
+#define STRL__REQUEST_NODES 32u /* most nodes that one page is read for at a time */
 #define STRL__MAX_REQUESTS 256u
-#define STRL__GIVE_UP_FAILURES 3u        /* from then on strl_walk_settled does not wait for it; it is still retried */
+#define STRL__GIVE_UP_FAILURES 3u /* from then on strl_walk_settled does not wait for it; it is still retried */
 
 typedef enum strl__residency { STRL__ABSENT, STRL__PENDING, STRL__RESIDENT } strl__residency;
 
@@ -30,9 +32,10 @@ typedef struct strl__retry {
     uint64_t frame;    /* not before this frame */
 } strl__retry;
 
-/* A decoded node: one block of at most strl_node_decoded_bytes, which `vertices` begins. indices[k] = resolve(corner k, state)
- * for all corners, also those of triangles that the state does not have yet. The corners that a vertex v >= base_vertices
- * moves (those in its subtree of the parent forest) are corners[moved_first[v - base] ...], moved_count of them. */
+/* A decoded node: one block of at most strl_node_decoded_bytes, which `vertices` begins. indices[k]
+ * = resolve(corner k, state) for all corners, also those of triangles that the state does not have
+ * yet. The corners that a vertex v >= base_vertices moves (those in its subtree of the parent
+ * forest) are corners[moved_first[v - base] ...], moved_count of them. */
 typedef struct strl__mesh {
     uint32_t vertex_count, base_vertices, triangle_count, step_count, state;
     strl_vertex *vertices; /* owned, with all that follows; NULL = not resident */
@@ -105,20 +108,21 @@ typedef struct strl__page {
 
 enum { STRL__JOB_QUEUED, STRL__JOB_RUNNING, STRL__JOB_DONE, STRL__JOB_ABANDONED };
 
-/* Decodes one node. Whole in itself: an abandoned job that runs after the walk is closed releases itself. */
+/* Decodes one node. Whole in itself: an abandoned job that runs after the walk is closed releases
+ * itself. */
 typedef struct strl__job {
     atomic_int phase;
     strl__page *page;
     strl_node record;
-    strl__node *node;  /* the walk's thread only */
-    strl__mesh mesh;   /* result; its block is owned */
+    strl__node *node; /* the walk's thread only */
+    strl__mesh mesh;  /* result; its block is owned */
     strl_status status;
     strl_error error;
 } strl__job;
 
 typedef struct strl__request {
     bool used, answered, cancelled;
-    bool prefetch;          /* for nothing that was wanted at submission */
+    bool prefetch; /* for nothing that was wanted at submission */
     uint64_t token;
     uint64_t touched_frame; /* last frame that wanted something of it */
     uint64_t offset;        /* of the page */
@@ -180,8 +184,8 @@ typedef struct strl__groups {
 typedef struct strl__active {
     strl__node *node;
     uint32_t placement;
-    bool visible;
-    strl_box box; /* world */
+    strl_box box;     /* world */
+    strl_sight sight; /* of the box */
 } strl__active;
 
 typedef struct strl__front {
@@ -201,12 +205,14 @@ typedef struct strl__cut {
     const strl_view *view;
     double allowed_px;
     uint64_t capacity_bytes;
-    bool stop_at_capacity; /* groups stay coarse where the next split would not fit; otherwise overflow is set */
+    bool stop_at_capacity; /* groups stay coarse where the next split would not fit; otherwise
+                              overflow is set */
     uint64_t bytes;        /* result: of all nodes of the cut and their ancestors */
     bool overflow;         /* result: more than capacity; the rest is undefined */
     bool records_missing;  /* result: the cut ends early for want of records that are on their way */
     bool waits;            /* result: something is missing that has not been given up */
-    uint32_t missing;      /* result: nodes of the wanted front that are not in the front, or groups' members cut short */
+    uint32_t missing;      /* result: nodes of the wanted front that are not in the front, or groups'
+                             members cut short */
 } strl__cut;
 
 struct strl_walk {
@@ -227,7 +233,7 @@ struct strl_walk {
     bool settled;
 
     strl__treelets treelets;
-    uint64_t treelet_bytes;  /* part of resident_bytes */
+    uint64_t treelet_bytes; /* part of resident_bytes */
     uint64_t resident_bytes;
     strl__node *oldest, *newest;
 
@@ -238,9 +244,9 @@ struct strl_walk {
 
     strl__visits level, below; /* scratch of a traversal */
     strl__groups groups;
-    strl__nodes children; /* of the group in work */
-    strl__nodes wanted;   /* the wanted cut and all above it */
-    strl__nodes ahead;    /* resident, likely to be wanted soon */
+    strl__nodes children;             /* of the group in work */
+    strl__nodes wanted;               /* the wanted cut and all above it */
+    strl__nodes ahead;                /* resident, likely to be wanted soon */
     strl__splits split, split_before; /* of this frame and the last */
     strl__candidates missing, prefetch;
     strl__front front;
@@ -251,9 +257,11 @@ struct strl_walk {
 };
 
 /* mesh.c: thread-safe. */
-strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size, strl__mesh *mesh, strl_error *err);
+strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size, strl__mesh *mesh,
+                              strl_error *err);
 void strl__mesh_deinit(strl__mesh *mesh);
-/* Moves to another state in time proportional to the corners that change; widens [*first, *end) to hold them. */
+/* Moves to another state in time proportional to the corners that change; widens [*first, *end) to
+ * hold them. */
 void strl__mesh_set_state(strl__mesh *mesh, uint32_t state, uint32_t *first, uint32_t *end);
 
 /* treelets.c */
@@ -263,8 +271,8 @@ void strl__treelets_remove(strl__treelets *treelets, strl__treelet *treelet); /*
 void strl__treelets_deinit(strl__treelets *treelets);
 
 /* residency.c */
-/* Evicts what has waited longest and that this frame does not need until `bytes` fit; evict_before: only what was touched
- * before that frame. False where it does not fit. */
+/* Evicts what has waited longest and that this frame does not need until `bytes` fit; evict_before:
+ * only what was touched before that frame. False where it does not fit. */
 bool strl__make_room(strl_walk *walk, uint64_t bytes, uint64_t evict_before);
 /* A treelet without content yet, its bytes reserved; NULL where there is no room or no memory. */
 strl__treelet *strl__treelet_reserve(strl_walk *walk, uint32_t tree, uint32_t index, const strl_treelet_ref *ref);
@@ -272,10 +280,10 @@ strl_status strl__treelet_load(strl_walk *walk, strl__treelet *treelet, const vo
 void strl__treelet_evict_cold(strl_walk *walk, uint64_t before_frame);
 /* The node with this id; NULL where its records are not there. */
 strl__node *strl__node_find(strl_walk *walk, uint32_t tree, uint32_t id);
-void strl__node_reserve(strl_walk *walk, strl__node *node);                  /* absent -> pending; room must be there */
-void strl__node_release(strl_walk *walk, strl__node *node);                  /* pending -> absent */
+void strl__node_reserve(strl_walk *walk, strl__node *node); /* absent -> pending; room must be there */
+void strl__node_release(strl_walk *walk, strl__node *node); /* pending -> absent */
 void strl__node_install(strl_walk *walk, strl__node *node, const strl__mesh *mesh); /* pending -> resident */
-void strl__node_touch(strl_walk *walk, strl__node *node);                    /* now the youngest */
+void strl__node_touch(strl_walk *walk, strl__node *node);                           /* now the youngest */
 void strl__back_off(const strl_walk *walk, strl__retry *retry);
 void strl__note_fault(strl_walk *walk, const strl_error *error);
 
@@ -296,7 +304,7 @@ strl_box strl__world_box(const strl_tree *tree, const strl__placement *placement
 strl_status strl__budget_cut(strl_walk *walk, const strl_view *view, strl__cut *cut, strl_error *err);
 
 /* refine.c */
-void strl__refine_front(strl_walk *walk, const strl_view *view);
+void strl__refine_front(strl_walk *walk);
 
 /* draw.c */
 strl_status strl__draw_list(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err);

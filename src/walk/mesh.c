@@ -1,9 +1,11 @@
 /* From a page's payload to what the walk draws, and from one state to another.
  *
- * The corners that a vertex split moves are those of the vertex's subtree in the parent forest. They are stored in preorder of
- * that forest, so that each subtree is one run: three numbers a corner and vertex bound the memory, whatever the mesh. */
+ * The corners that a vertex split moves are those of the vertex's subtree in the parent forest.
+ * They are stored in preorder of that forest, so that each subtree is one run: three numbers a
+ * corner and vertex bound the memory, whatever the mesh. */
 #include "walk/internal.h"
 
+#include <assert.h>
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>
@@ -56,16 +58,20 @@ static void make_vertices(const strl_pm *pm, strl_vertex *vertices)
 
 /* ---- layout */
 
-static strl_status allocate(const strl_pm *pm, strl__mesh *mesh, strl_error *err)
+static strl_status allocate(const strl_node *record, const strl_pm *pm, strl__mesh *mesh, strl_error *err)
 {
     size_t vertices = pm->vertex_count, added = vertices - pm->vertex_end[0], states = (size_t)pm->step_count + 1;
     size_t corners = 3 * (size_t)pm->triangle_count;
     size_t words = corners + 2 * added + 2 * states, halves = states + added + corners;
-    uint8_t *block = strl__alloc(1, vertices * sizeof(strl_vertex) + words * 4 + halves * 2);
+    size_t bytes = vertices * sizeof(strl_vertex) + words * 4 + halves * 2;
+    assert(bytes <= strl_node_decoded_bytes(record)); /* what the budget has reserved */
+    uint8_t *block = strl__alloc(1, bytes);
     if (!block)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %" PRIu32 " vertices", pm->vertex_count);
-    *mesh = (strl__mesh){.vertex_count = pm->vertex_count, .base_vertices = pm->vertex_end[0],
-                         .triangle_count = pm->triangle_count, .step_count = pm->step_count};
+    *mesh = (strl__mesh){.vertex_count = pm->vertex_count,
+                         .base_vertices = pm->vertex_end[0],
+                         .triangle_count = pm->triangle_count,
+                         .step_count = pm->step_count};
     /* Four-byte arrays come first, so that all are aligned. */
     mesh->vertices = (strl_vertex *)block;
     mesh->corners = (uint32_t *)(mesh->vertices + vertices);
@@ -112,7 +118,8 @@ static strl_status find_moves(const strl_pm *pm, strl__mesh *mesh, strl_arena *a
     uint32_t *fill = strl_arena_alloc_zero(arena, (size_t)mesh->vertex_count + 1, sizeof *fill);
     uint16_t *first = strl_arena_alloc(arena, (size_t)mesh->vertex_count + 1, sizeof *first);
     if (!own || !fill || !first)
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory to decode a node of %" PRIu32 " vertices", mesh->vertex_count);
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory to decode a node of %" PRIu32 " vertices",
+                          mesh->vertex_count);
     for (uint32_t k = 0; k < corners; k++)
         own[corner[k]]++;
     memset(mesh->moved_count, 0, (mesh->vertex_count - base) * sizeof *mesh->moved_count);
@@ -151,7 +158,7 @@ strl_status strl__mesh_create(const strl_node *record, const void *page, size_t 
     strl_arena_init(&arena, SCRATCH_BYTES);
     strl_status status = strl_page_mesh(record, page, size, &arena, &pm, err);
     if (status == STRL_OK)
-        status = allocate(&pm, mesh, err);
+        status = allocate(record, &pm, mesh, err);
     if (status == STRL_OK)
         status = find_moves(&pm, mesh, &arena, err);
     if (status == STRL_OK) {

@@ -1,10 +1,10 @@
-/* States of the front's progressive meshes: the coarsest that keeps to the allowed error, reached from the last frame's. */
+/* States of the front's progressive meshes: the coarsest that keeps to the allowed error, reached
+ * from the last frame's. */
 #include "walk/internal.h"
 
 /* What decides on a state: its error, projected over the node's box. */
 typedef struct projector {
-    const strl_view *view;
-    const strl_box *box;
+    const strl_sight *sight;
     const float *errors; /* by state, never increasing */
     double length_scale;
     double allowed_px;
@@ -12,7 +12,7 @@ typedef struct projector {
 
 static bool suffices(const projector *p, uint32_t state)
 {
-    return strl_view_error_px(p->view, p->box, p->errors[state] * p->length_scale) <= p->allowed_px;
+    return strl_sight_error_px(p->sight, p->errors[state] * p->length_scale) <= p->allowed_px;
 }
 
 /* The first state in (low, high] that suffices, where low does not and high does. */
@@ -28,7 +28,8 @@ static uint32_t bisect(const projector *p, uint32_t low, uint32_t high)
     return high;
 }
 
-/* Gallops from the last state, which is close in a smooth walk; the answer does not depend on where it begins. */
+/* Gallops from the last state, which is close in a smooth walk; the answer does not depend on where
+ * it begins. */
 static uint32_t coarsest_state(const projector *p, uint32_t begin, uint32_t finest)
 {
     uint32_t stride = 1, low = begin, high = begin;
@@ -48,10 +49,10 @@ static uint32_t coarsest_state(const projector *p, uint32_t begin, uint32_t fine
     return suffices(p, high) ? bisect(p, low, high) : finest;
 }
 
-static void choose_state(strl_walk *walk, const strl_view *view, const strl__active *active)
+static void choose_state(strl_walk *walk, const strl__active *active)
 {
     strl__node *node = active->node;
-    const projector p = {view, &active->box, node->mesh.errors, walk->placements[active->placement].length_scale,
+    const projector p = {&active->sight, node->mesh.errors, walk->placements[active->placement].length_scale,
                          walk->stats.allowed_error_px};
     uint32_t state = coarsest_state(&p, node->mesh.state, node->mesh.step_count);
     if (node->front_frame != walk->frame) {
@@ -61,7 +62,7 @@ static void choose_state(strl_walk *walk, const strl_view *view, const strl__act
     } else if (state > node->wanted_state) {
         node->wanted_state = state; /* placements share a node's indices: the finest state serves all */
     }
-    if (active->visible)
+    if (active->sight.seen)
         node->drawn_frame = walk->frame;
 }
 
@@ -88,10 +89,10 @@ static void apply_state(strl_walk *walk, strl__node *node)
     node->dirty_end = first < end ? end : 0;
 }
 
-void strl__refine_front(strl_walk *walk, const strl_view *view)
+void strl__refine_front(strl_walk *walk)
 {
     for (size_t i = 0; i < walk->front.count; i++)
-        choose_state(walk, view, &walk->front.items[i]);
+        choose_state(walk, &walk->front.items[i]);
     for (size_t i = 0; i < walk->front.count; i++) {
         strl__node *node = walk->front.items[i].node;
         if (node->wanted_state == UINT32_MAX)

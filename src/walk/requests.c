@@ -1,13 +1,14 @@
-/* Reads and decodes. A request is one page of nodes or one treelet; it keeps its slot until every node of it is decoded, so that
- * undecoded bytes are bounded by the number of slots. Decoding is a job per node: the executor's, or the pump's. */
+/* Reads and decodes. A request is one page of nodes or one treelet; it keeps its slot until every
+ * node of it is decoded, so that undecoded bytes are bounded by the number of slots. Decoding is a
+ * job per node: the executor's, or the pump's. */
 #include "walk/internal.h"
 
 #include <stdlib.h>
 
 #include "platform/thread.h"
 
-#define FORGET_FRAMES 16u   /* a read that nothing has wanted for this long is cancelled */
-#define SPARE_FRAMES 60u    /* prefetching evicts only what has been idle for longer */
+#define FORGET_FRAMES 16u /* a read that nothing has wanted for this long is cancelled */
+#define SPARE_FRAMES 60u  /* prefetching evicts only what has been idle for longer */
 #define ABANDON_WAIT_NS 50000u
 
 /* ---- jobs */
@@ -239,8 +240,8 @@ static strl__request *unanswered_page(strl_walk *walk, uint64_t offset)
 {
     for (uint32_t i = 0; i < walk->requests_in_flight; i++) {
         strl__request *request = &walk->requests[i];
-        if (request->used && !request->answered && !request->cancelled && !request->treelet && request->offset == offset &&
-            request->node_count < STRL__REQUEST_NODES)
+        if (request->used && !request->answered && !request->cancelled && !request->treelet &&
+            request->offset == offset && request->node_count < STRL__REQUEST_NODES)
             return request;
     }
     return NULL;
@@ -254,12 +255,14 @@ static strl__request *take_slot(strl_walk *walk, uint32_t in_flight)
     while (walk->requests[i].used)
         i++;
     strl__request *request = &walk->requests[i];
-    *request = (strl__request){.used = true, .token = ++walk->tokens * STRL__MAX_REQUESTS + i, .touched_frame = walk->frame};
+    *request =
+        (strl__request){.used = true, .token = ++walk->tokens * STRL__MAX_REQUESTS + i, .touched_frame = walk->frame};
     walk->requests_pending++;
     return request;
 }
 
-static strl_status submit(strl_walk *walk, strl__request *request, uint64_t offset, size_t size, float urgency, strl_error *err)
+static strl_status submit(strl_walk *walk, strl__request *request, uint64_t offset, size_t size, float urgency,
+                          strl_error *err)
 {
     strl_status status = strl_source_submit(walk->source, request->token, offset, size, urgency, err);
     if (status == STRL_OK)
@@ -308,7 +311,8 @@ static void ask_for_treelet(strl_walk *walk, const strl__candidate *candidate, u
 {
     const strl__treelet *parent = candidate->node->treelet;
     strl__treelet *treelet = strl__treelets_find(&walk->treelets, parent->tree, candidate->treelet);
-    if (walk->requests_pending >= in_flight || (treelet && (treelet->residency != STRL__ABSENT || treelet->retry.frame > walk->frame)))
+    if (walk->requests_pending >= in_flight ||
+        (treelet && (treelet->residency != STRL__ABSENT || treelet->retry.frame > walk->frame)))
         return;
     /* Decoding has checked that a treelet names those of all children of its nodes. */
     const strl_treelet_ref *ref = &parent->data.child_refs[candidate->treelet - parent->data.first_child_treelet];
@@ -324,10 +328,12 @@ static void ask_for_treelet(strl_walk *walk, const strl__candidate *candidate, u
         treelet_failed(walk, request, &error);
 }
 
-static void ask_for_all(strl_walk *walk, strl__candidates *candidates, uint32_t in_flight, uint64_t evict_before, bool prefetch)
+static void ask_for_all(strl_walk *walk, strl__candidates *candidates, uint32_t in_flight, uint64_t evict_before,
+                        bool prefetch)
 {
     bool room = true;
-    qsort(candidates->items, candidates->count, sizeof *candidates->items, by_urgency);
+    if (candidates->count > 1)
+        qsort(candidates->items, candidates->count, sizeof *candidates->items, by_urgency);
     for (size_t i = 0; i < candidates->count; i++) {
         const strl__candidate *candidate = &candidates->items[i];
         if (candidate->treelet != STRL_NONE)

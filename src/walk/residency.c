@@ -1,4 +1,5 @@
-/* What is in memory, under one budget: treelets and meshes, and the reservations of those on their way. */
+/* What is in memory, under one budget: treelets and meshes, and the reservations of those on their
+ * way. */
 #include "walk/internal.h"
 
 #include <string.h>
@@ -112,7 +113,8 @@ strl__treelet *strl__treelet_reserve(strl_walk *walk, uint32_t tree, uint32_t in
     /* Records may take an eighth of the budget before old ones go, and half of it in the end. */
     if (walk->treelet_bytes + bytes > walk->memory_bytes / 8)
         strl__treelet_evict_cold(walk, walk->frame);
-    if (walk->treelet_bytes + bytes > walk->memory_bytes / 2 || walk->treelet_bytes + bytes + walk->root_bytes > walk->memory_bytes ||
+    if (walk->treelet_bytes + bytes > walk->memory_bytes / 2 ||
+        walk->treelet_bytes + bytes + walk->root_bytes > walk->memory_bytes ||
         !strl__make_room(walk, bytes, walk->frame + 1))
         return NULL;
     strl__treelet *treelet = strl__alloc_zero(1, sizeof *treelet);

@@ -10,12 +10,14 @@
 #define DEFAULT_MEMORY_BYTES ((uint64_t)512 << 20)
 #define DEFAULT_REQUESTS 16u
 #define MAX_PLACEMENTS (1u << 24) /* what a draw item's key can tell apart */
-#define AHEAD_FRAMES 15.0         /* how far the eye's motion is carried on for prefetching */
+#define AHEAD_FRAMES 15           /* how far the eye's motion is carried on for prefetching */
+#define AHEAD_EVERY 4             /* frames between two looks ahead */
 
 /* ---- opening */
 
-/* The largest singular value of a placement: the root of the largest eigenvalue of its transposed times itself, by Jacobi
- * rotations; a little more for rounding, because errors must stay bounds. */
+/* The largest singular value of a placement: the root of the largest eigenvalue of its transposed
+ * times itself, by Jacobi rotations; a little more for rounding, because errors must stay bounds.
+ */
 static double largest_scale(const double transform[12])
 {
     double a[3][3] = {{0}};
@@ -46,8 +48,10 @@ static strl_status load_placements(strl_walk *walk, strl_error *err)
 {
     uint64_t count = strl_container_get_info(walk->container)->placement_count;
     if (count == 0 || count > MAX_PLACEMENTS || count > walk->memory_bytes / sizeof(strl__placement))
-        return strl__fail(err, count ? STRL_ERR_LIMIT : STRL_ERR_FORMAT, "the container has %" PRIu64
-                          " placements, expected at least 1 and no more than memory for walking allows", count);
+        return strl__fail(err, count ? STRL_ERR_LIMIT : STRL_ERR_FORMAT,
+                          "the container has %" PRIu64
+                          " placements, expected at least 1 and no more than memory for walking allows",
+                          count);
     walk->placements = strl__alloc((size_t)count, sizeof *walk->placements);
     if (!walk->placements)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %" PRIu64 " placements", count);
@@ -59,13 +63,15 @@ static strl_status load_placements(strl_walk *walk, strl_error *err)
             return status;
         const strl_tree *tree = strl_container_tree(walk->container, stored.tree);
         if (!tree)
-            return strl__fail(err, STRL_ERR_FORMAT, "placement %" PRIu32 " names tree %" PRIu32 ", expected less than %" PRIu32,
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "placement %" PRIu32 " names tree %" PRIu32 ", expected less than %" PRIu32,
                               walk->placement_count, stored.tree, walk->tree_count);
         placement->tree = stored.tree;
         memcpy(placement->transform, stored.transform, sizeof placement->transform);
         placement->length_scale = largest_scale(stored.transform) * tree->step;
         if (!isfinite(placement->length_scale))
-            return strl__fail(err, STRL_ERR_FORMAT, "placement %" PRIu32 ": its transform is not finite", walk->placement_count);
+            return strl__fail(err, STRL_ERR_FORMAT, "placement %" PRIu32 ": its transform is not finite",
+                              walk->placement_count);
     }
     return STRL_OK;
 }
@@ -88,8 +94,10 @@ static strl_status load_root_records(strl_walk *walk, uint32_t tree, strl_error 
         return status;
     strl__treelet *treelet = strl__treelet_reserve(walk, tree, 0, &ref);
     if (!treelet)
-        return strl__fail(err, STRL_ERR_MEMORY, "the root records of tree %" PRIu32 " do not fit into the memory for walking, %"
-                          PRIu64 " bytes", tree, walk->memory_bytes);
+        return strl__fail(err, STRL_ERR_MEMORY,
+                          "the root records of tree %" PRIu32 " do not fit into the memory for walking, %" PRIu64
+                          " bytes",
+                          tree, walk->memory_bytes);
     status = read_range(walk, ref.offset, ref.bytes, &data, err);
     if (status == STRL_OK)
         status = strl__treelet_load(walk, treelet, data, ref.bytes, err);
@@ -109,8 +117,10 @@ static strl_status load_root(strl_walk *walk, uint32_t tree, strl_error *err)
     strl__node *root = walk->trees[tree].root;
     uint64_t bytes = strl_node_decoded_bytes(root->record);
     if (!strl__make_room(walk, bytes, 0))
-        return strl__fail(err, STRL_ERR_MEMORY, "the root of tree %" PRIu32 " takes %" PRIu64
-                          " bytes, more than is left of the memory for walking, %" PRIu64 " bytes", tree, bytes, walk->memory_bytes);
+        return strl__fail(err, STRL_ERR_MEMORY,
+                          "the root of tree %" PRIu32 " takes %" PRIu64
+                          " bytes, more than is left of the memory for walking, %" PRIu64 " bytes",
+                          tree, bytes, walk->memory_bytes);
     strl__node_reserve(walk, root);
     walk->root_bytes += bytes;
     const strl_page_ref *page = &root->record->page;
@@ -200,10 +210,23 @@ void strl_walk_close(strl_walk *walk)
     strl__jobs_abandon(walk);
     strl__treelets_deinit(&walk->treelets);
     strl_container_close(walk->container);
-    void *const owned[] = {walk->trees,          walk->placements,    walk->jobs,          walk->level.items,
-                           walk->below.items,    walk->groups.items,  walk->groups.table,  walk->children.items,
-                           walk->wanted.items,   walk->ahead.items,   walk->split.items,   walk->split_before.items,
-                           walk->missing.items,  walk->prefetch.items, walk->front.items,  walk->items, walk};
+    void *const owned[] = {walk->trees,
+                           walk->placements,
+                           walk->jobs,
+                           walk->level.items,
+                           walk->below.items,
+                           walk->groups.items,
+                           walk->groups.table,
+                           walk->children.items,
+                           walk->wanted.items,
+                           walk->ahead.items,
+                           walk->split.items,
+                           walk->split_before.items,
+                           walk->missing.items,
+                           walk->prefetch.items,
+                           walk->front.items,
+                           walk->items,
+                           walk};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         strl__free(owned[i]);
 }
@@ -214,7 +237,8 @@ static void begin_frame(strl_walk *walk)
 {
     strl_walk_stats *stats = &walk->stats;
     strl_walk_stats kept = *stats;
-    *stats = (strl_walk_stats){.frame = ++walk->frame, .allowed_error_px = kept.allowed_error_px, .faults = kept.faults};
+    *stats =
+        (strl_walk_stats){.frame = ++walk->frame, .allowed_error_px = kept.allowed_error_px, .faults = kept.faults};
     memcpy(stats->last_fault, kept.last_fault, sizeof stats->last_fault);
     walk->settled = false;
 }
@@ -225,16 +249,20 @@ static strl_status look_ahead(strl_walk *walk, const strl_camera *camera, strl_e
     strl_camera further = *camera;
     double moved = 0;
     for (int axis = 0; axis < 3; axis++) {
-        double eye = camera->eye[axis] - walk->camera.eye[axis], target = camera->target[axis] - walk->camera.target[axis];
+        double eye = camera->eye[axis] - walk->camera.eye[axis],
+               target = camera->target[axis] - walk->camera.target[axis];
         moved += fabs(eye) + fabs(target);
         further.eye[axis] += AHEAD_FRAMES * eye;
         further.target[axis] += AHEAD_FRAMES * target;
     }
     strl_view view;
-    if (walk->frame < 2 || walk->missing.count > 0 || moved == 0 || !strl_view_init(&view, &further))
+    if (walk->frame % AHEAD_EVERY != 0 || walk->missing.count > 0 || moved == 0 || !strl_view_init(&view, &further))
         return STRL_OK;
-    strl__cut cut = {.kind = STRL__CUT_PREFETCH, .view = &view, .allowed_px = walk->stats.allowed_error_px,
-                     .capacity_bytes = walk->memory_bytes - walk->treelet_bytes, .stop_at_capacity = true};
+    strl__cut cut = {.kind = STRL__CUT_PREFETCH,
+                     .view = &view,
+                     .allowed_px = walk->stats.allowed_error_px,
+                     .capacity_bytes = walk->memory_bytes - walk->treelet_bytes,
+                     .stop_at_capacity = true};
     return strl__cut_run(walk, &cut, err);
 }
 
@@ -261,12 +289,14 @@ strl_status strl_walk_frame(strl_walk *walk, const strl_camera *camera, strl_dra
     *list = (strl_draw_list){.near_distance = 1, .far_distance = 2};
     begin_frame(walk);
     strl__requests_receive(walk);
-    strl_status status = strl_view_init(&view, camera) ? STRL_OK
-                         : strl__fail(err, STRL_ERR_ARGUMENT, "the camera is degenerate: not finite, without a direction or an image");
+    strl_status status = strl_view_init(&view, camera)
+                             ? STRL_OK
+                             : strl__fail(err, STRL_ERR_ARGUMENT,
+                                          "the camera is degenerate: not finite, without a direction or an image");
     if (status == STRL_OK)
         status = select_front(walk, camera, &view, err);
     if (status == STRL_OK) {
-        strl__refine_front(walk, &view);
+        strl__refine_front(walk);
         strl__requests_submit(walk);
         status = strl__draw_list(walk, &view, list, err);
         walk->camera = *camera;

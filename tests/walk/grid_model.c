@@ -159,7 +159,8 @@ static piece take_piece(builder *b, uint32_t first, uint32_t end)
 
 static strl_simplified simplify(builder *b, const piece *p, uint32_t target)
 {
-    const strl_simplify_desc desc = {.target_triangles = target, .error_limit = INFINITY, .last_rung = STRL_SIMPLIFY_TOPOLOGY};
+    const strl_simplify_desc desc = {
+        .target_triangles = target, .error_limit = INFINITY, .last_rung = STRL_SIMPLIFY_TOPOLOGY};
     strl_simplified done;
     strl_error err = {0};
     if (strl_simplify(&p->mesh, &desc, &b->arena, &done, &err) != STRL_OK)
@@ -288,7 +289,8 @@ static void link_node(builder *b, uint32_t level, uint32_t index)
     }
 }
 
-/* Group [first, end) of the level: errors and boxes that hold those of all groups of the members' children. */
+/* Group [first, end) of the level: errors and boxes that hold those of all groups of the members'
+ * children. */
 static void make_group(builder *b, uint32_t level, uint32_t first, uint32_t end, uint32_t boundary_steps)
 {
     uint32_t base = (GRID_LEAVES >> level) - 1;
@@ -354,14 +356,18 @@ static void write_model(const builder *b, const char *folder, const char *path, 
     strl_container_writer *writer = NULL;
     uint64_t bytes;
     const strl_container_writer_desc desc = {.path = path, .scratch_dir = folder, .info = {.unit = "m", .up_axis = 2}};
-    const strl_tree tree = {.structure = STRL_STRUCTURE_CLUSTERS, .step = GRID_STEP, .node_count = GRID_NODES,
-                            .level_count = GRID_DEPTH + 1, .leaf_geometric = 0.9f};
+    const strl_tree tree = {.structure = STRL_STRUCTURE_CLUSTERS,
+                            .step = GRID_STEP,
+                            .node_count = GRID_NODES,
+                            .level_count = GRID_DEPTH + 1,
+                            .leaf_geometric = 0.9f};
     const strl_placement placed[2] = {{0, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}},
                                       {0, {0, -0.5, 0, -20, 0.5, 0, 0, 0, 0, 0, 0.5, 3}}};
     must(strl_container_writer_create(&desc, &writer, &err), &err);
     must(strl_container_writer_begin_tree(writer, &tree, &err), &err);
     for (uint32_t id = 0; id < GRID_NODES; id++)
-        must(strl_container_writer_add_node(writer, &b->nodes[id].record, b->nodes[id].payload, b->nodes[id].payload_bytes, &err),
+        must(strl_container_writer_add_node(writer, &b->nodes[id].record, b->nodes[id].payload,
+                                            b->nodes[id].payload_bytes, &err),
              &err);
     must(strl_container_writer_end_tree(writer, &err), &err);
     for (unsigned i = 0; i < placements; i++)

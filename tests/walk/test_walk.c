@@ -102,7 +102,8 @@ static void a_late_source_never_waits_and_ends_like_an_immediate_one(void **stat
 {
     (void)state;
     strl_source *late;
-    assert_int_equal(strl_source_open_delayed(memory_source(shared.one, shared.one_bytes), 50000000, 0, &late, NULL), STRL_OK);
+    assert_int_equal(strl_source_open_delayed(memory_source(shared.one, shared.one_bytes), 50000000, 0, &late, NULL),
+                     STRL_OK);
     watched_source *slow_source = watched_source_open(late), *fast_source = watched_model();
     strl_walk *slow = open_walk(&slow_source->base, NULL), *fast = open_walk(&fast_source->base, NULL);
     slow_source->walking = fast_source->walking = true;
@@ -306,7 +307,8 @@ static void a_walk_with_threads_ends_like_one_without_any(void **state)
     assert_int_equal(strl_pool_create(2, &pool, NULL), STRL_OK);
     const strl_executor executor = {pool, submit_to_pool};
     strl_walk *alone = open_walk(memory_source(shared.one, shared.one_bytes), NULL);
-    strl_walk *threaded = open_walk(memory_source(shared.one, shared.one_bytes), &(strl_walk_desc){.executor = &executor});
+    strl_walk *threaded =
+        open_walk(memory_source(shared.one, shared.one_bytes), &(strl_walk_desc){.executor = &executor});
     for (unsigned at = 0; at < 200; at += 40) {
         strl_camera camera = flight_camera(at);
         strl_draw_list wanted = settle(alone, &camera, 400), list = {0};
@@ -332,7 +334,8 @@ static void a_walk_closes_while_its_nodes_are_being_decoded(void **state)
         assert_int_equal(strl_pool_create(threads, &pool, NULL), STRL_OK);
         const strl_executor executor = {pool, submit_to_pool};
         for (unsigned frames = 1; frames < 6; frames++) {
-            strl_walk *walk = open_walk(memory_source(shared.one, shared.one_bytes), &(strl_walk_desc){.executor = &executor});
+            strl_walk *walk =
+                open_walk(memory_source(shared.one, shared.one_bytes), &(strl_walk_desc){.executor = &executor});
             strl_camera camera = flight_camera(500);
             for (unsigned i = 0; i < frames; i++)
                 walk_frame(walk, &camera);

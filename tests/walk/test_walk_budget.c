@@ -40,7 +40,8 @@ static void resident_bytes_never_pass_the_budget(void **state)
             strl_draw_list list = walk_frame(walk, &camera);
             uint64_t drawn = 0;
             for (uint32_t i = 0; i < list.count; i++)
-                drawn += list.items[i].vertex_count * sizeof(strl_vertex) + list.items[i].index_count * sizeof(uint16_t);
+                drawn +=
+                    list.items[i].vertex_count * sizeof(strl_vertex) + list.items[i].index_count * sizeof(uint16_t);
             assert_true(strl_walk_get_stats(walk)->resident_bytes <= memory);
             assert_true(drawn <= strl_walk_get_stats(walk)->resident_bytes);
             if (at % 10 == 0)
@@ -88,7 +89,8 @@ static void a_slow_path_under_a_tight_budget_does_not_swing(void **state)
 {
     (void)state;
     watched_source *source = watched_source_open(memory_source(model, model_bytes));
-    strl_walk *walk = open_walk(&source->base, &(strl_walk_desc){.memory_bytes = (uint64_t)1500 << 10, .error_px = 0.25});
+    strl_walk *walk =
+        open_walk(&source->base, &(strl_walk_desc){.memory_bytes = (uint64_t)1500 << 10, .error_px = 0.25});
     strl_camera camera = flight_camera(300);
     settle(walk, &camera, 1000);
     unsigned turns = 0;
@@ -113,8 +115,9 @@ static void a_budget_too_small_for_the_root_is_refused_in_one_sentence(void **st
     (void)state;
     strl_walk *walk;
     strl_error err = {0};
-    assert_int_equal(strl_walk_open(memory_source(model, model_bytes), &(strl_walk_desc){.memory_bytes = 50 << 10}, &walk, &err),
-                     STRL_ERR_MEMORY);
+    assert_int_equal(
+        strl_walk_open(memory_source(model, model_bytes), &(strl_walk_desc){.memory_bytes = 50 << 10}, &walk, &err),
+        STRL_ERR_MEMORY);
     assert_null(walk);
     assert_true(err.message[0] != 0);
 }

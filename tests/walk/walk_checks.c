@@ -15,7 +15,8 @@
 
 /* ---- source */
 
-static strl_status watched_submit(strl_source *source, uint64_t token, uint64_t offset, size_t size, float urgency, strl_error *err)
+static strl_status watched_submit(strl_source *source, uint64_t token, uint64_t offset, size_t size, float urgency,
+                                  strl_error *err)
 {
     return strl_source_submit(((watched_source *)source)->inner, token, offset, size, urgency, err);
 }
@@ -49,7 +50,8 @@ static void watched_close(strl_source *source)
 
 watched_source *watched_source_open(strl_source *inner)
 {
-    static const strl_source_class klass = {"watched", watched_submit, watched_poll, watched_cancel, watched_read, watched_close};
+    static const strl_source_class klass = {"watched",      watched_submit, watched_poll,
+                                            watched_cancel, watched_read,   watched_close};
     watched_source *self = strl__alloc_zero(1, sizeof *self);
     assert_non_null(self);
     self->base = (strl_source){&klass, inner->bytes};
@@ -75,7 +77,8 @@ double next_random(uint64_t *state)
 
 static strl_camera camera_at(double x, double y, double z, double to_x, double to_y, double to_z)
 {
-    return (strl_camera){.eye = {x, y, z}, .target = {to_x, to_y, to_z}, .up = {0, 0, 1}, .fov_y_deg = 60, .width = 1280, .height = 720};
+    return (strl_camera){
+        .eye = {x, y, z}, .target = {to_x, to_y, to_z}, .up = {0, 0, 1}, .fov_y_deg = 60, .width = 1280, .height = 720};
 }
 
 strl_camera random_camera(uint64_t *state)
@@ -84,13 +87,15 @@ strl_camera random_camera(uint64_t *state)
     for (unsigned i = 0; i < 6; i++)
         at[i] = next_random(state);
     double size = GRID_QUADS * GRID_SPACING * GRID_STEP, height = 1 + pow(at[2], 3) * 12 * size;
-    return camera_at((at[0] * 1.6 - 0.3) * size, (at[1] * 1.6 - 0.3) * size, 6 + height, at[3] * size, at[4] * size, at[5] * 4);
+    return camera_at((at[0] * 1.6 - 0.3) * size, (at[1] * 1.6 - 0.3) * size, 6 + height, at[3] * size, at[4] * size,
+                     at[5] * 4);
 }
 
 strl_camera flight_camera(unsigned at)
 {
     double size = GRID_QUADS * GRID_SPACING * GRID_STEP, turn = at * 0.004;
-    double x = size * (0.5 + 0.7 * cos(turn)), y = size * (0.5 + 0.5 * sin(1.7 * turn)), z = 8 + 25 * (1 + sin(2.3 * turn));
+    double x = size * (0.5 + 0.7 * cos(turn)), y = size * (0.5 + 0.5 * sin(1.7 * turn)),
+           z = 8 + 25 * (1 + sin(2.3 * turn));
     return camera_at(x, y, z, size * (0.5 + 0.2 * sin(turn)), size * 0.5, 0);
 }
 
@@ -122,8 +127,8 @@ strl_draw_list settle(strl_walk *walk, const strl_camera *camera, unsigned max_f
             return list;
         strl_walk_pump(walk, UINT64_MAX);
     }
-    fail_msg("not settled after %u frames: %u missing, %u pending", max_frames, strl_walk_get_stats(walk)->missing_nodes,
-             strl_walk_get_stats(walk)->requests_pending);
+    fail_msg("not settled after %u frames: %u missing, %u pending", max_frames,
+             strl_walk_get_stats(walk)->missing_nodes, strl_walk_get_stats(walk)->requests_pending);
     return (strl_draw_list){0};
 }
 

@@ -1,4 +1,5 @@
-/* What the walk's tests share: a source that notices waits, cameras, settling, and the checks of a draw list. */
+/* What the walk's tests share: a source that notices waits, cameras, settling, and the checks of a
+ * draw list. */
 #ifndef WALK_CHECKS_H
 #define WALK_CHECKS_H
 
@@ -9,7 +10,8 @@
 #include "source/source.h"
 #include "stroll/walk.h"
 
-/* Wraps another source (owned). Fails the test on a blocking read once `walking` is set; holds back a share of the answers. */
+/* Wraps another source (owned). Fails the test on a blocking read once `walking` is set; holds back
+ * a share of the answers. */
 typedef struct watched_source {
     strl_source base;
     strl_source *inner;
@@ -34,8 +36,9 @@ strl_walk *open_walk(strl_source *source, const strl_walk_desc *desc);
 strl_draw_list settle(strl_walk *walk, const strl_camera *camera, unsigned max_frames);
 strl_draw_list walk_frame(strl_walk *walk, const strl_camera *camera);
 
-/* The items of a placement cover the height field without a crack: every edge inside is run as often in one direction as in the
- * other (nodes may meet in an edge of four triangles), each open one lies on the rim, and the areas add up exactly. */
+/* The items of a placement cover the height field without a crack: every edge inside is run as
+ * often in one direction as in the other (nodes may meet in an edge of four triangles), each open
+ * one lies on the rim, and the areas add up exactly. */
 void check_cut_is_closed(const strl_draw_list *list, uint32_t placement);
 /* The same nodes in the same states with the same indices. */
 void check_same_lists(const strl_draw_list *a, const strl_draw_list *b);
