@@ -5,7 +5,6 @@
  * corner and vertex bound the memory, whatever the mesh. */
 #include "walk/internal.h"
 
-#include <assert.h>
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>
@@ -64,7 +63,10 @@ static strl_status allocate(const strl_node *record, const strl_pm *pm, strl__me
     size_t corners = 3 * (size_t)pm->triangle_count;
     size_t words = corners + 2 * added + 2 * states, halves = states + added + corners;
     size_t bytes = vertices * sizeof(strl_vertex) + words * 4 + halves * 2;
-    assert(bytes <= strl_node_decoded_bytes(record)); /* what the budget has reserved */
+    if (bytes > strl_node_decoded_bytes(record))
+        return strl__fail(err, STRL_ERR_INTERNAL,
+                          "a decoded node takes %zu bytes, expected at most the %" PRIu64 " reserved for it", bytes,
+                          strl_node_decoded_bytes(record));
     uint8_t *block = strl__alloc(1, bytes);
     if (!block)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %" PRIu32 " vertices", pm->vertex_count);
