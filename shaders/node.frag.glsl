@@ -37,7 +37,8 @@ void main()
     vec3 to_eye = u_orthographic != 0 ? vec3(0.0, 0.0, -1.0) : -normalize(v_view);
     float facing = dot(normal, to_eye);
     float up = dot(facing < 0.0 ? -normal : normal, u_sky_up);
-    vec3 light = AMBIENT + abs(facing) * (vec3(u_headlight) + mix(GROUND, SKY, 0.5 + 0.5 * up));
+    facing = abs(facing);
+    vec3 light = AMBIENT + facing * (facing * u_headlight + mix(GROUND, SKY, 0.5 + 0.5 * up));
     out_colour = vec4(encoded_of(v_colour.rgb * light), 1.0);
 #ifdef STRL_SYMMETRIC_DEPTH
     gl_FragDepth = u_orthographic != 0 ? gl_FragCoord.z : u_projection.z * gl_FragCoord.w;

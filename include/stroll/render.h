@@ -53,7 +53,7 @@ typedef struct strl_draw_options {
     bool flat;              /* normals of the triangles instead of those of the vertices */
     bool keep;              /* draw over the last image, which had the same camera, near and far */
     uint8_t background[3];  /* sRGB-encoded */
-    float headlight;        /* strength of the light at the eye; 0 = 0.62 */
+    float headlight;        /* strength of the light at the eye; 0 = 0.55 */
     double sky_up[3];       /* world direction from which the sky shines; zero = +z */
 } strl_draw_options;
 

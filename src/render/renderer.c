@@ -8,7 +8,7 @@
 
 #define DEFAULT_GPU_BYTES (512u << 20)
 #define MOST_SUPERSAMPLE 8u
-#define DEFAULT_HEADLIGHT 0.62f
+#define DEFAULT_HEADLIGHT 0.55f
 
 static strl_status check_size(uint32_t width, uint32_t height, strl_error *err)
 {

@@ -1,0 +1,81 @@
+/* Camera paths as JSON files. */
+#include <jansson.h>
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "camera_path.h"
+#include "frame/view.h"
+
+#define MOST_FRAMES 1000000u
+
+static bool read_vector(const json_t *frame, const char *name, double out[3])
+{
+    const json_t *array = json_object_get(frame, name);
+    if (json_array_size(array) != 3)
+        return false;
+    for (size_t i = 0; i < 3; i++) {
+        const json_t *number = json_array_get(array, i);
+        if (!json_is_number(number))
+            return false;
+        out[i] = json_number_value(number);
+    }
+    return true;
+}
+
+static strl_status read_frames(const json_t *root, const char *file, strl_camera_path *path, strl_error *err)
+{
+    const json_t *frames = json_object_get(root, "frames"), *fov = json_object_get(root, "fov_y_deg");
+    size_t count = json_array_size(frames);
+    if (count == 0 || count > MOST_FRAMES)
+        return strl__fail(err, STRL_ERR_FORMAT, "path file %s: expected \"frames\" with 1 to %u entries, found %zu", file, MOST_FRAMES, count);
+    *path = (strl_camera_path){json_is_number(fov) ? json_number_value(fov) : 60, count, strl__alloc_zero(count, sizeof *path->frames)};
+    if (!path->frames)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a path of %zu frames", count);
+    for (size_t f = 0; f < count; f++) {
+        const json_t *entry = json_array_get(frames, f);
+        strl_path_frame *frame = &path->frames[f];
+        strl_view view;
+        bool whole = read_vector(entry, "eye", frame->eye) && read_vector(entry, "target", frame->target) &&
+                     read_vector(entry, "up", frame->up);
+        strl_camera camera = strl_path_camera(path, f, (const uint32_t[2]){1, 1});
+        if (!whole || !(path->fov_y_deg > 0) || !strl_view_init(&view, &camera))
+            return strl__fail(err, STRL_ERR_FORMAT, "path file %s: frame %zu: expected eye, target and up of three numbers each that make a view",
+                              file, f);
+    }
+    return STRL_OK;
+}
+
+strl_status strl_path_load(const char *file, strl_camera_path *path, strl_error *err)
+{
+    *path = (strl_camera_path){0};
+    json_error_t json_error;
+    json_t *root = json_load_file(file, 0, &json_error);
+    if (!root)
+        return strl__fail(err, STRL_ERR_FORMAT, "path file %s: line %d: %s", file, json_error.line, json_error.text);
+    strl_status status = read_frames(root, file, path, err);
+    json_decref(root);
+    if (status != STRL_OK)
+        strl_path_deinit(path);
+    return status;
+}
+
+static json_t *vector_of(const double v[3])
+{
+    return json_pack("[f,f,f]", v[0], v[1], v[2]);
+}
+
+strl_status strl_path_save(const strl_camera_path *path, const char *file, strl_error *err)
+{
+    json_t *frames = json_array();
+    for (size_t f = 0; f < path->count; f++) {
+        const strl_path_frame *frame = &path->frames[f];
+        json_array_append_new(frames, json_pack("{s:o,s:o,s:o}", "eye", vector_of(frame->eye), "target", vector_of(frame->target), "up",
+                                                vector_of(frame->up)));
+    }
+    json_t *root = json_pack("{s:f,s:o}", "fov_y_deg", path->fov_y_deg, "frames", frames);
+    int failed = !root || json_array_size(frames) != path->count || json_dump_file(root, file, JSON_COMPACT | JSON_REAL_PRECISION(17)) != 0;
+    json_decref(root);
+    return failed ? strl__fail(err, STRL_ERR_IO, "cannot write the path file %s", file) : STRL_OK;
+}

@@ -1,0 +1,236 @@
+/* stroll render: images of a model without a window. */
+#include <inttypes.h>
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "camera_path.h"
+#include "options.h"
+#include "platform/thread.h"
+#include "progress.h"
+#include "render_model.h"
+#include "render_output.h"
+
+#define DEFAULT_FPS 60.0
+#define WALKER_METRES 1.7
+
+/* The command line, with its defaults. */
+typedef struct render_options {
+    const char *camera, *path, *save_path, *output, *stats;
+    uint64_t frames, seed, supersample, memory_bytes, gpu_memory_bytes;
+    uint32_t size[2];
+    double error_px, fps;
+    bool full, realtime, depth, wireframe, flat, no_occlusion;
+    int backend, debug;
+} render_options;
+
+static const char *const backend_words = "auto|gl45|gl3|null|gles";
+enum { BACKEND_AUTO, BACKEND_GL45, BACKEND_GL3, BACKEND_NULL, BACKEND_GLES };
+
+/* ---- cameras */
+
+/* What a path probe needs: the model is drawn at the probe's size, then the renderer gets its own size back. */
+typedef struct prober {
+    strl_render_model *model;
+    strl_renderer *renderer;
+} prober;
+
+static strl_status probe(void *context, const strl_camera *camera, float *depth, strl_error *err)
+{
+    prober *self = context;
+    strl_image_stats stats = {0};
+    const strl_draw_options options = {0};
+    strl_status status = strl_renderer_resize(self->renderer, camera->width, camera->height, err);
+    if (status == STRL_OK)
+        status = self->model->klass->draw(self->model, self->renderer, camera, &options, &stats, err);
+    return status == STRL_OK ? strl_renderer_read_depth(self->renderer, depth, err) : status;
+}
+
+static double metres_of(const char *unit)
+{
+    static const struct {
+        const char *name;
+        double metres;
+    } units[] = {{"m", 1}, {"km", 1000}, {"cm", 0.01}, {"mm", 0.001}, {"in", 0.0254}, {"ft", 0.3048}, {"um", 1e-6}, {"dm", 0.1}};
+    for (size_t u = 0; u < sizeof units / sizeof *units; u++)
+        if (strcmp(units[u].name, unit) == 0)
+            return units[u].metres;
+    return 0;
+}
+
+static strl_path_site make_site(const strl_render_model *model, prober *looks)
+{
+    strl_path_site site = {.up_axis = model->up_axis, .probe = probe, .context = looks};
+    double centre[3], radius, metres = metres_of(model->unit);
+    memcpy(site.bounds, model->bounds, sizeof site.bounds);
+    strl_path_sphere(site.bounds, centre, &radius);
+    site.eye_height = metres > 0 ? WALKER_METRES / metres : radius / 50;
+    return site;
+}
+
+/* A named path shows the model's surface to the probe: any size the renderer had is restored. */
+static strl_status make_path(const render_options *o, strl_render_model *model, strl_renderer *renderer, strl_camera_path *path,
+                             strl_error *err)
+{
+    prober looks = {model, renderer};
+    strl_path_site site = make_site(model, &looks);
+    strl_status status;
+    if (o->camera || !o->path)
+        status = strl_path_parse(&site, o->camera ? o->camera : "", path, err);
+    else if (strcmp(o->path, "orbit") == 0)
+        status = strl_path_orbit(&site, o->frames, path, err);
+    else if (strcmp(o->path, "walk") == 0)
+        status = strl_path_walk(&site, o->frames, o->seed, path, err);
+    else if (strcmp(o->path, "flythrough") == 0)
+        status = strl_path_flythrough(&site, o->frames, o->seed, path, err);
+    else
+        status = strl_path_load(o->path, path, err);
+    if (status == STRL_OK)
+        status = strl_renderer_resize(renderer, o->size[0], o->size[1], err);
+    return status;
+}
+
+/* ---- frames */
+
+static strl_draw_options draw_options(const render_options *o, const strl_render_model *model)
+{
+    strl_draw_options options = {.debug = (strl_debug_colour)o->debug, .wireframe = o->wireframe, .flat = o->flat, .background = {30, 33, 38}};
+    options.sky_up[model->up_axis] = 1;
+    return options;
+}
+
+/* Holds a realtime path to its rate; late frames follow at once. */
+static void keep_pace(const render_options *o, strl_render_model *model, uint64_t start_ns, size_t frame)
+{
+    uint64_t due = start_ns + (uint64_t)((double)frame * 1e9 / o->fps), now = strl_clock_ns();
+    if (o->realtime && now < due && model->klass->idle)
+        model->klass->idle(model, due - now);
+}
+
+static strl_status render_frames(const render_options *o, strl_render_model *model, strl_renderer *renderer,
+                                 const strl_camera_path *path, strl_cli_progress *progress, strl_error *err)
+{
+    strl_render_output output;
+    const strl_render_output_desc desc = {.path = o->backend == BACKEND_NULL ? NULL : o->output, .stats = o->stats, .depth = o->depth,
+                                          .realtime = o->realtime, .size = {o->size[0], o->size[1]}, .cameras = path};
+    strl_draw_options options = draw_options(o, model);
+    strl_status status = strl_render_output_init(&output, &desc, err);
+    if (status != STRL_OK)
+        return status;
+    uint64_t start = strl_clock_ns();
+    for (size_t f = 0; status == STRL_OK && f < path->count; f++) {
+        strl_camera camera = strl_path_camera(path, f, o->size);
+        strl_image_stats stats = {0};
+        keep_pace(o, model, start, f);
+        status = model->klass->draw(model, renderer, &camera, &options, &stats, err);
+        if (status == STRL_OK)
+            status = strl_render_output_add(&output, f, renderer, &stats, err);
+        strl_cli_progress_update(progress, "render", f + 1, path->count, "frames");
+    }
+    if (status == STRL_OK)
+        status = strl_render_output_finish(&output, err);
+    strl_render_output_deinit(&output);
+    return status;
+}
+
+static strl_status open_renderer(const render_options *o, strl_renderer **renderer, strl_error *err)
+{
+    static const strl_backend backends[] = {STRL_BACKEND_DEFAULT, STRL_BACKEND_GL45, STRL_BACKEND_GL3, STRL_BACKEND_NULL, STRL_BACKEND_GL3};
+    const strl_renderer_desc desc = {.backend = backends[o->backend], .gles = o->backend == BACKEND_GLES, .width = o->size[0],
+                                     .height = o->size[1], .supersample = (uint32_t)o->supersample,
+                                     .gpu_memory_bytes = o->gpu_memory_bytes};
+    return strl_renderer_create(&desc, renderer, err);
+}
+
+static strl_status render(const render_options *o, const char *input, strl_cli_progress *progress, strl_error *err)
+{
+    strl_render_model *model = NULL;
+    strl_renderer *renderer = NULL;
+    strl_camera_path path = {0};
+    const strl_render_model_desc desc = {.path = input, .full = o->full, .realtime = o->realtime, .error_px = o->error_px,
+                                         .memory_bytes = o->memory_bytes, .progress = progress};
+    strl_status status = open_renderer(o, &renderer, err);
+    if (status == STRL_OK)
+        status = strl_render_model_open(&desc, &model, err);
+    if (status == STRL_OK)
+        status = make_path(o, model, renderer, &path, err);
+    if (status == STRL_OK && o->save_path)
+        status = strl_path_save(&path, o->save_path, err);
+    if (status == STRL_OK)
+        status = render_frames(o, model, renderer, &path, progress, err);
+    strl_path_deinit(&path);
+    if (model)
+        model->klass->close(model);
+    strl_renderer_destroy(renderer);
+    return status;
+}
+
+/* ---- the command */
+
+static int check(const strl_cli_args *args, const render_options *o)
+{
+    if (o->camera && o->path)
+        return strl_cli_usage_error(args, "--camera and --path exclude each other");
+    if (!o->output && !o->stats && !o->save_path)
+        return strl_cli_usage_error(args, "nothing to write: give -o, --stats or --save-path");
+    if (o->backend == BACKEND_NULL && o->path && (strcmp(o->path, "walk") == 0 || strcmp(o->path, "flythrough") == 0))
+        return strl_cli_usage_error(args, "the null backend sees no surface to go along: save the path with another one and load it");
+    if (o->full && o->realtime)
+        return strl_cli_usage_error(args, "--full draws everything and --realtime what is there: choose one");
+    return -1;
+}
+
+static int run(strl_cli_args *args)
+{
+    render_options o = {.frames = 60, .seed = 1, .supersample = 1, .memory_bytes = 512ull << 20, .gpu_memory_bytes = 512ull << 20,
+                        .size = {1280, 720}, .error_px = 1, .fps = DEFAULT_FPS};
+    const strl_cli_option options[] = {
+        {.name = "camera", .kind = STRL_CLI_STRING, .value = &o.camera, .argument = "SPEC",
+         .help = "one image: \"eye x y z target x y z up x y z fov DEG\" (the orbit's first frame)"},
+        {.name = "path", .kind = STRL_CLI_STRING, .value = &o.path, .argument = "FILE|orbit|walk|flythrough", .help = "many images"},
+        {.name = "frames", .kind = STRL_CLI_COUNT, .value = &o.frames, .help = "of a named path (60)", .least = 1, .most = 1e6},
+        {.name = "seed", .kind = STRL_CLI_COUNT, .value = &o.seed, .help = "of a named path (1)"},
+        {.name = "save-path", .kind = STRL_CLI_STRING, .value = &o.save_path, .argument = "FILE",
+         .help = "write the cameras as JSON, for --path of another render"},
+        {.name = "size", .kind = STRL_CLI_SIZE, .value = o.size, .help = "pixels of an image (1280x720)"},
+        {.name = "error", .kind = STRL_CLI_REAL, .value = &o.error_px, .argument = "PX", .help = "allowed pixel error (1)",
+         .least = 1e-6, .most = 1e6},
+        {.name = "full", .kind = STRL_CLI_FLAG, .value = &o.full,
+         .help = "the finest level of a container; the triangles of a mesh file as read, held in memory"},
+        {.name = "realtime", .kind = STRL_CLI_REAL, .value = &o.fps, .argument = "FPS", .given = &o.realtime, .value_optional = true,
+         .help = "never wait for bytes; keep this rate (60)", .least = 1e-3, .most = 1e6},
+        {.name = "no-occlusion", .kind = STRL_CLI_FLAG, .value = &o.no_occlusion, .help = "draw hidden nodes too (always so in this version)"},
+        {.name = "memory", .letter = 'm', .kind = STRL_CLI_BYTES, .value = &o.memory_bytes, .help = "decoded nodes held (512M)",
+         .least = 1 << 20, .most = 1e15},
+        {.name = "gpu-memory", .kind = STRL_CLI_BYTES, .value = &o.gpu_memory_bytes, .help = "buffers of nodes (512M)",
+         .least = STRL_RENDERER_LEAST_GPU_BYTES, .most = 1e15},
+        {.name = "supersample", .kind = STRL_CLI_COUNT, .value = &o.supersample, .argument = "K",
+         .help = "draw K times wider and higher, filter in linear light (1)", .least = 1, .most = 8},
+        {.name = "depth", .kind = STRL_CLI_FLAG, .value = &o.depth,
+         .help = "write linear depth too: frame_00000.pfm, 32-bit floats, infinity = background"},
+        {.name = "output", .letter = 'o', .kind = STRL_CLI_STRING, .value = &o.output, .argument = "PNG or DIR",
+         .help = "where images go: frame_00000.png ..., contact.png and path.json in a folder"},
+        {.name = "stats", .kind = STRL_CLI_STRING, .value = &o.stats, .argument = "FILE.jsonl", .help = "one JSON object a frame"},
+        {.name = "backend", .kind = STRL_CLI_ENUM, .value = &o.backend, .argument = backend_words, .help = "what draws (auto)"},
+        {.name = "debug", .kind = STRL_CLI_ENUM, .value = &o.debug, .argument = "none|cluster|level|error", .help = "colour by it (none)"},
+        {.name = "wireframe", .kind = STRL_CLI_FLAG, .value = &o.wireframe, .help = "edges only"},
+        {.name = "flat", .kind = STRL_CLI_FLAG, .value = &o.flat, .help = "normals of triangles instead of vertices"},
+    };
+    const strl_cli_usage usage = {.positional = "MODEL", .least = 1, .most = 1, .options = options,
+                                  .option_count = STRL_CLI_COUNT_OF(options),
+                                  .notes = "MODEL is a container, or with --full also a PLY, STL or OBJ file."};
+    strl_cli_list inputs;
+    int stop = strl_cli_parse(args, &usage, &inputs);
+    if (stop < 0)
+        stop = check(args, &o);
+    if (stop >= 0)
+        return stop;
+    strl_cli_progress progress;
+    strl_error err = {0};
+    strl_cli_progress_init(&progress, args->quiet);
+    strl_status status = render(&o, inputs.items[0], &progress, &err);
+    strl_cli_progress_end(&progress);
+    return status == STRL_OK ? 0 : strl_cli_fail(&err);
+}
+
+STRL_CLI_COMMAND(render, "draw images of a model without a window", run);

@@ -1,0 +1,172 @@
+#include "render_output.h"
+
+#include <errno.h>
+#include <inttypes.h>
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "platform/file.h"
+
+#define MOST_SHEET_FRAMES 10000u
+
+static bool ends_in_png(const char *path)
+{
+    size_t length = strlen(path);
+    return length > 4 && strcmp(path + length - 4, ".png") == 0;
+}
+
+static strl_status check_path(const strl_render_output_desc *desc, bool folder, strl_error *err)
+{
+    if (!folder && desc->cameras->count > 1)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "%zu frames need a folder to go to, found the file name %s", desc->cameras->count, desc->path);
+    return folder ? strl_path_make_directory(desc->path, err) : STRL_OK;
+}
+
+static strl_status allocate(strl_render_output *output, strl_error *err)
+{
+    const uint32_t *size = output->desc.size;
+    size_t frames = output->desc.cameras->count, pixels = (size_t)size[0] * size[1];
+    strl_status status = strl_image_init(&output->image, size[0], size[1], err);
+    output->rgba = strl__alloc(pixels, 4);
+    output->depth = strl__alloc(pixels, sizeof *output->depth);
+    if (status == STRL_OK && (!output->rgba || !output->depth))
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for an image of %" PRIu32 "x%" PRIu32 " pixels", size[0], size[1]);
+    if (status == STRL_OK && output->folder && frames > 1 && frames <= MOST_SHEET_FRAMES)
+        status = strl_contact_sheet_init(&output->sheet, (uint32_t)frames, size[0], size[1], err);
+    return status;
+}
+
+strl_status strl_render_output_init(strl_render_output *output, const strl_render_output_desc *desc, strl_error *err)
+{
+    *output = (strl_render_output){.desc = *desc, .folder = desc->path && !ends_in_png(desc->path)};
+    strl_status status = desc->path ? check_path(desc, output->folder, err) : STRL_OK;
+    if (status == STRL_OK)
+        status = allocate(output, err);
+    if (status == STRL_OK && desc->stats) {
+        output->stats = fopen(desc->stats, "w");
+        if (!output->stats)
+            status = strl__fail(err, STRL_ERR_IO, "cannot create %s: %s", desc->stats, strerror(errno));
+    }
+    if (status != STRL_OK)
+        strl_render_output_deinit(output);
+    return status;
+}
+
+/* The name of one of a frame's files, owned by the caller. */
+static char *frame_path(const strl_render_output *output, size_t frame, const char *extension)
+{
+    if (output->folder) {
+        char name[48];
+        snprintf(name, sizeof name, "frame_%05zu%s", frame, extension);
+        return strl_path_join(output->desc.path, name);
+    }
+    char *path = strl__strdup(output->desc.path);
+    if (path)
+        memcpy(path + strlen(path) - 4, extension, 4);
+    return path;
+}
+
+static strl_status write_image(strl_render_output *output, size_t frame, strl_error *err)
+{
+    size_t pixels = (size_t)output->image.width * output->image.height;
+    for (size_t p = 0; p < pixels; p++)
+        memcpy(output->image.rgb + 3 * p, output->rgba + 4 * p, 3);
+    char *path = frame_path(output, frame, ".png");
+    strl_status status = path ? strl_image_write_png(&output->image, path, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
+    strl__free(path);
+    if (status == STRL_OK && output->sheet.image.rgb)
+        strl_contact_sheet_add(&output->sheet, (uint32_t)frame, &output->image);
+    return status;
+}
+
+static strl_status write_depth(strl_render_output *output, size_t frame, strl_error *err)
+{
+    char *path = frame_path(output, frame, ".pfm");
+    strl_status status = path ? strl_depth_write(output->depth, output->image.width, output->image.height, path, err)
+                              : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
+    strl__free(path);
+    return status;
+}
+
+static uint64_t count_covered(const strl_render_output *output)
+{
+    uint64_t covered = 0;
+    for (size_t p = 0; p < (size_t)output->image.width * output->image.height; p++)
+        covered += isfinite(output->depth[p]);
+    return covered;
+}
+
+static strl_status write_stats(strl_render_output *output, size_t frame, const strl_image_stats *s, strl_error *err)
+{
+    double frame_ms = (double)s->frame_ns * 1e-6, select_ms = (double)s->select_ns * 1e-6, draw_ms = (double)s->draw_ns * 1e-6;
+    char allowed[32] = "null", largest[32] = "null"; /* JSON has no infinity: a box round the eye */
+    if (s->allowed_error_px > 0 && isfinite(s->allowed_error_px))
+        snprintf(allowed, sizeof allowed, "%.6g", s->allowed_error_px);
+    if (isfinite(s->max_error_px))
+        snprintf(largest, sizeof largest, "%.6g", (double)s->max_error_px);
+    /* cull_ms: frustum culling is part of selecting; occlusion will have a stage of its own. */
+    fprintf(output->stats,
+            "{\"frame\":%zu,\"realtime\":%s,\"frame_ms\":%.4f,\"select_ms\":%.4f,\"cull_ms\":0,\"draw_ms\":%.4f,\"triangles\":%" PRIu64
+            ",\"splats\":0,\"nodes\":%" PRIu32 ",\"nodes_culled\":%" PRIu32 ",\"draws\":%" PRIu32 ",\"requests\":%" PRIu32
+            ",\"bytes_read\":%" PRIu64 ",\"resident_bytes\":%" PRIu64 ",\"gpu_bytes\":%" PRIu64 ",\"uploaded_bytes\":%" PRIu64
+            ",\"evictions\":%" PRIu32 ",\"covered_pixels\":%" PRIu64 ",\"max_error_px\":%s,\"allowed_error_px\":%s,"
+            "\"missing_nodes\":%" PRIu32 ",\"fronts\":%" PRIu32 "}\n",
+            frame, output->desc.realtime ? "true" : "false", frame_ms, select_ms, draw_ms, s->triangles, s->nodes, s->nodes_culled, s->draws,
+            s->requests, s->bytes_read, s->resident_bytes, s->gpu_bytes, s->uploaded_bytes, s->evictions, count_covered(output), largest,
+            allowed, s->missing_nodes, s->fronts);
+    return ferror(output->stats) ? strl__fail(err, STRL_ERR_IO, "cannot write %s: %s", output->desc.stats, strerror(errno)) : STRL_OK;
+}
+
+strl_status strl_render_output_add(strl_render_output *output, size_t frame, strl_renderer *renderer, const strl_image_stats *stats,
+                                   strl_error *err)
+{
+    strl_status status = STRL_OK;
+    bool images = output->desc.path != NULL;
+    if (images)
+        status = strl_renderer_read_colour(renderer, output->rgba, err);
+    if (status == STRL_OK && (output->stats || (images && output->desc.depth)))
+        status = strl_renderer_read_depth(renderer, output->depth, err);
+    if (status == STRL_OK && images)
+        status = write_image(output, frame, err);
+    if (status == STRL_OK && images && output->desc.depth)
+        status = write_depth(output, frame, err);
+    if (status == STRL_OK && output->stats)
+        status = write_stats(output, frame, stats, err);
+    return status;
+}
+
+strl_status strl_render_output_finish(strl_render_output *output, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    if (output->folder) {
+        char *sheet = strl_path_join(output->desc.path, "contact.png"), *cameras = strl_path_join(output->desc.path, "path.json");
+        if (!sheet || !cameras)
+            status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
+        if (status == STRL_OK && output->sheet.image.rgb)
+            status = strl_image_write_png(&output->sheet.image, sheet, err);
+        if (status == STRL_OK)
+            status = strl_path_save(output->desc.cameras, cameras, err);
+        strl__free(sheet);
+        strl__free(cameras);
+    }
+    if (output->stats) {
+        int failed = fclose(output->stats);
+        output->stats = NULL;
+        if (failed && status == STRL_OK)
+            status = strl__fail(err, STRL_ERR_IO, "cannot write %s: %s", output->desc.stats, strerror(errno));
+    }
+    return status;
+}
+
+void strl_render_output_deinit(strl_render_output *output)
+{
+    if (output->stats)
+        fclose(output->stats);
+    strl_image_deinit(&output->image);
+    strl_contact_sheet_deinit(&output->sheet);
+    strl__free(output->rgba);
+    strl__free(output->depth);
+    *output = (strl_render_output){0};
+}

@@ -1,0 +1,147 @@
+/* A walk through a container. Settled: fronts are selected until the wanted one is resident, then drawn. Realtime: one front, drawn as
+ * far as it is there. */
+#include <inttypes.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "jobs/pool.h"
+#include "platform/thread.h"
+#include "render_container.h"
+#include "render_model.h"
+#include "stroll/walk.h"
+
+#define READ_THREADS 2u
+#define WAIT_NS 200000u
+/* Fronts without any answer after which a settled image is given up: two seconds of nothing. */
+#define MOST_IDLE_FRONTS 10000u
+
+typedef struct walk_model {
+    strl_render_model base;
+    strl_walk *walk;
+    strl_pool *pool;
+    strl_executor executor;
+    bool realtime;
+} walk_model;
+
+static strl_status submit(void *context, void (*run)(void *job), void *job, strl_error *err)
+{
+    return strl_pool_submit(context, run, job, err);
+}
+
+static strl_status fail_unsettled(const strl_walk_stats *stats, strl_error *err)
+{
+    return strl__fail(err, STRL_ERR_IO, "the front does not become resident: %" PRIu32 " nodes are missing%s%.200s", stats->missing_nodes,
+                      stats->last_fault[0] ? ", last fault: " : " and nothing arrives", stats->last_fault);
+}
+
+/* Selects until nothing is missing. */
+static strl_status settle(walk_model *self, const strl_camera *camera, strl_draw_list *list, strl_image_stats *stats, strl_error *err)
+{
+    uint32_t idle = 0;
+    for (;;) {
+        strl_status status = strl_walk_frame(self->walk, camera, list, err);
+        const strl_walk_stats *now = strl_walk_get_stats(self->walk);
+        stats->fronts++;
+        stats->requests += now->requests;
+        stats->bytes_read += now->bytes_read;
+        stats->select_ns = now->select_ns;
+        if (status != STRL_OK || self->realtime || strl_walk_settled(self->walk))
+            return status;
+        bool busy = now->bytes_read || now->splits || now->collapses || now->vertex_splits || now->vertex_collapses;
+        idle = busy ? 0 : idle + 1;
+        if (idle > MOST_IDLE_FRONTS)
+            return fail_unsettled(now, err);
+        if (!busy)
+            strl_sleep_ns(WAIT_NS);
+    }
+}
+
+static void fill_stats(const strl_walk_stats *walk, strl_image_stats *stats)
+{
+    stats->nodes_culled = walk->nodes_culled;
+    stats->resident_bytes = walk->resident_bytes;
+    stats->missing_nodes = walk->missing_nodes;
+    stats->max_error_px = walk->max_error_px;
+    stats->allowed_error_px = walk->allowed_error_px;
+}
+
+static strl_status walk_draw(strl_render_model *model, strl_renderer *renderer, const strl_camera *camera,
+                             const strl_draw_options *options, strl_image_stats *stats, strl_error *err)
+{
+    walk_model *self = (walk_model *)model;
+    strl_draw_list list;
+    uint64_t start = strl_clock_ns();
+    strl_status status = settle(self, camera, &list, stats, err);
+    if (status != STRL_OK)
+        return status;
+    fill_stats(strl_walk_get_stats(self->walk), stats);
+    uint64_t selected = strl_clock_ns();
+    strl_render_stats drawn;
+    status = strl_renderer_draw(renderer, camera, &list, options, &drawn, err);
+    strl_renderer_finish(renderer);
+    uint64_t end = strl_clock_ns();
+    stats->draw_ns = end - selected;
+    stats->frame_ns = end - start;
+    strl_render_add_stats(stats, &drawn);
+    return status;
+}
+
+static void walk_idle(strl_render_model *model, uint64_t budget_ns)
+{
+    (void)model;
+    strl_sleep_ns(budget_ns); /* reading and decoding have threads of their own */
+}
+
+static void walk_close(strl_render_model *model)
+{
+    walk_model *self = (walk_model *)model;
+    strl_walk_close(self->walk);
+    strl_pool_destroy(self->pool);
+    strl__free(self);
+}
+
+static const strl_render_model_class walk_class = {.draw = walk_draw, .idle = walk_idle, .close = walk_close};
+
+/* Up axis and unit are not the walk's business: taken from the header by the blocking reader. */
+static strl_status read_facts(const char *path, strl_render_model *model, strl_error *err)
+{
+    strl_container *container = NULL;
+    strl_status status = strl_container_open_path(path, &container, err);
+    if (status == STRL_OK)
+        status = strl_render_container_facts(container, model, err);
+    strl_container_close(container);
+    return status;
+}
+
+static strl_status open_walk(walk_model *self, const strl_render_model_desc *desc, strl_error *err)
+{
+    strl_source *source = NULL;
+    unsigned processors = strl_cpu_count();
+    strl_status status = read_facts(desc->path, &self->base, err);
+    if (status == STRL_OK)
+        status = strl_pool_create(processors > 1 ? processors - 1 : 1, &self->pool, err);
+    if (status == STRL_OK)
+        status = strl_source_open_file(desc->path, READ_THREADS, &source, err);
+    if (status != STRL_OK)
+        return status;
+    self->executor = (strl_executor){self->pool, submit};
+    const strl_walk_desc walk = {.memory_bytes = desc->memory_bytes, .error_px = desc->error_px, .executor = &self->executor};
+    return strl_walk_open(source, &walk, &self->walk, err);
+}
+
+strl_status strl_render_walk_open(const strl_render_model_desc *desc, strl_render_model **model, strl_error *err)
+{
+    walk_model *self = strl__alloc_zero(1, sizeof *self);
+    if (!self)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a model");
+    self->base.klass = &walk_class;
+    self->realtime = desc->realtime;
+    strl_status status = open_walk(self, desc, err);
+    if (status != STRL_OK) {
+        walk_close(&self->base);
+        return status;
+    }
+    *model = &self->base;
+    return STRL_OK;
+}
