@@ -88,15 +88,30 @@ static strl_status decode_parts(struct strl__decoder *d, strl_cursor *cursor)
     if (!status && !strl__streams_done(&d->in))
         status = strl__fail(d->err, STRL_ERR_FORMAT, "node payload has numbers left over or too few");
     for (uint32_t t = 0; !status && t < sizes->triangle_count; t++)
-        memcpy(d->pm->triangle[t], d->mesh.triangle[t], sizeof d->pm->triangle[t]);
+        strl__mesh_get_triangle(&d->mesh, t, d->pm->triangle[t]);
     return status;
+}
+
+/* Makes scratch one block of about what a decode needs: blocks that come and go cost more page faults than the decoding. Where
+ * more is needed, the arena grows as usual. It keeps to what the caller's arena may still take. */
+static void reserve(const struct strl__decoder *d, size_t size, const strl_arena *arena, strl_arena *scratch)
+{
+    size_t limit = 0, wanted = 2 * size + (size_t)d->sizes.vertex_count * 128 + (size_t)d->sizes.triangle_count * 64 +
+                               (size_t)d->sizes.base_triangle_count * 60 + 32768;
+    if (arena->limit_bytes)
+        limit = arena->limit_bytes > arena->total_bytes ? arena->limit_bytes - arena->total_bytes : 1;
+    strl_arena_init(scratch, limit);
+    strl_arena_mark empty = strl_arena_get_mark(scratch);
+    strl_arena_alloc(scratch, wanted, 1);
+    strl_arena_rewind(scratch, empty);
 }
 
 strl_status strl_payload_decode(const void *data, size_t size, strl_arena *arena, strl_pm *pm, strl_error *err)
 {
     strl_cursor cursor = strl_cursor_make(data, size);
     strl_pm mesh = {0};
-    struct strl__decoder decoder = {.pm = &mesh, .scratch = arena, .err = err};
+    strl_arena scratch;
+    struct strl__decoder decoder = {.pm = &mesh, .scratch = &scratch, .err = err};
     uint8_t flags;
     *pm = mesh;
     strl_status status = read_head(&cursor, &decoder.sizes, &flags, err);
@@ -104,11 +119,10 @@ strl_status strl_payload_decode(const void *data, size_t size, strl_arena *arena
         return status;
     strl_arena_mark before = strl_arena_get_mark(arena);
     status = allocate(&decoder.sizes, flags, arena, &mesh, err);
-    if (!status) {
-        strl_arena_mark results = strl_arena_get_mark(arena);
+    reserve(&decoder, size, arena, &scratch);
+    if (!status)
         status = decode_parts(&decoder, &cursor);
-        strl_arena_rewind(arena, results);
-    }
+    strl_arena_deinit(&scratch);
     if (status)
         strl_arena_rewind(arena, before);
     else

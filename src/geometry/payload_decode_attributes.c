@@ -6,8 +6,7 @@
 
 static bool decode_normals(struct strl__decoder *d)
 {
-    uint64_t(*sum)[4] = strl__normal_sums((const int32_t(*)[3])d->mesh.position, d->sizes.vertex_count,
-                                          (const uint16_t(*)[4])d->mesh.triangle, d->sizes.triangle_count, d->scratch);
+    uint64_t(*sum)[4] = strl__normal_sums(&d->mesh, d->scratch);
     for (uint32_t v = 0; sum && v < d->sizes.vertex_count; v++) {
         uint32_t predicted[2];
         strl__normal_predict(sum[v], predicted);
@@ -61,18 +60,25 @@ static void decode_palette(struct strl__decoder *d)
     }
 }
 
-/* Codes fall from state to state: the first is given, then by how much. */
+/* The first state's code; then, until the finest state: how many states keep it, and by how much it falls after them. */
 static bool decode_errors(struct strl__decoder *d, unsigned id, float *error)
 {
-    uint32_t code = strl__pull(&d->in, id);
-    for (uint32_t s = 0; s <= d->sizes.step_count; s++) {
-        uint32_t fall = s ? strl__pull(&d->in, id) : 0;
-        if (code > STRL__ERROR_CODE_MAX || fall > code)
+    uint32_t code = strl__pull(&d->in, id), state = 0, last = d->sizes.step_count;
+    if (code > STRL__ERROR_CODE_MAX)
+        return false;
+    for (;;) {
+        uint32_t run = strl__pull(&d->in, id);
+        if (run > last - state)
+            return false;
+        for (uint32_t end = state + run; state <= end; state++)
+            error[state] = strl__error_of_code(code);
+        if (state > last)
+            return true;
+        uint32_t fall = strl__pull(&d->in, id);
+        if (fall > code || d->in.failed)
             return false;
         code -= fall;
-        error[s] = strl__error_of_code(code);
     }
-    return true;
 }
 
 strl_status strl__decode_attributes(struct strl__decoder *d)

@@ -9,6 +9,7 @@ struct splitter {
     struct strl__decoder *d;
     struct strl__star star;
     uint32_t step_first; /* first vertex of the step */
+    uint32_t *arc;       /* [triangles], places of the corners that move */
     uint64_t moves;      /* work so far, see STRL_PM_MAX_MOVES */
 };
 
@@ -27,39 +28,6 @@ static bool decode_wedge_parent(struct splitter *s, uint32_t previous, uint32_t 
     } while (at != previous);
     *parent = code;
     return code < s->step_first;
-}
-
-/* The arc of u's star that moves, by kind. */
-static bool decode_arc(struct splitter *s, unsigned kind, struct strl__arc *arc)
-{
-    const struct strl__star *star = &s->star;
-    uint32_t at = strl__pull(&s->d->in, STRL__STREAM_SPOKE);
-    *arc = (struct strl__arc){star->chain, 0, 0};
-    if (kind == STRL__KIND_CHAIN) {
-        if (at >= star->chain_count)
-            return false;
-        arc->chain += at;
-        arc->triangles = arc->chain->triangles;
-        return true;
-    }
-    if (at >= star->spoke_count)
-        return false;
-    uint32_t last = star->chain_count - 1;
-    while ((uint32_t)(arc->chain - star->chain) < last && at >= arc->chain[1].first_spoke)
-        arc->chain++;
-    arc->from = at - arc->chain->first_spoke;
-    if (kind == STRL__KIND_CUT) {
-        arc->triangles = strl__pull(&s->d->in, STRL__STREAM_ARC);
-        return arc->triangles <= arc->chain->triangles - (arc->chain->closed ? 0 : arc->from);
-    }
-    if (arc->chain->closed)
-        return false;
-    arc->triangles = arc->chain->triangles - arc->from;
-    if (kind == STRL__KIND_HEAD) {
-        arc->triangles = arc->from;
-        arc->from = 0;
-    }
-    return true;
 }
 
 /* What a step still needs of a wedge once its corners are known. */
@@ -83,58 +51,76 @@ static bool add_triangle(struct splitter *s, uint32_t a, uint32_t b, uint32_t c)
     return true;
 }
 
-/* A wedge whose corners are an arc. The spokes differ in position from u already; v must differ from them and from u. */
-static bool decode_simple(struct splitter *s, const struct wedge *w, unsigned kind)
+/* A wedge whose corners are an arc. The neighbours differ in position from u already; v must differ from them and from u. */
+static bool decode_arc(struct splitter *s, const struct wedge *w, unsigned kind)
 {
     struct strl__star *star = &s->star;
-    struct strl__arc arc;
-    if (!decode_arc(s, kind, &arc))
+    struct strl__mesh *mesh = &s->d->mesh;
+    const int32_t(*position)[3] = (const int32_t(*)[3])mesh->position;
+    const int32_t *origin = position[w->parent], *v = position[w->vertex];
+    uint32_t start = strl__pull(&s->d->in, STRL__STREAM_SPOKE), count = strl__pull(&s->d->in, STRL__STREAM_ARC), place = start;
+    struct strl__mean mean = {0};
+    bool sound = count < star->count;
+    if (!sound || start >= star->count)
         return false;
-    int32_t(*position)[3] = s->d->mesh.position;
-    const int32_t *origin = position[w->parent];
-    if (w->is_first) {
-        struct strl__mean mean = {0};
-        for (uint32_t i = 0; i <= arc.triangles; i++)
-            strl__mean_add(&mean, origin, position[strl__arc_spoke(star, &arc, i)]);
-        set_first_position(s, w, &mean);
+    strl__mean_add(&mean, origin, position[star->wing[start][0]]);
+    for (uint32_t i = 0;; i++) {
+        s->arc[i] = place;
+        strl__mean_add(&mean, origin, position[star->wing[place][1]]);
+        sound &= !star->moves[place];
+        star->moves[place] = 1;
+        if (i == count)
+            break;
+        place = strl__star_follower(star, star->wing[place][1]);
+        if (place == STRL__NONE)
+            return false;
     }
-    const int32_t(*fixed)[3] = (const int32_t(*)[3])position;
-    bool sound = kind == STRL__KIND_CHAIN || !strl__same_position(fixed, w->vertex, w->parent);
-    for (uint32_t i = 0; i <= arc.triangles; i++)
-        sound &= !strl__same_position(fixed, w->vertex, strl__arc_spoke(star, &arc, i));
-    for (uint32_t i = 0; i < arc.triangles; i++)
-        star->moves[star->order[strl__arc_place(&arc, i)]] = 1;
-    uint32_t a = strl__arc_spoke(star, &arc, 0), b = strl__arc_spoke(star, &arc, arc.triangles);
-    strl__star_move(star, &s->d->mesh, w->parent, w->vertex);
-    if (sound && (kind == STRL__KIND_CUT || kind == STRL__KIND_TAIL))
+    if (w->is_first)
+        set_first_position(s, w, &mean);
+    uint16_t a = star->wing[start][0], b = star->wing[place][1];
+    sound &= !strl__is_at(v, position[a]) && (!kind || !strl__is_at(v, origin));
+    for (uint32_t i = 0; i <= count; i++) {
+        place = s->arc[i];
+        star->moves[place] = 0;
+        sound &= !strl__is_at(v, position[star->wing[place][1]]);
+        strl__mesh_move_corner(mesh, star->corner[place], w->vertex);
+    }
+    if (sound && kind & STRL__KIND_START)
         sound = add_triangle(s, w->vertex, w->parent, a);
-    if (sound && (kind == STRL__KIND_CUT || kind == STRL__KIND_HEAD))
+    if (sound && kind & STRL__KIND_END)
         sound = add_triangle(s, w->vertex, b, w->parent);
     return sound;
 }
 
+/* 0 is the parent; then the x of all places, then their y; then vertices by number. */
 static bool decode_corner(struct splitter *s, uint32_t parent, uint32_t *vertex)
 {
-    uint32_t code = strl__pull(&s->d->in, STRL__STREAM_GENERAL), spokes = s->star.spoke_count;
-    *vertex = code == 0 ? parent : code <= spokes ? s->star.spoke[code - 1] : code - 1 - spokes;
+    uint32_t code = strl__pull(&s->d->in, STRL__STREAM_GENERAL), count = s->star.count;
+    if (code == 0)
+        *vertex = parent;
+    else if (code - 1 < 2 * count)
+        *vertex = s->star.wing[(code - 1) % count][(code - 1) / count];
+    else
+        *vertex = code - 1 - 2 * count;
     return *vertex < s->step_first;
 }
 
-/* Runs of corners that stay and go, in turn. */
-static bool decode_runs(struct splitter *s, const struct wedge *w, struct strl__mean *mean)
+/* Runs of corners that stay and go, in turn. Those that go are put in s->arc. */
+static bool decode_runs(struct splitter *s, const struct wedge *w, struct strl__mean *mean, uint32_t *moved)
 {
     struct strl__star *star = &s->star;
     const int32_t(*position)[3] = (const int32_t(*)[3])s->d->mesh.position;
-    uint8_t moves = 0;
-    for (uint32_t done = 0; done < star->count; moves ^= 1) {
+    bool moves = false;
+    for (uint32_t done = 0; done < star->count; moves = !moves) {
         uint32_t run = strl__pull(&s->d->in, STRL__STREAM_GENERAL);
         if (run > star->count - done || (run == 0 && done) || s->d->in.failed)
             return false;
         for (uint32_t end = done + run; done < end; done++) {
-            uint32_t place = star->order[done];
-            star->moves[place] = moves;
-            for (unsigned k = 0; moves && k < 2; k++)
-                strl__mean_add(mean, position[w->parent], position[star->wing[place][k]]);
+            if (!moves)
+                continue;
+            s->arc[(*moved)++] = done;
+            strl__mean_add(mean, position[w->parent], position[star->wing[done][0]]);
+            strl__mean_add(mean, position[w->parent], position[star->wing[done][1]]);
         }
     }
     return true;
@@ -145,15 +131,17 @@ static bool decode_general(struct splitter *s, const struct wedge *w)
     struct strl__star *star = &s->star;
     const int32_t(*position)[3] = (const int32_t(*)[3])s->d->mesh.position;
     struct strl__mean mean = {0};
-    if (!decode_runs(s, w, &mean))
+    uint32_t moved = 0;
+    if (!decode_runs(s, w, &mean, &moved))
         return false;
     if (w->is_first)
         set_first_position(s, w, &mean);
-    for (uint32_t i = 0; i < star->count; i++)
-        for (unsigned k = 0; star->moves[i] && k < 2; k++)
-            if (strl__same_position(position, w->vertex, star->wing[i][k]))
-                return false;
-    strl__star_move(star, &s->d->mesh, w->parent, w->vertex);
+    for (uint32_t i = 0; i < moved; i++) {
+        const uint16_t *wing = star->wing[s->arc[i]];
+        if (strl__same_position(position, w->vertex, wing[0]) || strl__same_position(position, w->vertex, wing[1]))
+            return false;
+        strl__mesh_move_corner(&s->d->mesh, star->corner[s->arc[i]], w->vertex);
+    }
     uint32_t triangles = strl__pull(&s->d->in, STRL__STREAM_GENERAL);
     for (uint32_t i = 0; i < triangles; i++) {
         uint32_t x, y;
@@ -180,7 +168,7 @@ static bool decode_wedge(struct splitter *s, uint32_t parent, unsigned kind)
     s->moves += s->star.count;
     if (s->moves > STRL_PM_MAX_MOVES)
         return false;
-    return kind == STRL__KIND_GENERAL ? decode_general(s, &w) : kind < STRL__KIND_GENERAL && decode_simple(s, &w, kind);
+    return kind == STRL__KIND_GENERAL ? decode_general(s, &w) : kind < STRL__KIND_GENERAL && decode_arc(s, &w, kind);
 }
 
 static bool decode_step(struct splitter *s)
@@ -207,7 +195,8 @@ static bool decode_step(struct splitter *s)
 strl_status strl__decode_steps(struct strl__decoder *d)
 {
     struct splitter s = {.d = d};
-    if (!strl__star_init(&s.star, d->sizes.vertex_count, d->sizes.triangle_count, d->scratch))
+    s.arc = strl_arena_alloc(d->scratch, d->sizes.triangle_count, sizeof *s.arc);
+    if (!s.arc || !strl__star_init(&s.star, d->sizes.vertex_count, d->sizes.triangle_count, d->scratch))
         return strl__fail(d->err, STRL_ERR_MEMORY, "no memory to decode a node payload");
     for (uint32_t step = 1; step <= d->sizes.step_count; step++) {
         if (!decode_step(&s))

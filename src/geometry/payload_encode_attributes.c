@@ -18,8 +18,7 @@ static uint32_t predictor(const struct strl__encoder *e, uint32_t v)
 static bool encode_normals(struct strl__encoder *e)
 {
     uint32_t count = e->pm->vertex_count;
-    uint64_t(*sum)[4] = strl__normal_sums((const int32_t(*)[3])e->mesh.position, count, (const uint16_t(*)[4])e->mesh.triangle,
-                                          e->mesh.triangle_count, e->scratch);
+    uint64_t(*sum)[4] = strl__normal_sums(&e->mesh, e->scratch);
     for (uint32_t v = 0; sum && v < count; v++) {
         uint32_t predicted[2];
         strl__normal_predict(sum[v], predicted);
@@ -69,13 +68,20 @@ static void encode_palette(struct strl__encoder *e)
 
 static void encode_errors(struct strl__encoder *e, unsigned id, const float *error)
 {
-    uint32_t before = strl__code_of_error(error[0]);
+    uint32_t before = strl__code_of_error(error[0]), run = 0;
     strl__push(&e->out, id, before);
     for (uint32_t s = 1; s <= e->pm->step_count; s++) {
         uint32_t code = error[s] < error[s - 1] ? strl__code_of_error(error[s]) : before;
+        if (code == before) {
+            run++;
+            continue;
+        }
+        strl__push(&e->out, id, run);
         strl__push(&e->out, id, before - code);
         before = code;
+        run = 0;
     }
+    strl__push(&e->out, id, run);
 }
 
 strl_status strl__encode_attributes(struct strl__encoder *e)

@@ -8,6 +8,8 @@
 struct recorder {
     struct strl__encoder *e;
     struct strl__star star;
+    uint32_t *arc;       /* [triangles], places of the corners that move, in the order in which the decoder moves them */
+    uint16_t *ends;      /* [vertices], the last step's vertex for which a moving triangle (u, x, y) had this y */
     uint16_t *stamp;     /* [4 * triangles], the last step's vertex to which a corner went */
     uint32_t step_first; /* first vertex of the step */
     uint32_t vertex, parent;
@@ -48,76 +50,62 @@ static uint32_t added_corner(const struct recorder *r, uint32_t added, unsigned 
     return r->e->number[r->e->birth[added / 3][(added % 3 + i) % 3]];
 }
 
-/* Whether the marked corners are just those of the arc. */
-static bool moves_arc(const struct recorder *r, const struct strl__arc *arc)
-{
-    if (r->moved != arc->triangles)
-        return false;
-    for (uint32_t i = 0; i < arc->triangles; i++)
-        if (!r->star.moves[r->star.order[strl__arc_place(arc, i)]])
-            return false;
-    return true;
-}
-
-/* Fits an arc from the spoke of a chain, by kind; end: the vertex of its last spoke, for cuts. */
-static bool fit_spoke(const struct recorder *r, unsigned kind, uint32_t local, uint32_t end, struct strl__arc *arc)
-{
-    arc->from = kind == STRL__KIND_HEAD ? 0 : local;
-    arc->triangles = kind == STRL__KIND_HEAD ? local : kind == STRL__KIND_CUT ? r->moved : arc->chain->triangles - local;
-    if (kind != STRL__KIND_CUT)
-        return !arc->chain->closed && moves_arc(r, arc);
-    return arc->triangles <= arc->chain->triangles - (arc->chain->closed ? 0 : local) &&
-           strl__arc_spoke(&r->star, arc, arc->triangles) == end && moves_arc(r, arc);
-}
-
-/* The spoke at which an arc of this kind is just what moves, or STRL__NONE. spoke: the vertex there. */
-static uint32_t fit_arc(const struct recorder *r, unsigned kind, uint32_t spoke, uint32_t end, struct strl__arc *arc)
+/* Follows the decoder's arc from a place: true where it is just what moves. Leaves it in r->arc. */
+static bool follow_arc(struct recorder *r, uint32_t place)
 {
     const struct strl__star *star = &r->star;
-    for (arc->chain = star->chain; arc->chain < star->chain + star->chain_count; arc->chain++) {
-        uint32_t spokes = arc->chain->triangles + !arc->chain->closed;
-        for (uint32_t local = 0; local < spokes; local++)
-            if (star->spoke[arc->chain->first_spoke + local] == spoke && fit_spoke(r, kind, local, end, arc))
-                return arc->chain->first_spoke + local;
+    uint32_t count = 0;
+    bool arrived = true;
+    while (arrived && place != STRL__NONE && star->moves[place]) {
+        star->moves[place] = 0; /* each once */
+        r->arc[count++] = place;
+        arrived = count < r->moved;
+        place = strl__star_follower(star, star->wing[place][1]);
     }
-    return STRL__NONE;
+    for (uint32_t i = 0; i < count; i++)
+        star->moves[r->arc[i]] = 1;
+    return count == r->moved;
 }
 
-static uint32_t fit_chain(const struct recorder *r, struct strl__arc *arc)
+/* Finds the arc that begins at vertex a, or at any where a is STRL__NONE. */
+static bool find_arc(struct recorder *r, uint32_t a)
 {
-    for (uint32_t i = 0; i < r->star.chain_count; i++) {
-        *arc = (struct strl__arc){&r->star.chain[i], 0, r->star.chain[i].triangles};
-        if (moves_arc(r, arc))
-            return i;
+    const struct strl__star *star = &r->star;
+    uint32_t start = STRL__NONE;
+    for (uint32_t i = 0; i < star->count; i++)
+        if (star->moves[i])
+            r->ends[star->wing[i][1]] = (uint16_t)r->vertex;
+    for (uint32_t i = 0; i < star->count; i++) {
+        if (!star->moves[i])
+            continue;
+        if (a != STRL__NONE && star->wing[i][0] == a && follow_arc(r, i))
+            return true;
+        if (start == STRL__NONE || r->ends[star->wing[i][0]] != r->vertex)
+            start = i; /* nothing that moves leads here */
     }
-    return STRL__NONE;
+    return a == STRL__NONE && start != STRL__NONE && follow_arc(r, start);
 }
 
-/* Finds the kind that says just what happens; *at: what the spoke stream holds for it. Orders r->added as the kind does. */
-static unsigned choose_kind(struct recorder *r, uint32_t *at, struct strl__arc *arc)
+/* Finds the kind that says just what happens; r->arc is then the arc. Orders r->added as the kind does. */
+static unsigned choose_kind(struct recorder *r)
 {
-    uint32_t parent = r->parent;
-    if (r->added_count == 0 && (*at = fit_chain(r, arc)) != STRL__NONE)
-        return STRL__KIND_CHAIN;
-    if (r->added_count == 1) {
-        uint32_t x = added_corner(r, r->added[0], 1), y = added_corner(r, r->added[0], 2);
-        if (x == parent && (*at = fit_arc(r, STRL__KIND_TAIL, y, 0, arc)) != STRL__NONE)
-            return STRL__KIND_TAIL;
-        if (y == parent && (*at = fit_arc(r, STRL__KIND_HEAD, x, 0, arc)) != STRL__NONE)
-            return STRL__KIND_HEAD;
+    uint32_t parent = r->parent, count = r->added_count;
+    if (count > 2 || r->moved == 0)
+        return STRL__KIND_GENERAL;
+    if (count == 2 && added_corner(r, r->added[0], 1) != parent) {
+        uint32_t swap = r->added[0];
+        r->added[0] = r->added[1];
+        r->added[1] = swap;
     }
-    if (r->added_count == 2) {
-        if (added_corner(r, r->added[0], 1) != parent) {
-            uint32_t swap = r->added[0];
-            r->added[0] = r->added[1];
-            r->added[1] = swap;
-        }
-        uint32_t a = added_corner(r, r->added[0], 2), b = added_corner(r, r->added[1], 1);
-        if (added_corner(r, r->added[0], 1) == parent && added_corner(r, r->added[1], 2) == parent &&
-            (*at = fit_arc(r, STRL__KIND_CUT, a, b, arc)) != STRL__NONE)
-            return STRL__KIND_CUT;
-    }
-    return STRL__KIND_GENERAL;
+    bool start = count > 0 && added_corner(r, r->added[0], 1) == parent;
+    bool end = count > 0 && added_corner(r, r->added[count - 1], 2) == parent;
+    if (count != (uint32_t)start + end)
+        return STRL__KIND_GENERAL;
+    if (!find_arc(r, start ? added_corner(r, r->added[0], 2) : STRL__NONE))
+        return STRL__KIND_GENERAL;
+    if (end && r->star.wing[r->arc[r->moved - 1]][1] != added_corner(r, r->added[count - 1], 1))
+        return STRL__KIND_GENERAL;
+    return (start ? STRL__KIND_START : 0u) | (end ? STRL__KIND_END : 0u);
 }
 
 static void push_step_position(struct recorder *r, const struct strl__mean *mean)
@@ -127,41 +115,51 @@ static void push_step_position(struct recorder *r, const struct strl__mean *mean
     strl__push_position(r->e, STRL__STREAM_STEP_POSITION, predicted, r->vertex);
 }
 
-static void encode_simple(struct recorder *r, unsigned kind, uint32_t at, const struct strl__arc *arc)
+static void encode_arc(struct recorder *r)
 {
     struct strl__encoder *e = r->e;
-    strl__push(&e->out, STRL__STREAM_SPOKE, at);
-    if (kind == STRL__KIND_CUT)
-        strl__push(&e->out, STRL__STREAM_ARC, arc->triangles);
+    const struct strl__star *star = &r->star;
+    const int32_t *origin = e->mesh.position[r->parent];
+    strl__push(&e->out, STRL__STREAM_SPOKE, r->arc[0]);
+    strl__push(&e->out, STRL__STREAM_ARC, r->moved - 1);
     if (r->vertex != r->step_first)
         return;
     struct strl__mean mean = {0};
-    for (uint32_t i = 0; i <= arc->triangles; i++)
-        strl__mean_add(&mean, e->mesh.position[r->parent], e->mesh.position[strl__arc_spoke(&r->star, arc, i)]);
+    strl__mean_add(&mean, origin, e->mesh.position[star->wing[r->arc[0]][0]]);
+    for (uint32_t i = 0; i < r->moved; i++)
+        strl__mean_add(&mean, origin, e->mesh.position[star->wing[r->arc[i]][1]]);
     push_step_position(r, &mean);
 }
 
 static uint32_t corner_code(const struct recorder *r, uint32_t vertex)
 {
+    const struct strl__star *star = &r->star;
     if (vertex == r->parent)
         return 0;
-    for (uint32_t i = 0; i < r->star.spoke_count; i++)
-        if (r->star.spoke[i] == vertex)
-            return 1 + i;
-    return 1 + r->star.spoke_count + vertex;
+    for (uint32_t i = 0; i < star->count; i++)
+        for (uint32_t k = 0; k < 2; k++)
+            if (star->wing[i][k] == vertex)
+                return 1 + k * star->count + i;
+    return 1 + 2 * star->count + vertex;
 }
 
 static void encode_general(struct recorder *r)
 {
     struct strl__encoder *e = r->e;
     const struct strl__star *star = &r->star;
+    const int32_t *origin = e->mesh.position[r->parent];
     struct strl__mean mean = {0};
+    uint32_t moved = 0;
     uint8_t moves = 0;
     for (uint32_t done = 0; done < star->count; moves ^= 1) {
         uint32_t run = 0;
-        for (; done < star->count && star->moves[star->order[done]] == moves; done++, run++)
-            for (unsigned k = 0; moves && k < 2; k++)
-                strl__mean_add(&mean, e->mesh.position[r->parent], e->mesh.position[star->wing[star->order[done]][k]]);
+        for (; done < star->count && star->moves[done] == moves; done++, run++) {
+            if (!moves)
+                continue;
+            r->arc[moved++] = done;
+            strl__mean_add(&mean, origin, e->mesh.position[star->wing[done][0]]);
+            strl__mean_add(&mean, origin, e->mesh.position[star->wing[done][1]]);
+        }
         strl__push(&e->out, STRL__STREAM_GENERAL, run);
     }
     if (r->vertex == r->step_first)
@@ -196,15 +194,14 @@ static void encode_wedge(struct recorder *r, uint32_t step)
     r->moves += r->star.count;
     mark_moves(r);
     find_added(r, step);
-    uint32_t at;
-    struct strl__arc arc;
-    unsigned kind = choose_kind(r, &at, &arc);
+    unsigned kind = choose_kind(r);
     strl__push(&e->out, STRL__STREAM_KIND, kind << 1 | !is_last);
     if (kind == STRL__KIND_GENERAL)
         encode_general(r);
     else
-        encode_simple(r, kind, at, &arc);
-    strl__star_move(&r->star, &e->mesh, r->parent, r->vertex);
+        encode_arc(r);
+    for (uint32_t i = 0; i < r->moved; i++)
+        strl__mesh_move_corner(&e->mesh, r->star.corner[r->arc[i]], r->vertex);
     for (uint32_t i = 0; i < r->added_count; i++) {
         uint32_t corner[3] = {r->vertex, added_corner(r, r->added[i], 1), added_corner(r, r->added[i], 2)};
         strl__encode_triangle(e, r->added[i] / 3, r->added[i] % 3, corner);
@@ -232,7 +229,9 @@ strl_status strl__encode_steps(struct strl__encoder *e)
     uint32_t triangles = e->pm->triangle_count;
     r.stamp = strl_arena_alloc_zero(e->scratch, (size_t)triangles * 4, sizeof *r.stamp);
     r.added = strl_arena_alloc(e->scratch, triangles, sizeof *r.added);
-    if (!r.stamp || !r.added || !strl__star_init(&r.star, e->pm->vertex_count, triangles, e->scratch))
+    r.arc = strl_arena_alloc(e->scratch, triangles, sizeof *r.arc);
+    r.ends = strl_arena_alloc_zero(e->scratch, e->pm->vertex_count, sizeof *r.ends);
+    if (!r.stamp || !r.added || !r.arc || !r.ends || !strl__star_init(&r.star, e->pm->vertex_count, triangles, e->scratch))
         return strl__fail(e->err, STRL_ERR_MEMORY, "no memory to encode a node payload");
     for (uint32_t step = 1; step <= e->pm->step_count; step++) {
         encode_step(&r, step);

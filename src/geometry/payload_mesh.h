@@ -12,38 +12,77 @@
 
 #define STRL__NONE 0xffffffffu
 
+/* Corner k of triangle t has the number 4 t + k; every fourth is unused. Behind them lies one head for each vertex: the list of
+ * the corners at a vertex is a ring through its head, newest first. What a walk round a vertex needs lies together. */
+struct strl__corner {
+    uint32_t next, previous;
+    uint16_t wing[2]; /* the vertices that follow in the triangle */
+};
+
 struct strl__mesh {
     int32_t (*position)[3];
-    uint16_t (*triangle)[4]; /* three corners; corner k of triangle t has the number 4 t + k */
-    uint32_t *next;          /* [4 * triangles], the next corner at the same vertex, with a smaller number */
-    uint32_t *first;         /* [vertices], first corner at a vertex */
-    uint16_t *twin;          /* [vertices], rings of vertices known to share a position */
+    struct strl__corner *corner;
+    uint32_t heads;  /* the number of vertex 0's head */
+    uint16_t *twin;  /* [vertices], rings of vertices known to share a position */
     uint32_t vertex_count, triangle_count; /* so far */
 };
 
 bool strl__mesh_init(struct strl__mesh *mesh, uint32_t vertices, uint32_t triangles, int32_t (*position)[3], strl_arena *scratch);
 
-static inline unsigned strl__next3(unsigned k) { return k == 2 ? 0 : k + 1; }
+/* (k + 1) % 3 and (k + 2) % 3 for k < 3, without a branch. */
+static inline unsigned strl__next3(unsigned k) { return 9u >> (2 * k) & 3; }
+static inline unsigned strl__last3(unsigned k) { return 18u >> (2 * k) & 3; }
 
-static inline void strl__mesh_add_corner(struct strl__mesh *mesh, uint32_t corner, uint32_t vertex)
+static inline void strl__mesh_push_corner(struct strl__mesh *mesh, uint32_t corner, uint32_t vertex)
 {
-    mesh->triangle[corner >> 2][corner & 3] = (uint16_t)vertex;
-    mesh->next[corner] = mesh->first[vertex];
-    mesh->first[vertex] = corner;
+    struct strl__corner *corners = mesh->corner;
+    uint32_t head = mesh->heads + vertex, next = corners[head].next;
+    corners[corner].next = next;
+    corners[corner].previous = head;
+    corners[next].previous = corner;
+    corners[head].next = corner;
 }
 
 static inline void strl__mesh_add_triangle(struct strl__mesh *mesh, uint32_t a, uint32_t b, uint32_t c)
 {
     uint32_t corner = 4 * mesh->triangle_count++;
-    strl__mesh_add_corner(mesh, corner, a);
-    strl__mesh_add_corner(mesh, corner + 1, b);
-    strl__mesh_add_corner(mesh, corner + 2, c);
+    struct strl__corner *corners = &mesh->corner[corner];
+    corners[0].wing[0] = corners[2].wing[1] = (uint16_t)b;
+    corners[1].wing[0] = corners[0].wing[1] = (uint16_t)c;
+    corners[2].wing[0] = corners[1].wing[1] = (uint16_t)a;
+    strl__mesh_push_corner(mesh, corner, a);
+    strl__mesh_push_corner(mesh, corner + 1, b);
+    strl__mesh_push_corner(mesh, corner + 2, c);
+}
+
+/* Takes a corner out of its list and puts it in front of vertex's. */
+static inline void strl__mesh_move_corner(struct strl__mesh *mesh, uint32_t corner, uint32_t vertex)
+{
+    struct strl__corner *corners = mesh->corner;
+    uint32_t next = corners[corner].next, previous = corners[corner].previous;
+    corners[previous].next = next;
+    corners[next].previous = previous;
+    strl__mesh_push_corner(mesh, corner, vertex);
+    corners[(corner & ~3u) + strl__next3(corner & 3)].wing[1] = (uint16_t)vertex;
+    corners[(corner & ~3u) + strl__last3(corner & 3)].wing[0] = (uint16_t)vertex;
+}
+
+static inline void strl__mesh_get_triangle(const struct strl__mesh *mesh, uint32_t t, uint16_t vertex[3])
+{
+    const struct strl__corner *corner = &mesh->corner[4 * t];
+    vertex[0] = corner[1].wing[1];
+    vertex[1] = corner[0].wing[0];
+    vertex[2] = corner[0].wing[1];
+}
+
+static inline bool strl__is_at(const int32_t p[3], const int32_t q[3])
+{
+    return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
 }
 
 static inline bool strl__same_position(const int32_t (*position)[3], uint32_t a, uint32_t b)
 {
-    const int32_t *p = position[a], *q = position[b];
-    return !((p[0] ^ q[0]) | (p[1] ^ q[1]) | (p[2] ^ q[2]));
+    return strl__is_at(position[a], position[b]);
 }
 
 static inline void strl__twin_join(uint16_t *twin, uint32_t ring, uint32_t vertex)
@@ -52,70 +91,43 @@ static inline void strl__twin_join(uint16_t *twin, uint32_t ring, uint32_t verte
     twin[ring] = (uint16_t)vertex;
 }
 
-/* ---- the star of a vertex ----
- * Its triangles in chains: triangle (u, x, y) is followed by the first listed (u, y, z), where it is itself the first listed
- * with y last. A chain is closed where it runs back into its first triangle. Spokes are the vertices x along a chain and, where
- * it is open, its last y. */
-struct strl__chain {
-    uint32_t first_triangle, triangles; /* places in `order` */
-    uint32_t first_spoke;               /* place in `spoke`; an open chain has one spoke more than triangles */
-    bool closed;
-};
-
+/* ---- the star of a vertex: its corners in the order of its list, each with a place from 0 ---- */
 struct strl__star {
-    uint32_t count;       /* triangles */
-    uint32_t *corner;     /* [count], the corners at the vertex, by falling number */
-    uint16_t (*wing)[2];  /* [count], x and y */
-    uint32_t *order;      /* [count], places in `corner`, chain by chain */
-    uint16_t *spoke;      /* [spoke_count] */
-    uint32_t spoke_count;
-    struct strl__chain *chain;
-    uint32_t chain_count;
-    uint8_t *moves;       /* [count], by place in `corner`: the corner goes to the new vertex */
-    uint32_t *begins;     /* [vertices], scratch: first place with this x; stale entries are recognised */
-    uint32_t *ends;       /* [vertices], scratch: first place with this y */
-    uint32_t *link;       /* [count], scratch: the place that follows */
-    uint8_t *placed;      /* [count], scratch */
+    uint32_t count;
+    uint32_t *corner;    /* [count] */
+    uint16_t (*wing)[2]; /* [count], x and y of the triangle (vertex, x, y) */
+    uint8_t *moves;      /* [count], for the users of the star: the corner goes to the new vertex; false at first */
+    uint32_t *begins;    /* [vertices], the last place with this x; stale entries are recognised */
 };
 
 /* Room for stars of up to `triangles`. */
 bool strl__star_init(struct strl__star *star, uint32_t vertices, uint32_t triangles, strl_arena *scratch);
-/* Fills star for `vertex`; moves is all false. */
-void strl__star_build(struct strl__star *star, const struct strl__mesh *mesh, uint32_t vertex);
 
-/* An arc of a chain: `triangles` triangles from local spoke `from`. */
-struct strl__arc {
-    const struct strl__chain *chain;
-    uint32_t from, triangles;
-};
-
-/* Place in star->order of the arc's i-th triangle, and the arc's i-th spoke (0..triangles). */
-static inline uint32_t strl__arc_place(const struct strl__arc *arc, uint32_t i)
+static inline void strl__star_build(struct strl__star *star, const struct strl__mesh *mesh, uint32_t vertex)
 {
-    uint32_t local = arc->from + i;
-    return arc->chain->first_triangle + (local >= arc->chain->triangles ? local - arc->chain->triangles : local);
+    const struct strl__corner *corners = mesh->corner;
+    uint32_t count = 0, heads = mesh->heads, *corner = star->corner, *begins = star->begins;
+    uint16_t(*wing)[2] = star->wing;
+    for (uint32_t c = corners[heads + vertex].next; c < heads; c = corners[c].next) {
+        corner[count] = c;
+        wing[count][0] = corners[c].wing[0];
+        wing[count][1] = corners[c].wing[1];
+        begins[corners[c].wing[0]] = count++;
+    }
+    star->count = count;
 }
 
-static inline uint16_t strl__arc_spoke(const struct strl__star *star, const struct strl__arc *arc, uint32_t i)
+/* The place of the triangle that follows (vertex, x, y) round the vertex: the last with y for its x. STRL__NONE without one. */
+static inline uint32_t strl__star_follower(const struct strl__star *star, uint16_t y)
 {
-    uint32_t local = arc->from + i;
-    if (arc->chain->closed && local >= arc->chain->triangles)
-        local -= arc->chain->triangles;
-    return star->spoke[arc->chain->first_spoke + local];
+    uint32_t place = star->begins[y];
+    return place < star->count && star->wing[place][0] == y ? place : STRL__NONE;
 }
 
-/* Moves the corners marked in star->moves from the star's vertex to `vertex`; both lists keep their order. */
-void strl__star_move(const struct strl__star *star, struct strl__mesh *mesh, uint32_t from, uint32_t vertex);
-
-/* ---- how a step's vertex splits from its parent u ---- */
-enum {
-    STRL__KIND_CHAIN,   /* a whole chain moves, no new triangle */
-    STRL__KIND_TAIL,    /* from a spoke a to the end of an open chain; new (v, u, a) */
-    STRL__KIND_HEAD,    /* from the start of an open chain to a spoke b; new (v, b, u) */
-    STRL__KIND_CUT,     /* from spoke a to spoke b; new (v, u, a) and (v, b, u) */
-    STRL__KIND_GENERAL, /* all explicit */
-    STRL__KIND_COUNT
-};
+/* ---- how a step's vertex v splits from its parent u ----
+ * An arc of triangles round u, from (u, a, .) to (u, ., b), moves to v. By the bits of its kind, a triangle (v, u, a) closes the
+ * gap at its start and (v, b, u) that at its end. What is no arc is said corner by corner. */
+enum { STRL__KIND_START = 1, STRL__KIND_END = 2, STRL__KIND_GENERAL = 4 };
 
 /* Predicts a new vertex: the mean of its parent and `count` neighbours, in integers. */
 struct strl__mean {
@@ -139,8 +151,7 @@ static inline void strl__mean_get(const struct strl__mean *mean, const int32_t o
 
 /* ---- attributes: predicted over the finest state ---- */
 /* Integer normals of all vertices from the finest triangles; sums wrap. NULL without memory. */
-uint64_t (*strl__normal_sums(const int32_t (*position)[3], uint32_t vertices, const uint16_t (*triangle)[4], uint32_t triangles,
-                             strl_arena *scratch))[4];
+uint64_t (*strl__normal_sums(const struct strl__mesh *mesh, strl_arena *scratch))[4];
 void strl__normal_predict(const uint64_t sum[4], uint32_t predicted[2]);
 
 #endif

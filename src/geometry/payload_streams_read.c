@@ -18,8 +18,9 @@ struct reader {
     uint32_t state[STRL__RANS_STATES];
 };
 
-/* sym | frequency - 1 << 8 | slot - start << 20 */
-typedef uint32_t slot_table[STRL__PROBABILITY_ONE];
+/* sym | frequency - 1 << 8 | slot - start << 20; filled in runs of SLOT_RUN, which may pass the end. */
+enum { SLOT_RUN = 8 };
+typedef uint32_t slot_table[STRL__PROBABILITY_ONE + SLOT_RUN];
 
 static inline uint64_t load_u64(const uint8_t *bytes)
 {
@@ -41,77 +42,115 @@ static inline uint32_t take_bits(struct reader *reader, unsigned count)
     return (uint32_t)(word & (((uint64_t)1 << count) - 1));
 }
 
-static bool read_table(struct reader *reader, slot_table slots)
+/* Returns the number of symbols, or 0 where the table is bad. */
+static unsigned read_table(struct reader *reader, slot_table slots)
 {
     unsigned alphabet = take_bits(reader, 7);
-    if (alphabet < 1 || alphabet > STRL__SYMBOLS)
-        return false;
+    if (alphabet > STRL__SYMBOLS)
+        return 0;
     uint32_t start = 0;
     for (unsigned s = 0; s < alphabet; s++) {
         uint32_t frequency = STRL__PROBABILITY_ONE - start; /* the last symbol's: what is left */
         if (s + 1 < alphabet) {
             unsigned length = take_bits(reader, 4);
             if (length > STRL__PROBABILITY_BITS + 1)
-                return false;
+                return 0;
             frequency = length ? 1u << (length - 1) | take_bits(reader, length - 1) : 0;
             if (frequency > STRL__PROBABILITY_ONE - start)
-                return false;
+                return 0;
         } else if (!frequency) {
-            return false;
+            return 0;
         }
-        for (uint32_t i = 0; i < frequency; i++)
-            slots[start + i] = s | (frequency - 1) << 8 | i << 20;
+        for (uint32_t i = 0, slot = s | (frequency - 1) << 8; i < frequency; i += SLOT_RUN)
+            for (unsigned k = 0; k < SLOT_RUN; k++, slot += 1u << 20)
+                slots[start + i + k] = slot;
         start += frequency;
     }
-    return true;
+    return alphabet;
 }
 
-static inline uint32_t next_value(const slot_table slots, const uint8_t **words, uint32_t *state, uint64_t *bit_at,
-                                  const uint8_t *bits)
-{
-    static const struct {
-        uint32_t base, mask;
-    } symbols[STRL__SYMBOLS] = {
+
+static const struct {
+    uint32_t base, bits;
+} symbols[STRL__SYMBOLS] = {
 #define DIRECT(v) {v, 0}
-#define OCTAVE(raw) {2u << (raw), (1u << (raw)) - 1}, {3u << (raw), (1u << (raw)) - 1}
-        DIRECT(0), DIRECT(1), DIRECT(2), DIRECT(3), DIRECT(4), DIRECT(5), DIRECT(6), DIRECT(7), DIRECT(8), DIRECT(9),
-        DIRECT(10), DIRECT(11), DIRECT(12), DIRECT(13), DIRECT(14), DIRECT(15), OCTAVE(3), OCTAVE(4), OCTAVE(5), OCTAVE(6),
-        OCTAVE(7), OCTAVE(8), OCTAVE(9), OCTAVE(10), OCTAVE(11), OCTAVE(12), OCTAVE(13), OCTAVE(14), OCTAVE(15), OCTAVE(16),
-        OCTAVE(17), OCTAVE(18), OCTAVE(19), OCTAVE(20), OCTAVE(21), OCTAVE(22), OCTAVE(23), OCTAVE(24), OCTAVE(25), OCTAVE(26),
-        OCTAVE(27), OCTAVE(28), OCTAVE(29), OCTAVE(30),
+#define OCTAVE(raw) {2u << (raw), raw}, {3u << (raw), raw}
+    DIRECT(0), DIRECT(1), DIRECT(2), DIRECT(3), DIRECT(4), DIRECT(5), DIRECT(6), DIRECT(7), DIRECT(8), DIRECT(9), DIRECT(10),
+    DIRECT(11), DIRECT(12), DIRECT(13), DIRECT(14), DIRECT(15), OCTAVE(3), OCTAVE(4), OCTAVE(5), OCTAVE(6), OCTAVE(7), OCTAVE(8),
+    OCTAVE(9), OCTAVE(10), OCTAVE(11), OCTAVE(12), OCTAVE(13), OCTAVE(14), OCTAVE(15), OCTAVE(16), OCTAVE(17), OCTAVE(18),
+    OCTAVE(19), OCTAVE(20), OCTAVE(21), OCTAVE(22), OCTAVE(23), OCTAVE(24), OCTAVE(25), OCTAVE(26), OCTAVE(27), OCTAVE(28),
+    OCTAVE(29), OCTAVE(30),
 #undef DIRECT
 #undef OCTAVE
-    };
+};
+
+/* One step of a state: returns the symbol. */
+static inline uint32_t next_symbol(const uint32_t *slots, const uint8_t **words, uint32_t *state)
+{
     uint32_t x = *state, slot = slots[x & (STRL__PROBABILITY_ONE - 1)];
+    uint16_t word;
+    memcpy(&word, *words, sizeof word);
+#if __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
+    word = __builtin_bswap16(word);
+#endif
     x = ((slot >> 8 & 0xfff) + 1) * (x >> STRL__PROBABILITY_BITS) + (slot >> 20);
-    uint32_t word = (uint32_t)(*words)[0] | (uint32_t)(*words)[1] << 8;
-    bool low = x < STRL__RANS_LOW;
-    *words += low ? 2 : 0;
-    *state = low ? x << 16 | word : x;
-    unsigned symbol = slot & 0xff;
-    uint32_t mask = symbols[symbol].mask;
-    uint32_t raw = (uint32_t)(load_u64(bits + (*bit_at >> 3)) >> (*bit_at & 7)) & mask;
-    *bit_at += (unsigned)__builtin_popcount(mask);
-    return symbols[symbol].base + raw;
+    uint32_t refilled = x << 16 | word, low = x < STRL__RANS_LOW;
+    *words += 2 * low;
+    *state = low ? refilled : x;
+    return slot & 0xff;
 }
 
-static bool read_coded(struct reader *reader, const slot_table slots, uint32_t *values, uint32_t count)
+static inline uint32_t finish_value(uint32_t symbol, const uint8_t *bits, uint64_t *bit_at)
 {
-    const uint8_t *words = reader->words;
-    uint64_t bit_at = reader->bit_at;
-    uint32_t state[GROUP];
-    memcpy(state, reader->state, sizeof state);
-    uint32_t i = 0;
-    for (; count - i >= GROUP && words <= reader->words_end && bit_at <= reader->bit_end; i += GROUP)
-        for (unsigned k = 0; k < GROUP; k++)
-            values[i + k] = next_value(slots, &words, &state[k], &bit_at, reader->bits);
-    bool sound = words <= reader->words_end && bit_at <= reader->bit_end;
-    for (unsigned k = 0; sound && i < count; k++, i++)
-        values[i] = next_value(slots, &words, &state[k], &bit_at, reader->bits);
+    uint32_t raw_bits = symbols[symbol].bits;
+    uint32_t raw = (uint32_t)(load_u64(bits + (*bit_at >> 3)) >> (*bit_at & 7));
+    *bit_at += raw_bits;
+    return symbols[symbol].base + (raw & ((1u << raw_bits) - 1));
+}
+
+/* The symbols of `count` values, in groups of one from each state: the states are independent, so their latencies overlap. */
+static bool read_symbols(struct reader *reader, const uint32_t *slots, uint32_t *values, uint32_t count)
+{
+    const uint8_t *words = reader->words, *end = reader->words_end;
+    uint32_t a = reader->state[0], b = reader->state[1], c = reader->state[2], d = reader->state[3], i = 0;
+    for (; count - i >= GROUP && words <= end; i += GROUP) {
+        values[i] = next_symbol(slots, &words, &a);
+        values[i + 1] = next_symbol(slots, &words, &b);
+        values[i + 2] = next_symbol(slots, &words, &c);
+        values[i + 3] = next_symbol(slots, &words, &d);
+    }
+    if (words > end)
+        return false;
+    if (i < count)
+        values[i++] = next_symbol(slots, &words, &a);
+    if (i < count)
+        values[i++] = next_symbol(slots, &words, &b);
+    if (i < count)
+        values[i++] = next_symbol(slots, &words, &c);
     reader->words = words;
+    memcpy(reader->state, (uint32_t[GROUP]){a, b, c, d}, sizeof reader->state);
+    return words <= end;
+}
+
+/* Puts the raw low bits to symbols that have some. */
+static bool read_raw_bits(struct reader *reader, uint32_t *values, uint32_t count)
+{
+    const uint8_t *bits = reader->bits;
+    uint64_t bit_at = reader->bit_at, end = reader->bit_end;
+    uint32_t i = 0;
+    for (; count - i >= GROUP && bit_at <= end; i += GROUP)
+        for (unsigned k = 0; k < GROUP; k++)
+            values[i + k] = finish_value(values[i + k], bits, &bit_at);
+    for (; i < count && bit_at <= end; i++)
+        values[i] = finish_value(values[i], bits, &bit_at);
     reader->bit_at = bit_at;
-    memcpy(reader->state, state, sizeof state);
-    return sound && words <= reader->words_end && bit_at <= reader->bit_end;
+    return bit_at <= end;
+}
+
+static bool read_coded(struct reader *reader, slot_table slots, uint32_t *values, uint32_t count)
+{
+    unsigned alphabet = read_table(reader, slots);
+    return alphabet && read_symbols(reader, slots, values, count) && (alphabet <= 16 || read_raw_bits(reader, values, count));
 }
 
 static strl_status read_stream(struct reader *reader, uint64_t *item_limit, slot_table slots, strl_arena *scratch,
@@ -129,7 +168,7 @@ static strl_status read_stream(struct reader *reader, uint64_t *item_limit, slot
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to decode a node payload");
     bool sound = mode <= STRL__MODE_TABLE;
     if (sound && mode == STRL__MODE_TABLE)
-        sound = read_table(reader, slots) && read_coded(reader, slots, values, count);
+        sound = read_coded(reader, slots, values, count);
     else if (mode == 0)
         memset(values, 0, (size_t)count * sizeof *values);
     else
@@ -185,7 +224,7 @@ strl_status strl__streams_read(strl_cursor *cursor, size_t payload_bytes, uint64
     size_t bit_bytes = strl_cursor_left(cursor) - (size_t)word_count * 2;
     reader.words = padded_copy(cursor, (size_t)word_count * 2, scratch);
     reader.bits = padded_copy(cursor, bit_bytes, scratch);
-    uint32_t *slots = strl_arena_alloc(scratch, STRL__PROBABILITY_ONE, sizeof *slots);
+    uint32_t *slots = strl_arena_alloc(scratch, 1, sizeof(slot_table));
     if (!reader.words || !reader.bits || !slots)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to decode a node payload");
     reader.words_end = reader.words + (size_t)word_count * 2;
