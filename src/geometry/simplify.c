@@ -7,6 +7,12 @@
 #include "geometry/octahedral.h"
 #include "geometry/simplify_plan.h"
 
+/* Stands for "more than one wedge" while wedges are counted. */
+#define SEVERAL (UINT32_MAX - 1)
+
+#define LADDER_RATIO 4.f /* the first rung gives up where its next collapse costs so many times its middle one */
+#define LEAST_ERROR 1.f  /* lattice units: below, all errors count as equal */
+
 static void heap_place(simplifier *s, uint32_t at, uint32_t point)
 {
     s->heap[at] = point;
@@ -134,13 +140,15 @@ static bool allocate(simplifier *s, const strl_mesh *mesh, strl_arena *arena)
     s->heap = strl_arena_alloc(arena, points, sizeof *s->heap);
     s->heap_at = strl_arena_alloc(arena, points, sizeof *s->heap_at);
     s->key = strl_arena_alloc(arena, points, sizeof *s->key);
-    s->target = strl_arena_alloc(arena, points, sizeof *s->target);
+    s->plan = strl_arena_alloc(arena, points, sizeof *s->plan);
+    s->own_cost = strl_arena_alloc(arena, points, sizeof *s->own_cost);
+    s->only_wedge = strl_arena_alloc(arena, points, sizeof *s->only_wedge);
     s->stale = strl_arena_alloc_zero(arena, points, sizeof *s->stale);
     s->holders = mesh->holders ? strl_arena_alloc(arena, points, 1) : NULL;
     if (mesh->holders && s->holders)
         memcpy(s->holders, mesh->holders, points);
     return (s->holders || !mesh->holders) && s->position && s->normal && s->colour && s->quadrics && s->corner_next && s->head && s->tail && s->dead &&
-           s->stamp && s->heap && s->heap_at && s->key && s->target && s->stale;
+           s->stamp && s->heap && s->heap_at && s->key && s->plan && s->own_cost && s->only_wedge && s->stale;
 }
 
 static bool allocate_result(simplifier *s, strl_simplified *result, strl_arena *arena)
@@ -164,9 +172,11 @@ static void load(simplifier *s, strl_simplified *result)
     for (uint32_t p = 0; p < mesh->point_count; p++) {
         for (int k = 0; k < 3; k++)
             s->position[p][k] = mesh->position[p][k];
-        s->head[p] = s->tail[p] = s->heap_at[p] = NO_INDEX;
+        s->head[p] = s->tail[p] = s->heap_at[p] = s->only_wedge[p] = NO_INDEX;
     }
     for (uint32_t w = 0; w < mesh->wedge_count; w++) {
+        uint32_t *only = &s->only_wedge[mesh->wedge[w].point];
+        *only = *only == NO_INDEX ? w : SEVERAL;
         strl_oct_decode(mesh->wedge[w].normal, s->normal[w]);
         for (int k = 0; k < 3; k++)
             s->colour[w][k] = (float)(mesh->wedge[w].colour >> (8 * k) & 255) / 255.f;
@@ -187,32 +197,28 @@ static void load(simplifier *s, strl_simplified *result)
         s->deviation[t] = mesh->deviation[t];
         s->shift[t] = mesh->shift[t];
         result->removed_at[t] = UINT32_MAX;
-        result->geometric = fmaxf(result->geometric, mesh->error[t]);
-        result->appearance = fmaxf(result->appearance, mesh->shift[t]);
+        result->geometric = strl__larger(result->geometric, mesh->error[t]);
+        result->appearance = strl__larger(result->appearance, mesh->shift[t]);
     }
     s->triangles_left = mesh->triangle_count;
     for (uint32_t t = 0; t < mesh->triangle_count; t++)
         add_triangle_quadrics(s, t);
-    for (uint32_t p = 0; p < mesh->point_count; p++)
+    for (uint32_t p = 0; p < mesh->point_count; p++) {
         add_rim_quadrics(s, p);
+        s->own_cost[p] = strl__quadric_at(&s->quadrics[p], s->position[p]);
+        if (s->only_wedge[p] == SEVERAL)
+            s->only_wedge[p] = NO_INDEX;
+    }
 }
 
 /* Where every wedge of u goes. At most STAR_MAX of them. */
 static void map_wedges(simplifier *s, const strl_star *star, uint32_t to, strl_simplified *result)
 {
-    strl_star *v_star = NULL, storage;
     for (uint32_t i = 0; i < star->count; i++) {
         uint32_t wedge = s->corner[star->triangle[i]][star->corner[i]];
-        if (result->wedge_parent[wedge] != wedge)
-            continue;
         bool exact;
-        uint32_t target = strl__wedge_target(s, star, NULL, to, wedge, &exact);
-        if (!exact) {
-            if (!v_star && strl__star_gather(s, to, &storage))
-                v_star = &storage;
-            target = strl__wedge_target(s, star, v_star, to, wedge, &exact);
-        }
-        result->wedge_parent[wedge] = target;
+        if (result->wedge_parent[wedge] == wedge)
+            result->wedge_parent[wedge] = strl__wedge_target(s, star, to, wedge, &exact);
     }
 }
 
@@ -242,10 +248,11 @@ void strl__apply_collapse(simplifier *s, const strl_star *star, const collapse_p
         s->head[u] = s->tail[u] = NO_INDEX;
     }
     strl__quadric_add(&s->quadrics[v], &s->quadrics[u]);
+    s->own_cost[v] = strl__quadric_at(&s->quadrics[v], s->position[v]);
     if (s->holders)
         s->holders[v] |= s->holders[u];
-    result->geometric = fmaxf(result->geometric, plan->geometric);
-    result->appearance = fmaxf(result->appearance, plan->shift);
+    result->geometric = strl__larger(result->geometric, plan->geometric);
+    result->appearance = strl__larger(result->appearance, plan->shift);
     result->collapses[result->collapse_count++] =
         (strl_collapse){u, v, s->triangles_left, result->geometric, result->appearance};
     if (s->rung > result->rung)
@@ -268,18 +275,27 @@ static void plan_and_push(simplifier *s, uint32_t point)
     s->stale[point] = false;
     if (!strl__plan_best(s, point, &plan))
         return;
-    s->target[point] = plan.to;
+    s->plan[point] = plan;
     heap_push(s, point, plan.key);
 }
 
-static void run_rung(simplifier *s, strl_simplified *result)
+static float smaller(float a, float b)
 {
+    return a < b ? a : b;
+}
+
+/* Collapses on the present rung up to `limit`. *middle: the key at which the first half of what is wanted was done (0 until
+ * then); with `adaptive`, stops where keys leave it far behind: then the next rungs do the same for less. */
+static float run_rung(simplifier *s, float limit, bool adaptive, float *middle, strl_simplified *result)
+{
+    uint32_t half = s->mesh->triangle_count - (s->mesh->triangle_count - s->desc->target_triangles) / 2;
+    float reached = 0;
     for (uint32_t p = 0; p < s->mesh->point_count; p++)
         if (!(s->mesh->flags[p] & STRL_POINT_KEPT) && s->head[p] != NO_INDEX && s->heap_at[p] == NO_INDEX)
             plan_and_push(s, p);
     while (s->heap_count && s->triangles_left > s->desc->target_triangles) {
         uint32_t point = s->heap[0];
-        if (s->key[point] > s->desc->error_limit)
+        if (s->key[point] > limit || (adaptive && *middle > 0 && s->key[point] > LADDER_RATIO * *middle))
             break;
         heap_remove(s, point);
         if (s->stale[point]) {
@@ -287,16 +303,45 @@ static void run_rung(simplifier *s, strl_simplified *result)
             continue;
         }
         strl_star star;
-        collapse_plan plan;
+        collapse_plan plan = s->plan[point];
         if (!strl__star_gather(s, point, &star) || star.count == 0)
             continue;
-        strl__plan_collapse(s, &star, s->target[point], &plan);
+        if (!strl__may_collapse(s, &star, plan.to)) { /* the other side has changed since */
+            plan_and_push(s, point);
+            continue;
+        }
         strl__apply_collapse(s, &star, &plan, result);
+        reached = strl__larger(reached, plan.key);
+        if (*middle == 0 && s->triangles_left <= half)
+            *middle = strl__larger(reached, LEAST_ERROR);
         for (uint32_t i = 0; i < star.neighbour_count; i++)
             mark_stale(s, star.neighbour[i], plan.key);
     }
     while (s->heap_count)
         heap_remove(s, s->heap[s->heap_count - 1]);
+    return reached;
+}
+
+/* All rungs up to one error, then all again up to twice that, until the target is met. */
+static bool climb_ladder(simplifier *s, float start, strl_arena *arena, strl_simplified *result)
+{
+    float limit = start, middle = start;
+    for (int round = 0; round < 64 && s->triangles_left > s->desc->target_triangles; round++) {
+        if (s->triangles_left <= s->desc->soft_triangles || limit > s->desc->error_limit)
+            break;
+        limit = smaller(limit * 2, s->desc->error_limit);
+        for (int rung = STRL_SIMPLIFY_TOPOLOGY; rung <= STRL_SIMPLIFY_SEAMS; rung++) {
+            s->rung = (strl_simplify_rung)rung;
+            if (rung <= (int)s->desc->last_rung && s->triangles_left > s->desc->target_triangles)
+                run_rung(s, limit, false, &middle, result);
+        }
+        if (s->desc->last_rung >= STRL_SIMPLIFY_DISJOINT && s->triangles_left > s->desc->target_triangles &&
+            !strl__simplify_clustering(s, limit, arena, result))
+            return false;
+        if (limit == s->desc->error_limit)
+            break;
+    }
+    return true;
 }
 
 strl_status strl_simplify(const strl_mesh *mesh, const strl_simplify_desc *desc, strl_arena *arena,
@@ -307,14 +352,11 @@ strl_status strl_simplify(const strl_mesh *mesh, const strl_simplify_desc *desc,
     if (!allocate_result(&s, result, arena) || !allocate(&s, mesh, arena))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to simplify %u triangles", mesh->triangle_count);
     load(&s, result);
-    for (int rung = STRL_SIMPLIFY_TOPOLOGY; rung <= (int)desc->last_rung && rung <= STRL_SIMPLIFY_SEAMS; rung++) {
-        s.rung = (strl_simplify_rung)rung;
-        if (s.triangles_left > desc->target_triangles)
-            run_rung(&s, result);
-    }
-    if (s.triangles_left > desc->target_triangles && desc->last_rung >= STRL_SIMPLIFY_DISJOINT)
-        if (!strl__simplify_clustering(&s, arena, result))
-            return strl__fail(err, STRL_ERR_MEMORY, "no memory to simplify %u triangles", mesh->triangle_count);
+    float middle = 0, reached = strl__larger(result->geometric, LEAST_ERROR);
+    if (s.triangles_left > desc->target_triangles)
+        reached = strl__larger(reached, run_rung(&s, desc->error_limit, true, &middle, result));
+    if (s.triangles_left > desc->target_triangles && !climb_ladder(&s, reached, arena, result))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory to simplify %u triangles", mesh->triangle_count);
     result->triangles_left = s.triangles_left;
     return STRL_OK;
 }

@@ -13,7 +13,8 @@
 #include "geometry/mesh.h"
 #include "stroll/error.h"
 
-/* The ladder: what a collapse may do. Each rung allows all that those before it allow. */
+/* The ladder: what a collapse may do. The first rung goes as far as its errors stay in proportion; then all rungs take turns
+ * up to one error, then up to twice that, and so on: a bolt may vanish before a wall is bent, and not after. Each rung allows all that those before it allow. */
 typedef enum strl_simplify_rung {
     STRL_SIMPLIFY_TOPOLOGY,   /* manifold stays manifold, seams collapse only along themselves */
     STRL_SIMPLIFY_SEAMS,      /* seams may end, non-manifold fans may collapse */
@@ -23,6 +24,7 @@ typedef enum strl_simplify_rung {
 
 typedef struct strl_simplify_desc {
     uint32_t target_triangles;  /* stop at this many or fewer */
+    uint32_t soft_triangles;    /* with so many or fewer, do not pay many times the error for the rest */
     float error_limit;          /* stop before a collapse whose error would pass this; lattice units; INFINITY = none */
     strl_simplify_rung last_rung; /* go no further down the ladder */
     float normal_weight;        /* attribute deviation of a normal that turned by one radian */

@@ -72,23 +72,6 @@ static bool prepare(clustering *c, simplifier *s, strl_arena *arena)
     return true;
 }
 
-static double first_cell_size(const simplifier *s)
-{
-    double sum = 0;
-    uint32_t count = 0;
-    for (uint32_t t = 0; t < s->mesh->triangle_count; t++) {
-        if (s->dead[t])
-            continue;
-        const double *a = s->position[strl__corner_point(s, t, 0)], *b = s->position[strl__corner_point(s, t, 1)];
-        double length2 = 0;
-        for (int k = 0; k < 3; k++)
-            length2 += (a[k] - b[k]) * (a[k] - b[k]);
-        sum += sqrt(length2);
-        count++;
-    }
-    return count && sum > 0 ? sum / count : 1;
-}
-
 /* Kept points first: they cannot move, so they represent their cells. */
 static void choose_representatives(clustering *c, double size)
 {
@@ -104,7 +87,7 @@ static void choose_representatives(clustering *c, double size)
         }
 }
 
-static void merge_cells(clustering *c, double size, bool disjoint_only, strl_simplified *result)
+static void merge_cells(clustering *c, double size, float limit, bool disjoint_only, strl_simplified *result)
 {
     simplifier *s = c->s;
     choose_representatives(c, size);
@@ -122,24 +105,22 @@ static void merge_cells(clustering *c, double size, bool disjoint_only, strl_sim
         if (!strl__leaves_surface_at(s, &star, to))
             continue;
         strl__plan_collapse(s, &star, to, &plan);
-        if (plan.key > s->desc->error_limit)
+        if (plan.key > limit)
             continue;
         strl__apply_collapse(s, &star, &plan, result);
         unite(c->component, p, to);
     }
 }
 
-bool strl__simplify_clustering(simplifier *s, strl_arena *arena, strl_simplified *result)
+bool strl__simplify_clustering(simplifier *s, float limit, strl_arena *arena, strl_simplified *result)
 {
     clustering c;
+    strl_arena_mark mark = strl_arena_get_mark(arena);
     if (!prepare(&c, s, arena))
         return false;
-    double size = first_cell_size(s);
-    for (int step = 0; step < 48 && s->triangles_left > s->desc->target_triangles && size < s->desc->error_limit; step++) {
-        merge_cells(&c, size, true, result);
-        if (s->desc->last_rung >= STRL_SIMPLIFY_CLUSTERING)
-            merge_cells(&c, size, false, result);
-        size *= 1.41421356;
-    }
+    merge_cells(&c, limit, limit, true, result);
+    if (s->desc->last_rung >= STRL_SIMPLIFY_CLUSTERING)
+        merge_cells(&c, limit, limit, false, result);
+    strl_arena_rewind(arena, mark);
     return true;
 }

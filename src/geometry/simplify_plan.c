@@ -3,7 +3,10 @@
 
 #include <math.h>
 
-static double quadric_at(const quadric *q, const double p[3])
+/* The second target in quadric order is planned too where its quadric is not so many times worse. */
+#define SECOND_CHOICE 3
+
+double strl__quadric_at(const quadric *q, const double p[3])
 {
     double value = q->xx * p[0] * p[0] + q->yy * p[1] * p[1] + q->zz * p[2] * p[2] +
                    2 * (q->xy * p[0] * p[1] + q->xz * p[0] * p[2] + q->yz * p[1] * p[2]) +
@@ -100,8 +103,10 @@ bool strl__leaves_surface_at(const simplifier *s, const strl_star *star, uint32_
 static bool wedges_can_follow(simplifier *s, const strl_star *u_star, uint32_t to)
 {
     uint32_t seen[STAR_MAX], targets[STAR_MAX], count = 0;
-    strl_star v_star;
-    bool gathered = false;
+    uint32_t only = s->only_wedge[u_star->point];
+    if (only != NO_INDEX && s->only_wedge[to] != NO_INDEX &&
+        s->mesh->wedge[only].palette == s->mesh->wedge[s->only_wedge[to]].palette)
+        return true;
     for (uint32_t i = 0; i < u_star->count; i++) {
         uint32_t wedge = s->corner[u_star->triangle[i]][u_star->corner[i]];
         bool known = false, exact;
@@ -109,17 +114,9 @@ static bool wedges_can_follow(simplifier *s, const strl_star *u_star, uint32_t t
             known |= seen[k] == wedge;
         if (known)
             continue;
-        uint32_t target = strl__wedge_target(s, u_star, NULL, to, wedge, &exact);
-        if (!exact) {
-            if (s->rung < STRL_SIMPLIFY_SEAMS)
-                return false;
-            if (!gathered && !strl__star_gather(s, to, &v_star))
-                return false;
-            gathered = true;
-            target = strl__wedge_target(s, u_star, &v_star, to, wedge, &exact);
-            if (target == NO_INDEX)
-                return false;
-        }
+        uint32_t target = strl__wedge_target(s, u_star, to, wedge, &exact);
+        if (target == NO_INDEX || (!exact && s->rung < STRL_SIMPLIFY_SEAMS))
+            return false;
         for (uint32_t k = 0; k < count && s->rung < STRL_SIMPLIFY_SEAMS; k++)
             if (targets[k] == target)
                 return false; /* two wedges would become one: the seam ends here */
@@ -129,16 +126,17 @@ static bool wedges_can_follow(simplifier *s, const strl_star *u_star, uint32_t t
     return true;
 }
 
-static bool may_collapse(simplifier *s, const strl_star *star, uint32_t to)
+bool strl__may_collapse(simplifier *s, const strl_star *star, uint32_t to)
 {
     unsigned uses = strl__star_uses(star, to);
     if (s->holders && (s->mesh->flags[to] & STRL_POINT_OUTSIDE) && (s->holders[star->point] & ~s->holders[to]))
         return false; /* a node that outsiders do not know would come to share this point with them */
     if (star->on_boundary && !(uses & 1))
         return false; /* the rim collapses along itself only: an open edge then always ends at rim points of the input */
-    if (s->rung < STRL_SIMPLIFY_SEAMS && (!star->manifold || !link_is_disk(s, star, to)))
+    if (s->rung < STRL_SIMPLIFY_SEAMS && !star->manifold)
         return false;
-    return keeps_orientation(s, star, to) && strl__leaves_surface_at(s, star, to) && wedges_can_follow(s, star, to);
+    return wedges_can_follow(s, star, to) && keeps_orientation(s, star, to) && strl__leaves_surface_at(s, star, to) &&
+           (s->rung >= STRL_SIMPLIFY_SEAMS || link_is_disk(s, star, to));
 }
 
 /* How far the attributes of u's wedges are from what the new patch shows in their place. */
@@ -151,27 +149,28 @@ static float attribute_change(const simplifier *s, const strl_star *star, uint32
         unsigned c = star->corner[image];
         bool exact;
         own = corner[c];
-        uint32_t v_wedge = strl__wedge_target(s, star, NULL, to, own, &exact);
-        uint32_t wedges[3] = {v_wedge, corner[(c + 1) % 3], corner[(c + 2) % 3]};
+        uint32_t v_wedge = strl__wedge_target(s, star, to, own, &exact);
+        uint32_t corners[3] = {v_wedge, corner[(c + 1) % 3], corner[(c + 2) % 3]};
         if (v_wedge == NO_INDEX)
             own = NO_INDEX;
         else
             for (int k = 0; k < 3; k++)
                 for (int i = 0; i < 3; i++) {
-                    mixed_normal[i] += (float)weights[k] * s->normal[wedges[k]][i];
-                    mixed_colour[i] += (float)weights[k] * s->colour[wedges[k]][i];
+                    mixed_normal[i] += (float)weights[k] * s->normal[corners[k]][i];
+                    mixed_colour[i] += (float)weights[k] * s->colour[corners[k]][i];
                 }
         float length = sqrtf(mixed_normal[0] * mixed_normal[0] + mixed_normal[1] * mixed_normal[1] +
                              mixed_normal[2] * mixed_normal[2]);
         for (int i = 0; i < 3 && length > 0; i++)
             mixed_normal[i] /= length;
     }
-    for (uint32_t i = 0; i < star->count; i++) {
+    uint32_t wedges = s->only_wedge[star->point] != NO_INDEX ? 1 : star->count;
+    for (uint32_t i = 0; i < wedges; i++) {
         uint32_t wedge = s->corner[star->triangle[i]][star->corner[i]];
         const float *normal = mixed_normal, *colour = mixed_colour;
         if (wedge != own) {
             bool exact;
-            uint32_t target = strl__wedge_target(s, star, NULL, to, wedge, &exact);
+            uint32_t target = strl__wedge_target(s, star, to, wedge, &exact);
             if (target == NO_INDEX)
                 return s->desc->normal_weight + s->desc->colour_weight;
             normal = s->normal[target], colour = s->colour[target];
@@ -179,9 +178,9 @@ static float attribute_change(const simplifier *s, const strl_star *star, uint32
         float dn = 0, dc = 0;
         for (int k = 0; k < 3; k++) {
             dn += (s->normal[wedge][k] - normal[k]) * (s->normal[wedge][k] - normal[k]);
-            dc = fmaxf(dc, fabsf(s->colour[wedge][k] - colour[k]));
+            dc = strl__larger(dc, fabsf(s->colour[wedge][k] - colour[k]));
         }
-        worst = fmaxf(worst, s->desc->normal_weight * sqrtf(dn) + s->desc->colour_weight * dc);
+        worst = strl__larger(worst, s->desc->normal_weight * sqrtf(dn) + s->desc->colour_weight * dc);
     }
     return worst;
 }
@@ -195,9 +194,9 @@ void strl__plan_collapse(simplifier *s, const strl_star *star, uint32_t to, coll
     double longest = 0;
     for (uint32_t i = 0; i < star->count; i++) {
         uint32_t t = star->triangle[i];
-        error = fmaxf(error, s->error[t]);
-        deviation = fmaxf(deviation, s->deviation[t]);
-        shift = fmaxf(shift, s->shift[t]);
+        error = strl__larger(error, s->error[t]);
+        deviation = strl__larger(deviation, s->deviation[t]);
+        shift = strl__larger(shift, s->shift[t]);
     }
     const double *u = s->position[star->point], *v = s->position[to];
     for (int i = 0; i < 3; i++)
@@ -207,8 +206,8 @@ void strl__plan_collapse(simplifier *s, const strl_star *star, uint32_t to, coll
     plan->bound = nextafterf((float)bound, INFINITY);
     plan->geometric = nextafterf(error + plan->bound, INFINITY);
     plan->deviation = sqrtf(deviation * deviation + change * change);
-    plan->shift = fmaxf(shift, (float)sqrt(longest) * fminf(1, plan->deviation));
-    plan->key = fmaxf(plan->geometric, plan->shift);
+    plan->shift = strl__larger(shift, (float)sqrt(longest) * fminf(1, plan->deviation));
+    plan->key = strl__larger(plan->geometric, plan->shift);
 }
 
 bool strl__plan_best(simplifier *s, uint32_t point, collapse_plan *plan)
@@ -223,7 +222,7 @@ bool strl__plan_best(simplifier *s, uint32_t point, collapse_plan *plan)
         double length = 0;
         for (int k = 0; k < 3; k++)
             length += (u[k] - v[k]) * (u[k] - v[k]);
-        cost[i] = quadric_at(&s->quadrics[point], v) + quadric_at(&s->quadrics[star.neighbour[i]], v) +
+        cost[i] = strl__quadric_at(&s->quadrics[point], v) + s->own_cost[star.neighbour[i]] +
                   1e-4 * length * length; /* flat regions: the nearest */
         uint32_t at = i;
         for (; at > 0 && cost[order[at - 1]] > cost[i]; at--)
@@ -231,14 +230,19 @@ bool strl__plan_best(simplifier *s, uint32_t point, collapse_plan *plan)
         order[at] = (uint8_t)i;
     }
     unsigned found = 0;
+    double least = 0;
     for (uint32_t i = 0; i < star.neighbour_count && found < 2; i++) {
+        if (found && cost[order[i]] > SECOND_CHOICE * least)
+            break;
         uint32_t to = star.neighbour[order[i]];
-        if (!may_collapse(s, &star, to))
+        if (!strl__may_collapse(s, &star, to))
             continue;
         collapse_plan candidate;
         strl__plan_collapse(s, &star, to, &candidate);
         if (found++ == 0 || candidate.key < plan->key)
             *plan = candidate;
+        if (found == 1)
+            least = cost[order[i]];
     }
     return found > 0;
 }

@@ -20,47 +20,53 @@ static void count_uses(simplifier *s, strl_star *star)
             }
             star->uses[s->stamp[p] - base - 1]++;
         }
-    s->tick = base + star->neighbour_count;
+    s->tick = base + star->neighbour_count + 1;
     star->on_boundary = false;
     for (uint32_t i = 0; i < star->neighbour_count; i++)
         star->on_boundary |= star->uses[i] & 1;
 }
 
-/* Chains the triangles into one fan, if they are one. */
-static void order_fan(strl_star *star)
+/* Chains the triangles into one fan, if they are one. Stamps still name the neighbours (count_uses). */
+static void order_fan(const simplifier *s, strl_star *star)
 {
+    uint8_t by_next[2 * STAR_MAX]; /* triangle whose `next` is the neighbour; STAR_MAX = none */
+    uint32_t base = s->tick - star->neighbour_count - 1, start = 0, open_ends = 0;
     star->manifold = false;
     star->closed = false;
-    uint32_t start = 0, open_ends = 0;
+    for (uint32_t i = 0; i < star->neighbour_count; i++) {
+        if (star->uses[i] > 2)
+            return;
+        by_next[i] = STAR_MAX;
+    }
     for (uint32_t i = 0; i < star->count; i++) {
-        bool follows = false;
-        for (uint32_t k = 0; k < star->count; k++)
-            follows |= star->previous[k] == star->next[i];
-        if (!follows) {
+        uint8_t *slot = &by_next[s->stamp[star->next[i]] - base - 1];
+        if (*slot != STAR_MAX)
+            return; /* two triangles leave the same neighbour: not oriented alike */
+        *slot = (uint8_t)i;
+    }
+    uint8_t follower[STAR_MAX];
+    bool followed[STAR_MAX] = {false};
+    for (uint32_t i = 0; i < star->count; i++) {
+        follower[i] = by_next[s->stamp[star->previous[i]] - base - 1];
+        if (follower[i] != STAR_MAX)
+            followed[follower[i]] = true;
+    }
+    for (uint32_t i = 0; i < star->count; i++)
+        if (!followed[i]) {
             start = i;
             open_ends++;
         }
-    }
     if (open_ends > 1)
         return;
-    for (uint32_t i = 0; i < star->neighbour_count; i++)
-        if (star->uses[i] > 2)
-            return;
     uint32_t at = start, done = 0;
-    for (;;) {
+    do {
         star->order[done++] = (uint8_t)at;
-        if (done == star->count)
-            break;
-        uint32_t next = NO_INDEX;
-        for (uint32_t k = 0; k < star->count; k++)
-            if (star->next[k] == star->previous[at])
-                next = k;
-        if (next == NO_INDEX || next == start)
-            return;
-        at = next;
-    }
-    star->closed = star->previous[at] == star->next[start];
-    star->manifold = star->closed ? star->count >= 3 : open_ends == 1;
+        at = follower[at];
+    } while (at != STAR_MAX && at != start && done < star->count);
+    if (done != star->count)
+        return;
+    star->closed = at == start;
+    star->manifold = star->closed ? star->count >= 3 : true;
 }
 
 bool strl__star_gather(simplifier *s, uint32_t point, strl_star *star)
@@ -90,7 +96,7 @@ bool strl__star_gather(simplifier *s, uint32_t point, strl_star *star)
         star->count++;
     }
     count_uses(s, star);
-    order_fan(star);
+    order_fan(s, star);
     return true;
 }
 
@@ -113,9 +119,14 @@ static float attribute_difference(const simplifier *s, uint32_t a, uint32_t b)
     return s->desc->normal_weight * sqrtf(normal) + s->desc->colour_weight * sqrtf(colour);
 }
 
-uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, const strl_star *v_star, uint32_t to, uint32_t wedge,
-                            bool *exact)
+uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32_t to, uint32_t wedge, bool *exact)
 {
+    uint32_t only = s->only_wedge[to];
+    if (only != NO_INDEX && s->only_wedge[u_star->point] != NO_INDEX &&
+        s->mesh->wedge[only].palette == s->mesh->wedge[wedge].palette && strl__star_uses(u_star, to)) {
+        *exact = true;
+        return only;
+    }
     for (uint32_t i = 0; i < u_star->count; i++) {
         const uint32_t *corner = s->corner[u_star->triangle[i]];
         unsigned c = u_star->corner[i];
@@ -132,8 +143,10 @@ uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, const 
     *exact = false;
     uint32_t best = NO_INDEX;
     float least = INFINITY;
-    for (uint32_t i = 0; v_star && i < v_star->count; i++) {
-        uint32_t other = s->corner[v_star->triangle[i]][v_star->corner[i]];
+    for (uint32_t corner = s->head[to]; corner != NO_INDEX; corner = s->corner_next[corner]) {
+        uint32_t other = s->corner[corner / 3][corner % 3];
+        if (s->dead[corner / 3])
+            continue;
         float difference = attribute_difference(s, wedge, other);
         if (s->mesh->wedge[other].palette != s->mesh->wedge[wedge].palette) {
             if (s->rung < STRL_SIMPLIFY_DISJOINT)

@@ -28,6 +28,16 @@ typedef struct strl_star {
     uint8_t order[STAR_MAX];      /* fan order of the triangles where manifold: next[order[i + 1]] == previous[order[i]] */
 } strl_star;
 
+/* What a collapse would do. */
+typedef struct collapse_plan {
+    uint32_t to;
+    float bound;      /* distance moved, lattice units */
+    float geometric;  /* the error of the new patch */
+    float deviation;  /* the same of attributes */
+    float shift;      /* appearance error of the new patch */
+    float key;
+} collapse_plan;
+
 typedef struct simplifier {
     const strl_mesh *mesh;
     const strl_simplify_desc *desc;
@@ -35,6 +45,8 @@ typedef struct simplifier {
     float (*normal)[3];     /* per wedge, decoded */
     float (*colour)[3];     /* per wedge, 0..1 */
     quadric *quadrics;      /* per point */
+    double *own_cost;       /* per point: its quadric at its own position */
+    uint32_t *only_wedge;   /* per point: its wedge where it has just one; else NO_INDEX */
     uint32_t (*corner)[3];  /* current wedges */
     uint32_t *corner_next;  /* [3 * triangle_count] next corner at the same point */
     uint32_t *head, *tail;  /* per point, corners */
@@ -49,19 +61,14 @@ typedef struct simplifier {
     uint32_t *heap, heap_count;
     uint32_t *heap_at;      /* per point, NO_INDEX = not in the heap */
     float *key;             /* per point */
-    uint32_t *target;       /* per point: best v */
+    collapse_plan *plan;    /* per point: the best collapse, valid where not stale */
     bool *stale;            /* per point: the neighbourhood changed since key was computed */
 } simplifier;
 
-/* What a collapse would do. */
-typedef struct collapse_plan {
-    uint32_t to;
-    float bound;      /* distance moved, lattice units */
-    float geometric;  /* the error of the new patch */
-    float deviation;  /* the same of attributes */
-    float shift;      /* appearance error of the new patch */
-    float key;
-} collapse_plan;
+static inline float strl__larger(float a, float b)
+{
+    return a > b ? a : b;
+}
 
 static inline uint32_t strl__corner_point(const simplifier *s, uint32_t triangle, unsigned corner)
 {
@@ -72,10 +79,9 @@ static inline uint32_t strl__corner_point(const simplifier *s, uint32_t triangle
 bool strl__star_gather(simplifier *s, uint32_t point, strl_star *star);
 /* How many triangles hold the edge to `point` (0 = no neighbour). */
 unsigned strl__star_uses(const strl_star *star, uint32_t point);
-/* The wedge of v that a wedge of u falls onto; NO_INDEX where none of the same palette exists. *exact: a triangle of the
- * edge says so. v_star may be NULL: then only exact ones are found. */
-uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, const strl_star *v_star, uint32_t to, uint32_t wedge,
-                            bool *exact);
+/* The wedge of v that a wedge of u falls onto. *exact: a triangle of the edge says so; else it is the one of v's that looks most
+ * like it, of the same palette where the rung does not allow others. NO_INDEX = none. */
+uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32_t to, uint32_t wedge, bool *exact);
 /* Bound of the two-sided distance between the patch before and after u -> v (never above |u - v| plus what lost edges cost).
  * *image: index in the star of the triangle whose image holds u's, weights of (v, next, previous) there; NO_INDEX = v itself. */
 double strl__collapse_bound(const simplifier *s, const strl_star *star, uint32_t to, uint32_t *image, double weights[3]);

@@ -8,8 +8,8 @@
 #include "geometry/record.h"
 #include "geometry/simplify.h"
 
-/* Where topology, seams and locked borders leave more than this, the lower rungs of the ladder take over. */
-#define LADDER_TRIANGLES 6144u
+/* A base mesh of so many triangles is good enough where fewer would cost many times the error. */
+#define SOFT_TRIANGLES 6144u
 
 void strl_made_node_deinit(strl_made_node *made)
 {
@@ -22,15 +22,9 @@ void strl_made_node_deinit(strl_made_node *made)
 static strl_status simplify(const strl_mesh *mesh, uint32_t target, strl_arena *arena, strl_simplified *result,
                             strl_error *err)
 {
-    strl_simplify_desc desc = {.target_triangles = target, .error_limit = INFINITY, .last_rung = STRL_SIMPLIFY_SEAMS,
-                               .normal_weight = STRL_NORMAL_WEIGHT, .colour_weight = STRL_COLOUR_WEIGHT};
-    strl_arena_mark mark = strl_arena_get_mark(arena);
-    strl_status status = strl_simplify(mesh, &desc, arena, result, err);
-    if (status || result->triangles_left <= LADDER_TRIANGLES || result->triangles_left <= target)
-        return status;
-    strl_arena_rewind(arena, mark);
-    desc.last_rung = STRL_SIMPLIFY_CLUSTERING;
-    desc.target_triangles = target > LADDER_TRIANGLES ? target : LADDER_TRIANGLES;
+    strl_simplify_desc desc = {.target_triangles = target, .soft_triangles = SOFT_TRIANGLES, .error_limit = INFINITY,
+                               .last_rung = STRL_SIMPLIFY_CLUSTERING, .normal_weight = STRL_NORMAL_WEIGHT,
+                               .colour_weight = STRL_COLOUR_WEIGHT};
     return strl_simplify(mesh, &desc, arena, result, err);
 }
 
