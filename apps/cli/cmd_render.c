@@ -1,6 +1,7 @@
 /* stroll render: images of a model without a window. */
 #include <inttypes.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/fail.h"
@@ -118,9 +119,10 @@ static strl_status render_frames(const render_options *o, strl_render_model *mod
     if (status != STRL_OK)
         return status;
     uint64_t start = strl_clock_ns();
+    strl_image_stats stats = {0};
     for (size_t f = 0; status == STRL_OK && f < path->count; f++) {
         strl_camera camera = strl_path_camera(path, f, o->size);
-        strl_image_stats stats = {0};
+        stats = (strl_image_stats){0};
         keep_pace(o, model, start, f);
         status = model->klass->draw(model, renderer, &camera, &options, &stats, err);
         if (status == STRL_OK)
@@ -130,6 +132,9 @@ static strl_status render_frames(const render_options *o, strl_render_model *mod
     if (status == STRL_OK)
         status = strl_render_output_finish(&output, err);
     strl_render_output_deinit(&output);
+    strl_cli_progress_end(progress);
+    if (status == STRL_OK && stats.faults > 0)
+        fprintf(stderr, "stroll: %" PRIu64 " reads failed and their nodes stayed coarse, the last because %s\n", stats.faults, stats.last_fault);
     return status;
 }
 

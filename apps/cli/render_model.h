@@ -19,6 +19,8 @@ typedef struct strl_image_stats {
     uint32_t fronts; /* selected until the front was resident */
     float max_error_px;
     double allowed_error_px;
+    uint64_t faults;      /* reads and pages that failed so far: their nodes stay coarse */
+    char last_fault[256]; /* the newest one's sentence; empty = none */
 } strl_image_stats;
 
 typedef struct strl_render_model strl_render_model;

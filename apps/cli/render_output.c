@@ -2,6 +2,7 @@
 
 #include <errno.h>
 #include <inttypes.h>
+#include <jansson.h>
 #include <math.h>
 #include <string.h>
 
@@ -98,25 +99,35 @@ static uint64_t count_covered(const strl_render_output *output)
     return covered;
 }
 
+/* JSON has no infinity, which is the pixel error of a box round the eye. */
+static json_t *real_or_null(double value)
+{
+    return isfinite(value) ? json_real(value) : json_null();
+}
+
 static strl_status write_stats(strl_render_output *output, size_t frame, const strl_image_stats *s, strl_error *err)
 {
-    double frame_ms = (double)s->frame_ns * 1e-6, select_ms = (double)s->select_ns * 1e-6, draw_ms = (double)s->draw_ns * 1e-6;
-    char allowed[32] = "null", largest[32] = "null"; /* JSON has no infinity: a box round the eye */
-    if (s->allowed_error_px > 0 && isfinite(s->allowed_error_px))
-        snprintf(allowed, sizeof allowed, "%.6g", s->allowed_error_px);
-    if (isfinite(s->max_error_px))
-        snprintf(largest, sizeof largest, "%.6g", (double)s->max_error_px);
     /* cull_ms: frustum culling is part of selecting; occlusion will have a stage of its own. */
-    fprintf(output->stats,
-            "{\"frame\":%zu,\"realtime\":%s,\"frame_ms\":%.4f,\"select_ms\":%.4f,\"cull_ms\":0,\"draw_ms\":%.4f,\"triangles\":%" PRIu64
-            ",\"splats\":0,\"nodes\":%" PRIu32 ",\"nodes_culled\":%" PRIu32 ",\"draws\":%" PRIu32 ",\"requests\":%" PRIu32
-            ",\"bytes_read\":%" PRIu64 ",\"resident_bytes\":%" PRIu64 ",\"gpu_bytes\":%" PRIu64 ",\"uploaded_bytes\":%" PRIu64
-            ",\"evictions\":%" PRIu32 ",\"covered_pixels\":%" PRIu64 ",\"max_error_px\":%s,\"allowed_error_px\":%s,"
-            "\"missing_nodes\":%" PRIu32 ",\"fronts\":%" PRIu32 "}\n",
-            frame, output->desc.realtime ? "true" : "false", frame_ms, select_ms, draw_ms, s->triangles, s->nodes, s->nodes_culled, s->draws,
-            s->requests, s->bytes_read, s->resident_bytes, s->gpu_bytes, s->uploaded_bytes, s->evictions, count_covered(output), largest,
-            allowed, s->missing_nodes, s->fronts);
-    return ferror(output->stats) ? strl__fail(err, STRL_ERR_IO, "cannot write %s: %s", output->desc.stats, strerror(errno)) : STRL_OK;
+    json_t *line = json_pack("{s:I,s:b,s:f,s:f,s:f,s:f}", "frame", (json_int_t)frame, "realtime", output->desc.realtime, "frame_ms",
+                             (double)s->frame_ns * 1e-6, "select_ms", (double)s->select_ns * 1e-6, "cull_ms", 0.0, "draw_ms",
+                             (double)s->draw_ns * 1e-6);
+    const struct {
+        const char *name;
+        uint64_t value;
+    } counts[] = {{"triangles", s->triangles}, {"splats", 0}, {"nodes", s->nodes}, {"nodes_culled", s->nodes_culled}, {"draws", s->draws},
+                  {"requests", s->requests}, {"bytes_read", s->bytes_read}, {"resident_bytes", s->resident_bytes}, {"gpu_bytes", s->gpu_bytes},
+                  {"uploaded_bytes", s->uploaded_bytes}, {"evictions", s->evictions}, {"covered_pixels", count_covered(output)},
+                  {"missing_nodes", s->missing_nodes}, {"fronts", s->fronts}, {"faults", s->faults}};
+    int failed = !line;
+    for (size_t c = 0; c < sizeof counts / sizeof *counts; c++)
+        failed |= json_object_set_new(line, counts[c].name, json_integer((json_int_t)counts[c].value));
+    failed |= json_object_set_new(line, "max_error_px", real_or_null(s->max_error_px));
+    failed |= json_object_set_new(line, "allowed_error_px", real_or_null(s->allowed_error_px));
+    failed |= json_object_set_new(line, "last_fault", json_string(s->last_fault));
+    if (!failed)
+        failed = json_dumpf(line, output->stats, JSON_COMPACT | JSON_REAL_PRECISION(8)) != 0 || fputc('\n', output->stats) == EOF;
+    json_decref(line);
+    return failed ? strl__fail(err, STRL_ERR_IO, "cannot write %s", output->desc.stats) : STRL_OK;
 }
 
 strl_status strl_render_output_add(strl_render_output *output, size_t frame, strl_renderer *renderer, const strl_image_stats *stats,

@@ -64,6 +64,8 @@ static void fill_stats(const strl_walk_stats *walk, strl_image_stats *stats)
     stats->missing_nodes = walk->missing_nodes;
     stats->max_error_px = walk->max_error_px;
     stats->allowed_error_px = walk->allowed_error_px;
+    stats->faults = walk->faults;
+    memcpy(stats->last_fault, walk->last_fault, sizeof stats->last_fault);
 }
 
 static strl_status walk_draw(strl_render_model *model, strl_renderer *renderer, const strl_camera *camera,
