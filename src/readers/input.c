@@ -58,6 +58,7 @@ void strl__input_refill(strl__input *input, size_t bytes)
         size_t got = 0;
         if (strl_file_read_some(input->file, input->end_offset, input->buffer + kept, input->capacity - kept, &got,
                                 &input->failure)) {
+            got = 0; /* part of it may have come; where reading stopped must not depend on that */
             stop_here(input);
         } else if (got == 0) {
             strl__fail(&input->failure, STRL_ERR_FORMAT,
