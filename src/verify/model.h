@@ -1,0 +1,107 @@
+/* What the checker knows of a container: header, trees and all node records, decoded by code of its own. Everything in a record
+ * is checked for its range before it comes here; where records contradict each other, checking stops after the records. */
+#ifndef STRL_VERIFY_MODEL_H
+#define STRL_VERIFY_MODEL_H
+
+#include "jobs/pool.h"
+#include "platform/file.h"
+#include "verify/checks.h"
+
+#define STRL__NO_NODE UINT32_MAX
+
+typedef struct strl__hash128 {
+    uint64_t low, high;
+} strl__hash128;
+
+typedef struct strl__place {
+    uint64_t offset, checksum;
+    uint32_t bytes;
+} strl__place;
+
+typedef struct strl__vnode {
+    uint32_t parent, first_child, group, group_size;
+    uint16_t level;
+    uint8_t child_count, rung;
+    int64_t anchor[3];
+    int64_t box[2][3], group_box[2][3]; /* min, max */
+    float geometric_min, geometric_max, appearance_min, appearance_max, group_geometric, group_appearance;
+    uint32_t vertex_count, base_vertex_count, triangle_count, base_triangle_count, step_count;
+    uint32_t boundary_steps, shared_vertices;
+    uint32_t payload_offset, payload_bytes, page_decoded;
+    strl__place page;
+    strl__hash128 base, finest; /* sums of the hashes of its triangles, from its payload */
+} strl__vnode;
+
+typedef struct strl__vtree {
+    uint32_t index, structure, level_count, node_count, group_count, root_triangles;
+    double origin[3], step;
+    int64_t box[2][3];
+    uint64_t triangle_count, vertex_count;
+    float leaf_geometric;
+    strl__place root;
+    strl__vnode *nodes;        /* [node_count], owned */
+    uint32_t *page_first;      /* [page_count + 1] first node of each run of nodes on one page, owned */
+    uint32_t page_count;
+    uint32_t *group_first;     /* [group_count] its first member, owned */
+} strl__vtree;
+
+typedef struct strl__section {
+    uint32_t depth;
+    uint64_t item_count;
+    strl__place place;
+} strl__section;
+
+enum { STRL__TREES = 1, STRL__PLACEMENTS, STRL__PARTS, STRL__MATERIALS, STRL__SECTIONS };
+
+typedef struct strl__model {
+    const strl_verify_desc *desc;
+    strl__checks *checks;
+    strl_pool *pool;
+    uint64_t memory_bytes;
+    strl_file *file;
+    uint64_t file_bytes; /* as the header says, and no more than there is */
+    bool closed;         /* the header's word */
+    uint64_t triangles_in, dropped_nonfinite, dropped_degenerate, dropped_lines, dropped_points;
+    double bounds[6];
+    strl__section sections[STRL__SECTIONS];
+    strl__vtree *trees;  /* [tree_count], owned */
+    uint32_t tree_count;
+    bool placed_plainly; /* one tree, placed once, as it is */
+    uint64_t record_bytes; /* held by all trees' arrays */
+} strl__model;
+
+/* Each returns a failure of the machine only; *sound false where what comes later cannot be looked at. */
+strl_status strl__v_read_header(strl__model *model, bool *sound, strl_error *err);
+strl_status strl__v_read_trees(strl__model *model, bool *sound, strl_error *err);
+strl_status strl__v_read_tables(strl__model *model, strl_error *err);
+strl_status strl__v_read_records(strl__model *model, strl__vtree *tree, bool *sound, strl_error *err);
+void strl__v_trees_deinit(strl__model *model);
+
+/* Whether records of parents, children and group members agree: boxes, errors, groups, counts, pages. */
+strl_status strl__v_check_structure(strl__model *model, strl__vtree *tree, strl_error *err);
+
+/* Reads the bytes at place into data (place->bytes long) and checks range and checksum; key and what describe it.
+ * *good false: a flaw was noted. */
+strl_status strl__v_fetch(strl__model *model, const strl__place *place, const char *what, uint64_t key, uint8_t *data, bool *good,
+                        strl_error *err);
+bool strl__v_place_good(strl__model *model, const strl__place *place, const char *what, uint64_t key);
+
+/* Progress; STRL_ERR_CANCELLED where the callback says so. From the caller's thread only. */
+strl_status strl__v_report(strl__model *model, const char *stage, uint64_t done, uint64_t total, strl_error *err);
+
+static inline uint64_t strl__key(const strl__vtree *tree, uint32_t node)
+{
+    return (uint64_t)tree->index << 32 | node;
+}
+
+static inline bool strl__replaces(const strl__vtree *tree)
+{
+    return tree->structure != 3;
+}
+
+static inline uint32_t strl__group_first(const strl__vtree *tree, uint32_t node)
+{
+    return tree->group_first[tree->nodes[node].group];
+}
+
+#endif

@@ -1,0 +1,153 @@
+#include "verify/verify.h"
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "verify/cracks.h"
+#include "verify/distances.h"
+
+strl_status strl__v_report(strl__model *model, const char *stage, uint64_t done, uint64_t total, strl_error *err)
+{
+    const strl_verify_desc *desc = model->desc;
+    if (!desc->progress || desc->progress(desc->context, stage, done, total))
+        return STRL_OK;
+    return strl__fail(err, STRL_ERR_CANCELLED, "cancelled");
+}
+
+static bool any_flaw(strl__model *model, strl_verify_kind first, strl_verify_kind last)
+{
+    for (unsigned kind = first; kind <= last; kind++)
+        if (strl__v_flawed(model->checks, kind))
+            return true;
+    return false;
+}
+
+static void check_totals(strl__model *model, strl_verify_report *report)
+{
+    for (uint32_t t = 0; t < model->tree_count; t++) {
+        report->triangles_leaf += model->trees[t].triangle_count;
+        report->nodes += model->trees[t].node_count;
+        report->groups += model->trees[t].group_count;
+    }
+    report->trees = model->tree_count;
+    report->triangles_in = model->triangles_in;
+    strl__v_checked(model->checks, STRL_VERIFY_COUNTS, 1);
+    uint64_t accounted = report->triangles_leaf + model->dropped_nonfinite + model->dropped_degenerate;
+    if (model->triangles_in != accounted)
+        strl__v_flaw(model->checks, STRL_VERIFY_COUNTS, 0,
+                   "header: %llu triangles came in, the leaves have %llu, %llu not finite and %llu degenerate ones were dropped",
+                   (unsigned long long)model->triangles_in, (unsigned long long)report->triangles_leaf,
+                   (unsigned long long)model->dropped_nonfinite, (unsigned long long)model->dropped_degenerate);
+}
+
+/* Header to records. *sound: all records can be relied on as far as indexing goes. */
+static strl_status read_structure(strl__model *model, strl_verify_report *report, bool *sound, strl_error *err)
+{
+    strl_status status = strl__v_read_header(model, sound, err);
+    if (status == STRL_OK && *sound)
+        status = strl__v_read_trees(model, sound, err);
+    if (status == STRL_OK && *sound)
+        status = strl__v_read_tables(model, err);
+    for (uint32_t t = 0; status == STRL_OK && *sound && t < model->tree_count; t++) {
+        status = strl__v_read_records(model, &model->trees[t], sound, err);
+        if (status == STRL_OK && *sound)
+            status = strl__v_check_structure(model, &model->trees[t], err);
+    }
+    if (status == STRL_OK && *sound)
+        check_totals(model, report);
+    *sound = *sound && !strl__v_flawed(model->checks, STRL_VERIFY_PAGES) && !strl__v_flawed(model->checks, STRL_VERIFY_GROUPS);
+    return status;
+}
+
+/* Every payload, and what compares them. Cracks need sound payloads. */
+static strl_status check_tree(strl__model *model, strl__vtree *tree, strl_verify_report *report, bool *sound, strl_error *err)
+{
+    strl__boundary boundary = {0};
+    strl_status status = strl__v_check_contents(model, tree, err);
+    *sound = !any_flaw(model, STRL_VERIFY_HEADER, STRL_VERIFY_PAYLOADS);
+    if (status != STRL_OK || !*sound || !strl__replaces(tree))
+        return status;
+    if (tree->structure == 1)
+        strl__v_check_unions(model, tree, &report->unions_exempt);
+    status = strl__v_boundary_find(model, tree, &boundary, err);
+    report->open_edges += boundary.open_edges;
+    if (status == STRL_OK)
+        status = strl__v_check_cracks(model, tree, &boundary, report, err);
+    strl__v_boundary_deinit(&boundary);
+    return status;
+}
+
+static void check_closed(strl__model *model, strl_verify_report *report)
+{
+    report->closed = report->open_edges == 0;
+    strl__v_checked(model->checks, STRL_VERIFY_CLOSED, 1);
+    if (model->closed && !report->closed)
+        strl__v_flaw(model->checks, STRL_VERIFY_CLOSED, 0, "header: the input is said to be closed, its leaves have %llu open edges",
+                   (unsigned long long)report->open_edges);
+}
+
+static strl_status compare_input(strl__model *model, strl_verify_report *report, strl_error *err)
+{
+    strl__vinput input;
+    strl__vtree *tree = &model->trees[0];
+    if (!model->placed_plainly || !strl__replaces(tree))
+        return strl__fail(err, STRL_ERR_UNSUPPORTED, "%s has more than one tree or placement: it cannot be compared with an input",
+                          model->desc->model);
+    strl_status status = strl__v_input_read(model, tree, &input, err);
+    if (status == STRL_OK)
+        strl__v_check_leaves(model, tree, &input);
+    if (status == STRL_OK)
+        status = strl__v_check_distances(model, tree, &input, report, err);
+    strl__v_input_deinit(&input);
+    return status;
+}
+
+static strl_status check_all(strl__model *model, strl_verify_report *report, strl_error *err)
+{
+    bool sound;
+    strl_status status = read_structure(model, report, &sound, err);
+    for (uint32_t t = 0; status == STRL_OK && sound && t < model->tree_count; t++)
+        status = check_tree(model, &model->trees[t], report, &sound, err);
+    if (status != STRL_OK || !sound)
+        return status;
+    check_closed(model, report);
+    return model->desc->input_count ? compare_input(model, report, err) : STRL_OK;
+}
+
+static strl_status check_desc(const strl_verify_desc *desc, strl_error *err)
+{
+    if (desc->memory_bytes && desc->memory_bytes < STRL_VERIFY_LEAST_MEMORY)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "--memory is %llu bytes, the least is %llu", (unsigned long long)desc->memory_bytes,
+                          (unsigned long long)STRL_VERIFY_LEAST_MEMORY);
+    if (desc->input_count && !desc->scratch_dir)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "comparing with an input needs a scratch folder");
+    return STRL_OK;
+}
+
+strl_status strl_verify_run(const strl_verify_desc *desc, strl_verify_report *report, strl_error *err)
+{
+    strl__checks checks;
+    strl__model model = {.desc = desc, .checks = &checks, .memory_bytes = desc->memory_bytes ? desc->memory_bytes : 1u << 30};
+    unsigned jobs = desc->jobs ? desc->jobs : strl_cpu_count();
+    *report = (strl_verify_report){0};
+    strl__v_checks_init(&checks);
+    strl_status status = check_desc(desc, err);
+    if (status == STRL_OK)
+        status = strl_pool_create(jobs - 1, &model.pool, err); /* the caller works too */
+    if (status == STRL_OK)
+        status = strl_file_open(desc->model, &model.file, err);
+    if (status == STRL_OK)
+        status = check_all(&model, report, err);
+    strl__v_checks_report(&checks, report);
+    report->ok = report->ok && status == STRL_OK;
+    strl__v_trees_deinit(&model);
+    strl_file_close(model.file, NULL);
+    strl_pool_destroy(model.pool);
+    strl__v_checks_deinit(&checks);
+    return status;
+}
+
+void strl_verify_report_deinit(strl_verify_report *report)
+{
+    strl__free(report->levels);
+    report->levels = NULL;
+}
