@@ -63,10 +63,10 @@ static bool decode_arc(struct splitter *s, const struct wedge *w, unsigned kind)
     bool sound = count < star->count;
     if (!sound || start >= star->count)
         return false;
-    strl__mean_add(&mean, origin, position[star->wing[start][0]]);
+    strl__mean_add(&mean, position[star->wing[start][0]]);
     for (uint32_t i = 0;; i++) {
         s->arc[i] = place;
-        strl__mean_add(&mean, origin, position[star->wing[place][1]]);
+        strl__mean_add(&mean, position[star->wing[place][1]]);
         sound &= !star->moves[place];
         star->moves[place] = 1;
         if (i == count)
@@ -106,7 +106,7 @@ static bool decode_corner(struct splitter *s, uint32_t parent, uint32_t *vertex)
 }
 
 /* Runs of corners that stay and go, in turn. Those that go are put in s->arc. */
-static bool decode_runs(struct splitter *s, const struct wedge *w, struct strl__mean *mean, uint32_t *moved)
+static bool decode_runs(struct splitter *s, struct strl__mean *mean, uint32_t *moved)
 {
     struct strl__star *star = &s->star;
     const int32_t(*position)[3] = (const int32_t(*)[3])s->d->mesh.position;
@@ -119,8 +119,8 @@ static bool decode_runs(struct splitter *s, const struct wedge *w, struct strl__
             if (!moves)
                 continue;
             s->arc[(*moved)++] = done;
-            strl__mean_add(mean, position[w->parent], position[star->wing[done][0]]);
-            strl__mean_add(mean, position[w->parent], position[star->wing[done][1]]);
+            strl__mean_add(mean, position[star->wing[done][0]]);
+            strl__mean_add(mean, position[star->wing[done][1]]);
         }
     }
     return true;
@@ -132,7 +132,7 @@ static bool decode_general(struct splitter *s, const struct wedge *w)
     const int32_t(*position)[3] = (const int32_t(*)[3])s->d->mesh.position;
     struct strl__mean mean = {0};
     uint32_t moved = 0;
-    if (!decode_runs(s, w, &mean, &moved))
+    if (!decode_runs(s, &mean, &moved))
         return false;
     if (w->is_first)
         set_first_position(s, w, &mean);
@@ -192,6 +192,23 @@ static bool decode_step(struct splitter *s)
     return true;
 }
 
+/* Brings the list of a step to come into the cache: its parent is known but where steps between add more than one vertex. The
+ * hops are a fixed number, because a loop that ends with the list would be mispredicted. */
+static inline void prefetch(const struct strl__decoder *d, uint32_t step)
+{
+    enum { AHEAD = 2, HOPS = 7 };
+    const struct strl__stream_in *parents = &d->in.stream[STRL__STREAM_PARENT];
+    if (step - 1 + AHEAD >= parents->count)
+        return;
+    uint32_t parent = d->mesh.vertex_count - 1 + AHEAD - parents->values[step - 1 + AHEAD];
+    if (parent >= d->mesh.vertex_count)
+        return;
+    uint32_t corner = d->mesh.corner[d->mesh.heads + parent].next;
+    for (unsigned i = 0; i < HOPS; i++)
+        corner = d->mesh.corner[corner].next;
+    __asm__ volatile("" : : "r"(corner)); /* or the compiler sees that nothing comes of it */
+}
+
 strl_status strl__decode_steps(struct strl__decoder *d)
 {
     struct splitter s = {.d = d};
@@ -199,6 +216,7 @@ strl_status strl__decode_steps(struct strl__decoder *d)
     if (!s.arc || !strl__star_init(&s.star, d->sizes.vertex_count, d->sizes.triangle_count, d->scratch))
         return strl__fail(d->err, STRL_ERR_MEMORY, "no memory to decode a node payload");
     for (uint32_t step = 1; step <= d->sizes.step_count; step++) {
+        prefetch(d, step);
         if (!decode_step(&s))
             return strl__fail(d->err, STRL_ERR_FORMAT, "node payload's step %" PRIu32 " of %" PRIu32 " is broken", step,
                               d->sizes.step_count);

@@ -119,15 +119,14 @@ static void encode_arc(struct recorder *r)
 {
     struct strl__encoder *e = r->e;
     const struct strl__star *star = &r->star;
-    const int32_t *origin = e->mesh.position[r->parent];
     strl__push(&e->out, STRL__STREAM_SPOKE, r->arc[0]);
     strl__push(&e->out, STRL__STREAM_ARC, r->moved - 1);
     if (r->vertex != r->step_first)
         return;
     struct strl__mean mean = {0};
-    strl__mean_add(&mean, origin, e->mesh.position[star->wing[r->arc[0]][0]]);
+    strl__mean_add(&mean, e->mesh.position[star->wing[r->arc[0]][0]]);
     for (uint32_t i = 0; i < r->moved; i++)
-        strl__mean_add(&mean, origin, e->mesh.position[star->wing[r->arc[i]][1]]);
+        strl__mean_add(&mean, e->mesh.position[star->wing[r->arc[i]][1]]);
     push_step_position(r, &mean);
 }
 
@@ -147,7 +146,6 @@ static void encode_general(struct recorder *r)
 {
     struct strl__encoder *e = r->e;
     const struct strl__star *star = &r->star;
-    const int32_t *origin = e->mesh.position[r->parent];
     struct strl__mean mean = {0};
     uint32_t moved = 0;
     uint8_t moves = 0;
@@ -157,8 +155,8 @@ static void encode_general(struct recorder *r)
             if (!moves)
                 continue;
             r->arc[moved++] = done;
-            strl__mean_add(&mean, origin, e->mesh.position[star->wing[done][0]]);
-            strl__mean_add(&mean, origin, e->mesh.position[star->wing[done][1]]);
+            strl__mean_add(&mean, e->mesh.position[star->wing[done][0]]);
+            strl__mean_add(&mean, e->mesh.position[star->wing[done][1]]);
         }
         strl__push(&e->out, STRL__STREAM_GENERAL, run);
     }

@@ -129,24 +129,25 @@ static inline uint32_t strl__star_follower(const struct strl__star *star, uint16
  * gap at its start and (v, b, u) that at its end. What is no arc is said corner by corner. */
 enum { STRL__KIND_START = 1, STRL__KIND_END = 2, STRL__KIND_GENERAL = 4 };
 
-/* Predicts a new vertex: the mean of its parent and `count` neighbours, in integers. */
+/* Predicts a new vertex: the mean of its parent and `count` neighbours, in integers that wrap. */
 struct strl__mean {
-    int64_t sum[3]; /* of differences to the origin */
-    uint32_t count;
+    uint32_t sum[3], count;
 };
 
-static inline void strl__mean_add(struct strl__mean *mean, const int32_t origin[3], const int32_t position[3])
+static inline void strl__mean_add(struct strl__mean *mean, const int32_t position[3])
 {
     for (unsigned k = 0; k < 3; k++)
-        mean->sum[k] += (int64_t)position[k] - origin[k];
+        mean->sum[k] += (uint32_t)position[k];
     mean->count++;
 }
 
-static inline void strl__mean_get(const struct strl__mean *mean, const int32_t origin[3], uint32_t predicted[3])
+static inline void strl__mean_get(const struct strl__mean *mean, const int32_t parent[3], uint32_t predicted[3])
 {
-    uint32_t scale = 65536u / (mean->count + 1);
-    for (unsigned k = 0; k < 3; k++)
-        predicted[k] = (uint32_t)origin[k] + (uint32_t)((mean->sum[k] * (int64_t)scale + 32768) >> 16);
+    int64_t scale = 65536u / (mean->count + 1);
+    for (unsigned k = 0; k < 3; k++) {
+        int32_t difference = (int32_t)(mean->sum[k] - mean->count * (uint32_t)parent[k]);
+        predicted[k] = (uint32_t)parent[k] + (uint32_t)((difference * scale + 32768) >> 16);
+    }
 }
 
 /* ---- attributes: predicted over the finest state ---- */

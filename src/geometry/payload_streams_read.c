@@ -18,7 +18,7 @@ struct reader {
     uint32_t state[STRL__RANS_STATES];
 };
 
-/* sym | frequency - 1 << 8 | slot - start << 20; filled in runs of SLOT_RUN, which may pass the end. */
+/* symbol | frequency - 1 << 8 | slot - start << 20; filled in runs of SLOT_RUN, which may pass the end. */
 enum { SLOT_RUN = 8 };
 typedef uint32_t slot_table[STRL__PROBABILITY_ONE + SLOT_RUN];
 
@@ -61,9 +61,9 @@ static unsigned read_table(struct reader *reader, slot_table slots)
         } else if (!frequency) {
             return 0;
         }
-        for (uint32_t i = 0, slot = s | (frequency - 1) << 8; i < frequency; i += SLOT_RUN)
-            for (unsigned k = 0; k < SLOT_RUN; k++, slot += 1u << 20)
-                slots[start + i + k] = slot;
+        for (uint32_t i = 0, slot = s | (frequency - 1) << 8; i < frequency; i += SLOT_RUN, slot += SLOT_RUN << 20)
+            for (unsigned k = 0; k < SLOT_RUN; k++)
+                slots[start + i + k] = slot + (k << 20);
         start += frequency;
     }
     return alphabet;
