@@ -66,7 +66,7 @@ typedef struct strl_made_node {
 
 void strl_made_node_deinit(strl_made_node *made);
 /* Simplifies to `target` triangles, records the progressive mesh, encodes it, keeps the base mesh with its shares. `self` is the node's index
- * in its level. Fills all of made but boxes. */
+ * in its level. Boxes and errors are those of the mesh alone. */
 strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh *node, uint32_t self, uint32_t target,
                            strl_arena *arena, strl_made_node *made, strl_error *err);
 /* Appends a made node's bytes to its level and counts its neighbours. In node order, one thread. */

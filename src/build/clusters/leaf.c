@@ -217,19 +217,6 @@ static strl_status mark_shared(const leaf_stage *stage, const shared_ref *refs, 
     return STRL_OK;
 }
 
-static void set_box(const strl_node_mesh *node, strl_node *record)
-{
-    for (int k = 0; k < 3; k++) {
-        int32_t least = INT32_MAX, most = INT32_MIN;
-        for (uint32_t p = 0; p < node->mesh.point_count; p++) {
-            least = node->mesh.position[p][k] < least ? node->mesh.position[p][k] : least;
-            most = node->mesh.position[p][k] > most ? node->mesh.position[p][k] : most;
-        }
-        record->box_min[k] = node->anchor[k] + least;
-        record->box_max[k] = node->anchor[k] + most;
-    }
-}
-
 static strl_status make_leaf(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
 {
     leaf_stage *stage = context;
@@ -252,7 +239,6 @@ static strl_status make_leaf(void *context, uint64_t index, unsigned slot, unsig
     if (!status)
         status = strl_make_node(stage->hierarchy, &node, cluster, (own + 1) / 2, arena, made, err);
     if (!status) {
-        set_box(&node, &made->state.record);
         for (int k = 0; k < 3; k++) {
             made->state.record.group_box_min[k] = made->state.record.box_min[k];
             made->state.record.group_box_max[k] = made->state.record.box_max[k];

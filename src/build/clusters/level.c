@@ -273,17 +273,13 @@ static void include_box(int64_t least[3], int64_t most[3], const int64_t other_l
     }
 }
 
-/* A node's errors and box cover its children's and those of their groups; so every rule that holds for a child's group
+/* A node's errors and box cover its own mesh (which may have got points of its neighbours), its children's and those of their groups; so every rule that holds for a child's group
  * holds for the groups above it, and a cut chosen by groups is closed. */
 static void raise_to_children(const level_stage *stage, uint32_t self, strl_node *record, int64_t group_least[3],
                               int64_t group_most[3])
 {
     for (uint32_t i = 0; i < 2; i++) {
         const strl_node *child = &stage->children->nodes[2 * self + i].record;
-        if (i == 0) {
-            memcpy(record->box_min, child->box_min, sizeof record->box_min);
-            memcpy(record->box_max, child->box_max, sizeof record->box_max);
-        }
         include_box(record->box_min, record->box_max, child->box_min, child->box_max);
         include_box(group_least, group_most, child->group_box_min, child->group_box_max);
         record->geometric_min = fmaxf(record->geometric_min, fmaxf(child->geometric_max, child->group_geometric));

@@ -28,10 +28,24 @@ static strl_status simplify(const strl_mesh *mesh, uint32_t target, strl_arena *
     return strl_simplify(mesh, &desc, arena, result, err);
 }
 
+static void set_box(const strl_node_mesh *node, strl_node *record)
+{
+    for (int k = 0; k < 3; k++) {
+        int32_t least = INT32_MAX, most = INT32_MIN;
+        for (uint32_t p = 0; p < node->mesh.point_count; p++) {
+            least = node->mesh.position[p][k] < least ? node->mesh.position[p][k] : least;
+            most = node->mesh.position[p][k] > most ? node->mesh.position[p][k] : most;
+        }
+        record->box_min[k] = node->anchor[k] + least;
+        record->box_max[k] = node->anchor[k] + most;
+    }
+}
+
 static void fill_record(strl_node *record, const strl_node_mesh *node, const strl_simplified *simplified,
                         const strl_pm *pm)
 {
     memcpy(record->anchor, node->anchor, sizeof record->anchor);
+    set_box(node, record);
     record->geometric_min = pm->geometric_error[pm->step_count];
     record->geometric_max = pm->geometric_error[0];
     record->appearance_min = pm->appearance_error[pm->step_count];
