@@ -4,15 +4,12 @@ layout(location = 0) in ivec3 in_position;
 layout(location = 1) in uvec2 in_normal;
 layout(location = 2) in vec4 in_colour;
 
-#ifdef STRL_ITEM_STORAGE
-layout(location = 3) in uint in_item;
-struct Item {
-    vec4 rows[6];
-    ivec4 base[2];
-};
-layout(std430, binding = 0) readonly buffer Items { Item items[]; };
-#define ITEM_ROW(i) items[in_item].rows[i]
-#define ITEM_BASE(i) items[in_item].base[i]
+/* What the item's vertices share: instanced attributes where one call draws many items, else uniforms. */
+#ifdef STRL_ITEM_ATTRIBUTES
+layout(location = 3) in vec4 in_rows[6];
+layout(location = 9) in ivec4 in_base[2];
+#define ITEM_ROW(i) in_rows[i]
+#define ITEM_BASE(i) in_base[i]
 #else
 uniform highp vec4 u_rows[6];
 uniform highp ivec4 u_base[2];

@@ -15,7 +15,7 @@
 typedef struct gl45_command {
     uint32_t count, instance_count, first_index;
     int32_t base_vertex;
-    uint32_t base_instance; /* which number of item_numbers the vertices get: the item's place in the batch */
+    uint32_t base_instance; /* which item record the vertices get: the item's place in the batch */
 } gl45_command;
 
 typedef struct gl45_queued {
@@ -28,7 +28,6 @@ typedef struct gl45_renderer {
     strl_gl gl;
     strl_gl_ring ring;
     strl_gl_store store;
-    GLuint item_numbers;
     uint32_t batch_most;  /* items of one batch */
     uint32_t batch_count;
     uint64_t batch;       /* number of the batch being collected; nodes of it cannot be evicted */
@@ -64,7 +63,9 @@ static void draw_slab(gl45_draw *draw, gl45_piece *piece, uint32_t slab, bool tr
     }
     if (count == 0)
         return;
-    glBindVertexArray(self->store.slabs[slab].array);
+    GLuint array = self->store.slabs[slab].array;
+    glVertexArrayVertexBuffer(array, 1, self->ring.buffer, (GLintptr)piece->offset, sizeof(strl_gl_item));
+    glBindVertexArray(array);
     glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_SHORT, (const void *)(piece->offset + first), (GLsizei)count, 0);
     draw->stats->draws += count;
 }
@@ -78,7 +79,6 @@ static void flush(gl45_draw *draw)
     gl45_piece piece = {.used = record_bytes};
     piece.mapped = strl__gl_ring_take(&self->ring, record_bytes + self->batch_count * sizeof(gl45_command), &piece.offset);
     memcpy(piece.mapped, self->records, record_bytes);
-    glBindBufferRange(GL_SHADER_STORAGE_BUFFER, 0, self->ring.buffer, (GLintptr)piece.offset, (GLsizeiptr)record_bytes);
     glBindBuffer(GL_DRAW_INDIRECT_BUFFER, self->ring.buffer);
     for (int translucent = 0; translucent < 2; translucent++) {
         glUseProgram(self->gl.programs[translucent ? STRL_GL_NODE_ALPHA : STRL_GL_NODE].name);
@@ -202,7 +202,7 @@ static strl_status queue_item(gl45_draw *draw, const strl_draw_item *item, const
 
 static uint64_t fixed_bytes(const gl45_renderer *self)
 {
-    return self->ring.segment_bytes * STRL_RING_SEGMENTS + self->batch_most * sizeof(uint32_t);
+    return self->ring.segment_bytes * STRL_RING_SEGMENTS;
 }
 
 static strl_status gl45_draw_list(strl_renderer *renderer, const strl_draw_setup *setup, const strl_draw_list *list,
@@ -236,18 +236,9 @@ static strl_status init_batch(gl45_renderer *self, strl_error *err)
 {
     self->queued = strl__alloc(self->batch_most, sizeof *self->queued);
     self->records = strl__alloc(self->batch_most, sizeof *self->records);
-    uint32_t *numbers = strl__alloc(self->batch_most, sizeof *numbers);
-    strl_status status = STRL_OK;
-    if (!self->queued || !self->records || !numbers) {
-        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a batch of %" PRIu32 " draws", self->batch_most);
-    } else {
-        for (uint32_t n = 0; n < self->batch_most; n++)
-            numbers[n] = n;
-        glCreateBuffers(1, &self->item_numbers);
-        glNamedBufferStorage(self->item_numbers, (GLsizeiptr)(self->batch_most * sizeof *numbers), numbers, 0);
-    }
-    strl__free(numbers);
-    return status;
+    if (self->queued && self->records)
+        return STRL_OK;
+    return strl__fail(err, STRL_ERR_MEMORY, "no memory for a batch of %" PRIu32 " draws", self->batch_most);
 }
 
 /* A small budget gets a small ring: most of it is for nodes. */
@@ -261,7 +252,7 @@ static strl_status init_buffers(gl45_renderer *self, strl_error *err)
     if (status == STRL_OK)
         status = init_batch(self, err);
     if (status == STRL_OK)
-        strl__gl_store_init(&self->store, budget - fixed_bytes(self), self->item_numbers);
+        strl__gl_store_init(&self->store, budget - fixed_bytes(self));
     return status;
 }
 
@@ -271,7 +262,6 @@ static void gl45_destroy(strl_renderer *renderer)
     strl__gl_make_current(&self->gl);
     strl__gl_store_deinit(&self->store);
     strl__gl_ring_deinit(&self->ring);
-    glDeleteBuffers(1, &self->item_numbers);
     strl__gl_deinit(&self->gl);
     strl__free(self->queued);
     strl__free(self->records);

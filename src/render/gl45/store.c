@@ -2,11 +2,13 @@
 
 #include <string.h>
 
+#include "render/glcommon/item.h"
+
 /* Room for the largest node: 65536 vertices and 131072 triangles. */
 #define LEAST_SLAB_BYTES (2200u << 10)
 #define MOST_SLAB_BYTES (64u << 20)
 
-void strl__gl_store_init(strl_gl_store *store, uint64_t budget_bytes, GLuint item_numbers)
+void strl__gl_store_init(strl_gl_store *store, uint64_t budget_bytes)
 {
     uint64_t bytes = budget_bytes / 8;
     bytes = bytes < LEAST_SLAB_BYTES ? LEAST_SLAB_BYTES : bytes > MOST_SLAB_BYTES ? MOST_SLAB_BYTES : bytes;
@@ -15,7 +17,7 @@ void strl__gl_store_init(strl_gl_store *store, uint64_t budget_bytes, GLuint ite
         bytes = budget_bytes / STRL_MOST_SLABS;
     if (bytes > (1u << 30))
         bytes = 1u << 30;
-    *store = (strl_gl_store){.item_numbers = item_numbers, .slab_bytes = bytes / STRL_GRANULE_BYTES * STRL_GRANULE_BYTES};
+    *store = (strl_gl_store){.slab_bytes = bytes / STRL_GRANULE_BYTES * STRL_GRANULE_BYTES};
     uint64_t most = budget_bytes / bytes;
     store->slab_most = most > STRL_MOST_SLABS ? STRL_MOST_SLABS : (uint32_t)most;
 }
@@ -39,19 +41,21 @@ uint64_t strl__gl_store_bytes(const strl_gl_store *store)
     return store->slab_count * store->slab_bytes;
 }
 
-static void set_array(const strl_gl_store *store, const strl_gl_slab *slab)
+static void set_array(const strl_gl_slab *slab)
 {
     GLuint array = slab->array;
     glVertexArrayVertexBuffer(array, 0, slab->buffer, 0, sizeof(strl_vertex));
-    glVertexArrayVertexBuffer(array, 1, store->item_numbers, 0, sizeof(uint32_t));
     glVertexArrayBindingDivisor(array, 1, 1);
     glVertexArrayElementBuffer(array, slab->buffer);
     glVertexArrayAttribIFormat(array, 0, 3, GL_INT, offsetof(strl_vertex, position));
     glVertexArrayAttribIFormat(array, 1, 2, GL_UNSIGNED_SHORT, offsetof(strl_vertex, normal));
     glVertexArrayAttribFormat(array, 2, 4, GL_UNSIGNED_BYTE, GL_TRUE, offsetof(strl_vertex, rgba));
-    glVertexArrayAttribIFormat(array, 3, 1, GL_UNSIGNED_INT, 0);
-    for (GLuint attribute = 0; attribute < 4; attribute++) {
-        glVertexArrayAttribBinding(array, attribute, attribute == 3);
+    for (GLuint row = 0; row < 6; row++)
+        glVertexArrayAttribFormat(array, 3 + row, 4, GL_FLOAT, GL_FALSE, row * (GLuint)sizeof(float[4]));
+    for (GLuint word = 0; word < 2; word++)
+        glVertexArrayAttribIFormat(array, 9 + word, 4, GL_INT, (GLuint)offsetof(strl_gl_item, base) + word * (GLuint)sizeof(int32_t[4]));
+    for (GLuint attribute = 0; attribute < 11; attribute++) {
+        glVertexArrayAttribBinding(array, attribute, attribute >= 3);
         glEnableVertexArrayAttrib(array, attribute);
     }
 }
@@ -76,7 +80,7 @@ static bool add_slab(strl_gl_store *store)
         return false;
     }
     glCreateVertexArrays(1, &slab->array);
-    set_array(store, slab);
+    set_array(slab);
     store->slab_count++;
     return true;
 }

@@ -12,7 +12,8 @@
 #define STRL_MOST_SLABS 64u
 
 typedef struct strl_gl_slab {
-    GLuint buffer, array;
+    GLuint buffer;
+    GLuint array; /* binding 0: the slab's vertices; binding 1: item records, one an instance, bound anew for each batch */
     strl_ranges ranges;
 } strl_gl_slab;
 
@@ -20,11 +21,10 @@ typedef struct strl_gl_store {
     strl_gl_slab slabs[STRL_MOST_SLABS];
     uint32_t slab_count, slab_most;
     uint64_t slab_bytes;
-    GLuint item_numbers; /* borrowed: the buffer 0, 1, 2, ... that numbers items */
 } strl_gl_store;
 
 /* Divides budget_bytes into slabs; makes none yet. */
-void strl__gl_store_init(strl_gl_store *store, uint64_t budget_bytes, GLuint item_numbers);
+void strl__gl_store_init(strl_gl_store *store, uint64_t budget_bytes);
 void strl__gl_store_deinit(strl_gl_store *store);
 uint64_t strl__gl_store_bytes(const strl_gl_store *store);
 

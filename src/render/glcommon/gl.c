@@ -52,7 +52,7 @@ strl_status strl__gl_init(strl_gl *gl, const strl_renderer_class *klass, const s
     gl->base = (strl_renderer){.klass = klass, .desc = *desc};
     strl_status status = open_context(gl, desc, gl45, err);
     if (status == STRL_OK) {
-        gl->dialect = (strl_gl_dialect){.es = !epoxy_is_desktop_gl(), .item_storage = gl45};
+        gl->dialect = (strl_gl_dialect){.es = !epoxy_is_desktop_gl(), .item_attributes = gl45};
         gl->dialect.symmetric_depth = !has_clip_control(&gl->dialect, desc->core_only && !gl45);
         snprintf(gl->base.device, sizeof gl->base.device, "%s", (const char *)glGetString(GL_RENDERER));
         status = strl__cache_init(&gl->cache, err);

@@ -63,8 +63,8 @@ strl_status strl__gl_program_init(strl_gl_program *program, strl_gl_program_kind
 {
     const char *texts[] = {
         dialect->es ? "#version 300 es\nprecision highp float;\nprecision highp int;\n"
-                    : dialect->item_storage ? "#version 450 core\n" : "#version 330 core\n",
-        dialect->item_storage ? "#define STRL_ITEM_STORAGE\n" : "",
+                    : dialect->item_attributes ? "#version 450 core\n" : "#version 330 core\n",
+        dialect->item_attributes ? "#define STRL_ITEM_ATTRIBUTES\n" : "",
         dialect->symmetric_depth ? "#define STRL_SYMMETRIC_DEPTH\n" : "",
         kind == STRL_GL_NODE_ALPHA ? "#define STRL_ALPHA\n" : "",
         strl__shader_srgb,

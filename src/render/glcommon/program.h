@@ -10,7 +10,7 @@
 /* What the context can do; decides version line and defines. */
 typedef struct strl_gl_dialect {
     bool es;
-    bool item_storage;    /* items in a storage buffer (4.5); else uniforms */
+    bool item_attributes;    /* items as instanced attributes (4.5); else uniforms */
     bool symmetric_depth; /* no clip control: depth is written by the fragment shader */
 } strl_gl_dialect;
 
