@@ -58,7 +58,7 @@ static bool decode_arc(struct splitter *s, const struct wedge *w, unsigned kind)
     struct strl__mesh *mesh = &s->d->mesh;
     const int32_t(*position)[3] = (const int32_t(*)[3])mesh->position;
     const int32_t *origin = position[w->parent], *v = position[w->vertex];
-    uint32_t start = strl__pull(&s->d->in, STRL__STREAM_SPOKE), count = strl__pull(&s->d->in, STRL__STREAM_ARC), place = start;
+    uint32_t start = strl__pull(&s->d->in, STRL__STREAM_START), count = strl__pull(&s->d->in, STRL__STREAM_ARC), place = start;
     struct strl__mean mean = {0};
     bool sound = count < star->count;
     if (!sound || start >= star->count)

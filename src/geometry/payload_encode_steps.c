@@ -16,7 +16,7 @@ struct recorder {
     uint32_t moved;  /* corners that go from parent to vertex */
     uint32_t *added; /* [triangles], 3 t + corner of the vertex, for those of pm's triangles that the vertex brings */
     uint32_t added_count;
-    uint64_t moves;
+    uint64_t moves; /* work so far, counted as the decoder does, see STRL_PM_MAX_MOVES */
 };
 
 static uint32_t corner_number(const struct strl__encoder *e, uint32_t t, unsigned k)
@@ -119,7 +119,7 @@ static void encode_arc(struct recorder *r)
 {
     struct strl__encoder *e = r->e;
     const struct strl__star *star = &r->star;
-    strl__push(&e->out, STRL__STREAM_SPOKE, r->arc[0]);
+    strl__push(&e->out, STRL__STREAM_START, r->arc[0]);
     strl__push(&e->out, STRL__STREAM_ARC, r->moved - 1);
     if (r->vertex != r->step_first)
         return;
@@ -168,13 +168,14 @@ static void encode_general(struct recorder *r)
             strl__push(&e->out, STRL__STREAM_GENERAL, corner_code(r, added_corner(r, r->added[i], k)));
 }
 
-static void encode_wedge_parent(const struct recorder *r, uint32_t previous)
+static void encode_wedge_parent(struct recorder *r, uint32_t previous)
 {
     uint32_t code = 0, at = previous;
     do {
         if (at == r->parent)
             break;
         code++;
+        r->moves++;
         at = r->e->mesh.twin[at];
     } while (at != previous);
     strl__push(&r->e->out, STRL__STREAM_WEDGE_PARENT, at == r->parent ? code : code + r->parent);

@@ -34,19 +34,17 @@ struct table {
 struct bit_writer {
     strl_writer out;
     uint64_t pending;
-    unsigned count; /* bits pending, below 8 between calls */
-    uint64_t total;
+    unsigned count; /* bits pending, below 32 between calls */
 };
 
 static void put_bits(struct bit_writer *bits, unsigned count, uint32_t value)
 {
     bits->pending |= (uint64_t)value << bits->count;
     bits->count += count;
-    bits->total += count;
-    while (bits->count >= 8) {
-        strl_writer_u8(&bits->out, (uint8_t)bits->pending);
-        bits->pending >>= 8;
-        bits->count -= 8;
+    if (bits->count >= 32) {
+        strl_writer_u32(&bits->out, (uint32_t)bits->pending);
+        bits->pending >>= 32;
+        bits->count -= 32;
     }
 }
 
@@ -134,8 +132,8 @@ static void write_raw(const struct strl__stream_out *stream, const struct table 
 }
 
 struct rans_writer {
-    uint16_t *words; /* filled from the end */
-    size_t first, capacity;
+    uint8_t *words; /* filled from the end, two bytes a word */
+    size_t first, capacity; /* bytes */
     uint32_t state[STRL__RANS_STATES];
 };
 
@@ -145,7 +143,8 @@ static void code_stream(const struct strl__stream_out *stream, const struct tabl
         unsigned symbol = strl__symbol_of(stream->values[i]);
         uint32_t frequency = table->frequency[symbol], x = rans->state[i % STRL__RANS_STATES];
         if (x >= (uint64_t)frequency << (32 - STRL__PROBABILITY_BITS)) {
-            rans->words[--rans->first] = (uint16_t)x;
+            rans->first -= 2;
+            strl__store_le(rans->words + rans->first, 2, x & 0xffff);
             x >>= 16;
         }
         rans->state[i % STRL__RANS_STATES] = ((x / frequency) << STRL__PROBABILITY_BITS) + x % frequency + table->start[symbol];
@@ -160,13 +159,11 @@ static void write_padding(strl_writer *writer, size_t start, uint64_t items)
 
 static void write_sections(const struct rans_writer *rans, struct bit_writer *bits, strl_writer *writer)
 {
-    if (bits->count)
-        put_bits(bits, 8 - bits->count, 0);
-    strl_writer_u32(writer, (uint32_t)(rans->capacity - rans->first));
+    strl_writer_le(&bits->out, (bits->count + 7) / 8, bits->pending);
+    strl_writer_u32(writer, (uint32_t)((rans->capacity - rans->first) / 2));
     for (unsigned i = 0; i < STRL__RANS_STATES; i++)
         strl_writer_u32(writer, rans->state[i]);
-    for (size_t i = rans->first; i < rans->capacity; i++)
-        strl_writer_u16(writer, rans->words[i]);
+    strl_writer_bytes(writer, rans->words + rans->first, rans->capacity - rans->first);
     strl_writer_bytes(writer, bits->out.data, bits->out.size);
 }
 
@@ -180,10 +177,10 @@ strl_status strl__streams_write(const struct strl__streams_out *streams, size_t 
         choose_table(&streams->stream[id], &table[id]);
         write_raw(&streams->stream[id], &table[id], &bits);
         item_count += streams->stream[id].count;
-        rans.capacity += table[id].mode == STRL__MODE_TABLE ? streams->stream[id].count : 0;
+        rans.capacity += table[id].mode == STRL__MODE_TABLE ? 2 * streams->stream[id].count : 0;
     }
     rans.first = rans.capacity; /* a symbol shifts out at most one word */
-    rans.words = strl__alloc(rans.capacity, sizeof *rans.words);
+    rans.words = strl__alloc(rans.capacity, 1);
     bool failed = streams->failed || !rans.words;
     if (!failed) {
         for (unsigned id = STRL__STREAM_COUNT; id-- > 0;)
