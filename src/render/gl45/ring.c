@@ -2,7 +2,7 @@
 
 #include "base/fail.h"
 
-#define ALIGNMENT 256u /* the largest that GL lets a system ask for storage offsets */
+#define ALIGNMENT 256u /* whole cache lines; more than any offset needs */
 #define WAIT_NS 1000000000u
 
 strl_status strl__gl_ring_init(strl_gl_ring *ring, size_t segment_bytes, strl_error *err)
