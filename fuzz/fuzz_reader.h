@@ -1,4 +1,5 @@
-/* What the fuzzers of readers share: a hostile file may be refused, but what is read must keep the reader's promises. */
+/* What the fuzzers of readers share: a hostile file may be refused, but what is read must keep the
+ * reader's promises. */
 #ifndef STRL_FUZZ_READER_H
 #define STRL_FUZZ_READER_H
 
@@ -11,12 +12,12 @@
 #include "base/hash.h"
 #include "readers/internal.h"
 
-#define FUZZ_CHECK(condition)                                             \
-    do {                                                                  \
-        if (!(condition)) {                                               \
-            fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition); \
-            abort();                                                      \
-        }                                                                 \
+#define FUZZ_CHECK(condition)                                                                      \
+    do {                                                                                           \
+        if (!(condition)) {                                                                        \
+            fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition);                        \
+            abort();                                                                               \
+        }                                                                                          \
     } while (0)
 
 typedef struct fuzz_pass {
@@ -36,7 +37,8 @@ static inline void fuzz_check_triangle(const strl_triangle *triangle, fuzz_pass 
     if (!(triangle->flags & STRL_TRIANGLE_HAS_COLOUR))
         FUZZ_CHECK(triangle->colour[0] == 0xffffffffu && triangle->colour[2] == 0xffffffffu);
     pass->highest_part = triangle->part > pass->highest_part ? triangle->part : pass->highest_part;
-    pass->highest_material = triangle->material > pass->highest_material ? triangle->material : pass->highest_material;
+    pass->highest_material =
+        triangle->material > pass->highest_material ? triangle->material : pass->highest_material;
 }
 
 static inline fuzz_pass fuzz_read_pass(strl_reader *reader)
@@ -47,11 +49,13 @@ static inline fuzz_pass fuzz_read_pass(strl_reader *reader)
     size_t count = 0;
     do {
         pass.status = strl_reader_next(reader, triangles, 61, &count, &err);
-        FUZZ_CHECK(pass.status == STRL_OK || (count == 0 && err.message[0] != 0 && err.status == pass.status));
+        FUZZ_CHECK(pass.status == STRL_OK ||
+                   (count == 0 && err.message[0] != 0 && err.status == pass.status));
         for (size_t i = 0; i < count; i++)
             fuzz_check_triangle(&triangles[i], &pass);
         pass.count += count;
-        pass.checksum = strl__mix64(pass.checksum ^ strl__checksum(triangles, count * sizeof *triangles));
+        pass.checksum =
+            strl__mix64(pass.checksum ^ strl__checksum(triangles, count * sizeof *triangles));
     } while (count > 0);
     strl_reader_drops_get(reader, &pass.drops);
     return pass;
@@ -63,7 +67,8 @@ static inline void fuzz_reader(const strl__format *format, const uint8_t *data, 
     char path[40];
     if (file < 0)
         file = memfd_create("fuzz", 0);
-    FUZZ_CHECK(file >= 0 && ftruncate(file, 0) == 0 && pwrite(file, data, size, 0) == (ssize_t)size);
+    FUZZ_CHECK(file >= 0 && ftruncate(file, 0) == 0 &&
+               pwrite(file, data, size, 0) == (ssize_t)size);
     snprintf(path, sizeof path, "/proc/self/fd/%d", file);
     strl_reader_desc desc = {.path = path, .memory_bytes = STRL__READER_MEMORY_LEAST};
     strl_reader *reader;
@@ -78,7 +83,8 @@ static inline void fuzz_reader(const strl__format *format, const uint8_t *data, 
     FUZZ_CHECK(first.highest_material < strl_reader_material_count(reader));
     FUZZ_CHECK(strl_reader_rewind(reader, &err) == STRL_OK);
     fuzz_pass second = fuzz_read_pass(reader);
-    FUZZ_CHECK(first.status == second.status && first.count == second.count && first.checksum == second.checksum);
+    FUZZ_CHECK(first.status == second.status && first.count == second.count &&
+               first.checksum == second.checksum);
     FUZZ_CHECK(memcmp(&first.drops, &second.drops, sizeof first.drops) == 0);
     strl_reader_close(reader);
 }

@@ -11,8 +11,8 @@ strl_status strl__input_init(strl__input *input, strl_file *file, size_t capacit
     *input = (strl__input){.file = file, .capacity = capacity, .file_bytes = strl_file_bytes(file)};
     input->buffer = strl__alloc(capacity + 1, 1);
     if (!input->buffer)
-        return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a read buffer of %zu bytes", strl_file_path(file),
-                          capacity);
+        return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a read buffer of %zu bytes",
+                          strl_file_path(file), capacity);
     strl__input_seek(input, 0, 1);
     return STRL_OK;
 }
@@ -56,20 +56,22 @@ void strl__input_refill(strl__input *input, size_t bytes)
     input->end = input->buffer + kept;
     while (kept < bytes && input->end_offset < input->file_bytes) {
         size_t got = 0;
-        if (strl_file_read_some(input->file, input->end_offset, input->buffer + kept, input->capacity - kept, &got,
-                                &input->failure)) {
+        if (strl_file_read_some(input->file, input->end_offset, input->buffer + kept,
+                                input->capacity - kept, &got, &input->failure)) {
             got = 0; /* part of it may have come; where reading stopped must not depend on that */
             stop_here(input);
         } else if (got == 0) {
             strl__fail(&input->failure, STRL_ERR_FORMAT,
-                       "%s ends at byte %" PRIu64 ", but it had %" PRIu64 " bytes when it was opened",
+                       "%s ends at byte %" PRIu64 ", but it had %" PRIu64
+                       " bytes when it was opened",
                        strl_file_path(input->file), input->end_offset, input->file_bytes);
             stop_here(input);
         }
         kept += got;
         input->end += got;
         input->end_offset += got;
-        if (input->end_offset > input->file_bytes && !input->failed) { /* the file grew: the rest is not ours */
+        if (input->end_offset > input->file_bytes &&
+            !input->failed) { /* the file grew: the rest is not ours */
             size_t excess = (size_t)(input->end_offset - input->file_bytes);
             input->end -= excess;
             input->end_offset -= excess;

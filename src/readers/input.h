@@ -1,5 +1,6 @@
-/* A forward window over a file, for text and for records. A failed read is sticky: the window then behaves as if the file
- * ended there, so that parsers need no check after every token; whoever meets the end asks strl__input_status first. */
+/* A forward window over a file, for text and for records. A failed read is sticky: the window then
+ * behaves as if the file ended there, so that parsers need no check after every token; whoever
+ * meets the end asks strl__input_status first. */
 #ifndef STRL_READERS_INPUT_H
 #define STRL_READERS_INPUT_H
 
@@ -14,8 +15,8 @@
 #define STRL__TOKEN_BYTES 4096u
 
 typedef struct strl__input {
-    strl_file *file;     /* borrowed */
-    char *buffer;        /* owned; capacity + 1 bytes */
+    strl_file *file; /* borrowed */
+    char *buffer;    /* owned; capacity + 1 bytes */
     size_t capacity;
     const char *at;      /* next byte */
     const char *end;     /* end of what is in the buffer; *end is 0 and readable */
@@ -33,7 +34,8 @@ void strl__input_deinit(strl__input *input);
 void strl__input_seek(strl__input *input, uint64_t offset, uint64_t line);
 /* The failed read, if there was one. */
 strl_status strl__input_status(const strl__input *input, strl_error *err);
-/* Tries to have `bytes` (<= capacity) bytes from `at` on in the buffer. Moves what `at` points at. */
+/* Tries to have `bytes` (<= capacity) bytes from `at` on in the buffer. Moves what `at` points at.
+ */
 void strl__input_refill(strl__input *input, size_t bytes);
 /* Passes over bytes; false where the file ends before. */
 bool strl__input_skip(strl__input *input, uint64_t bytes);
@@ -52,7 +54,8 @@ static inline uint64_t strl__input_left(const strl__input *input)
 /* False where fewer than `bytes` are left in the file. */
 static inline bool strl__input_want(strl__input *input, size_t bytes)
 {
-    if (__builtin_expect((size_t)(input->end - input->at) < bytes && input->end_offset < input->file_bytes, 0))
+    if (__builtin_expect(
+            (size_t)(input->end - input->at) < bytes && input->end_offset < input->file_bytes, 0))
         strl__input_refill(input, bytes);
     return (size_t)(input->end - input->at) >= bytes;
 }

@@ -14,13 +14,17 @@
 typedef struct strl__format {
     const char *name;
     strl_axis default_up;
-    size_t state_bytes;     /* zeroed, in reader->state */
-    bool (*recognises)(const strl__input *input, uint64_t file_bytes); /* by the first bytes, which are in the input */
-    strl_status (*open)(strl_reader *reader, strl_error *err);    /* the header; sets reader->triangles_hint */
-    strl_status (*prepare)(strl_reader *reader, strl_error *err); /* before the first triangle: tables and the batch */
-    strl_status (*start)(strl_reader *reader, strl_error *err);   /* to the first face */
-    strl_status (*fill)(strl_reader *reader, strl_error *err);    /* adds faces to the batch; sets reader->ended */
-    void (*close)(strl_reader *reader);                           /* what the state owns; may be NULL */
+    size_t state_bytes; /* zeroed, in reader->state */
+    bool (*recognises)(const strl__input *input,
+                       uint64_t file_bytes); /* by the first bytes, which are in the input */
+    strl_status (*open)(strl_reader *reader,
+                        strl_error *err); /* the header; sets reader->triangles_hint */
+    strl_status (*prepare)(strl_reader *reader,
+                           strl_error *err); /* before the first triangle: tables and the batch */
+    strl_status (*start)(strl_reader *reader, strl_error *err); /* to the first face */
+    strl_status (*fill)(strl_reader *reader,
+                        strl_error *err); /* adds faces to the batch; sets reader->ended */
+    void (*close)(strl_reader *reader);   /* what the state owns; may be NULL */
 } strl__format;
 
 extern const strl__format strl__format_ply;
@@ -29,11 +33,11 @@ extern const strl__format strl__format_obj;
 
 struct strl_reader {
     const strl__format *format;
-    void *state;          /* of the format; owned */
-    char *path;           /* owned */
-    char *scratch_dir;    /* owned; NULL where none was given */
+    void *state;       /* of the format; owned */
+    char *path;        /* owned */
+    char *scratch_dir; /* owned; NULL where none was given */
     uint64_t memory_bytes;
-    strl_file *file;      /* owned */
+    strl_file *file;       /* owned */
     strl_file_info opened; /* as it was at opening */
     uint64_t triangles_hint;
     strl__input input;
@@ -41,16 +45,16 @@ struct strl_reader {
     strl__batch batch;
     strl__names parts, materials;
     strl_reader_drops drops;
-    bool prepared;        /* tables and batch are there */
-    bool started;         /* the input stands at a face */
-    bool ended;           /* the format has no more faces */
-    bool failed;          /* this pass ended with `failure` */
+    bool prepared; /* tables and batch are there */
+    bool started;  /* the input stands at a face */
+    bool ended;    /* the format has no more faces */
+    bool failed;   /* this pass ended with `failure` */
     strl_error failure;
 };
 
 /* Opens a file as a given format instead of guessing; for tests and fuzzers. NULL guesses. */
-strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__format *format, strl_reader **reader,
-                                 strl_error *err);
+strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__format *format,
+                                 strl_reader **reader, strl_error *err);
 
 /* Allocates the batch for the reader's tables, which must be complete. */
 strl_status strl__reader_init_batch(strl_reader *reader, bool indexed, strl_error *err);

@@ -1,10 +1,10 @@
-/* Of an MTL file only the diffuse colour (Kd, taken as sRGB as most programs write it) and the opacity (d, or Tr = 1 - d)
- * are used. */
+/* Of an MTL file only the diffuse colour (Kd, taken as sRGB as most programs write it) and the
+ * opacity (d, or Tr = 1 - d) are used. */
 #include "readers/mtl.h"
 
-#include <string.h>
+#include <inttypes.h>
 
-#include "base/memory.h"
+#include "base/fail.h"
 #include "readers/record.h"
 #include "readers/text.h"
 
@@ -26,7 +26,8 @@ static uint32_t with_colour(uint32_t rgba, const double values[3], unsigned coun
 {
     uint8_t channel[3];
     for (unsigned i = 0; i < 3; i++)
-        channel[i] = strl__colour_channel(STRL__F64, values[i < count ? i : 0]); /* "Kd r" means grey */
+        channel[i] =
+            strl__colour_channel(STRL__F64, values[i < count ? i : 0]); /* "Kd r" means grey */
     return strl__pack_colour(channel[0], channel[1], channel[2], (uint8_t)(rgba >> 24));
 }
 
@@ -68,9 +69,11 @@ static strl_status read_materials(strl__input *input, strl__names *materials, st
         if (strl__text_token_is(input, "newmtl")) {
             input->at += 6;
             strl__text_skip_blanks(input);
-            strl_status status = strl__names_add(materials, input->at, strl__text_rest_of_line(input), &current, err);
+            strl_status status = strl__names_add(materials, input->at,
+                                                 strl__text_rest_of_line(input), &current, err);
             if (status)
-                return status;
+                return strl__fail_context(err, status, "%s, line %" PRIu64,
+                                          strl_file_path(input->file), input->line);
             materials->items[current].rgba = 0xffffffffu;
         } else if (current != UINT32_MAX) {
             read_statement(input, &materials->items[current]);

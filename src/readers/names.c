@@ -29,7 +29,10 @@ static size_t utf8_sequence(const unsigned char *text, size_t left)
     unsigned char lead = text[0];
     if (lead < 0x80)
         return 1;
-    size_t bytes = lead >= 0xc2 && lead < 0xe0 ? 2 : lead >= 0xe0 && lead < 0xf0 ? 3 : lead >= 0xf0 && lead < 0xf5 ? 4 : 0;
+    size_t bytes = lead >= 0xc2 && lead < 0xe0   ? 2
+                   : lead >= 0xe0 && lead < 0xf0 ? 3
+                   : lead >= 0xf0 && lead < 0xf5 ? 4
+                                                 : 0;
     if (bytes == 0 || bytes > left)
         return 0;
     for (size_t i = 1; i < bytes; i++)
@@ -107,7 +110,8 @@ static bool grow_slots(strl__names *names)
     return true;
 }
 
-strl_status strl__names_add(strl__names *names, const char *text, size_t length, uint32_t *index, strl_error *err)
+strl_status strl__names_add(strl__names *names, const char *text, size_t length, uint32_t *index,
+                            strl_error *err)
 {
     char cleaned[STRL__NAME_BYTES_MAX + 1];
     size_t used = clean(text, length, cleaned);
@@ -117,9 +121,11 @@ strl_status strl__names_add(strl__names *names, const char *text, size_t length,
     size_t held = names->text_bytes + used + 2 * names->capacity * sizeof *names->items +
                   3 * names->slot_count * sizeof *names->slots;
     if (held > names->limit_bytes || names->count >= UINT32_MAX - 1)
-        return strl__fail(err, STRL_ERR_LIMIT, "expected at most %zu bytes of names, found more than %zu names",
+        return strl__fail(err, STRL_ERR_LIMIT,
+                          "expected at most %zu bytes of names, found more than %zu names",
                           names->limit_bytes, names->count);
-    if (!strl__grow(&names->items, &names->capacity, names->count + 1, sizeof *names->items) || !grow_slots(names))
+    if (!strl__grow(&names->items, &names->capacity, names->count + 1, sizeof *names->items) ||
+        !grow_slots(names))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu names", names->count + 1);
     char *copy = strl__strdup(cleaned);
     if (!copy)

@@ -1,4 +1,5 @@
-/* A bounded table of names, each with a colour: parts and materials. An index never changes once it was given. */
+/* A bounded table of names, each with a colour: parts and materials. An index never changes once it
+ * was given. */
 #ifndef STRL_READERS_NAMES_H
 #define STRL_READERS_NAMES_H
 
@@ -12,7 +13,7 @@
 
 typedef struct strl__name {
     char *text;    /* UTF-8; where it lies does not change */
-    uint32_t rgba;    /* sRGB-encoded RGBA8, R in the lowest byte */
+    uint32_t rgba; /* sRGB-encoded RGBA8, R in the lowest byte */
 } strl__name;
 
 typedef struct strl__names {
@@ -26,8 +27,10 @@ typedef struct strl__names {
 
 void strl__names_init(strl__names *names, size_t limit_bytes);
 void strl__names_deinit(strl__names *names);
-/* The index of a name, which is added (white) where it is new. Bytes that are not UTF-8 are taken as Latin-1. */
-strl_status strl__names_add(strl__names *names, const char *text, size_t length, uint32_t *index, strl_error *err);
+/* The index of a name, which is added (white) where it is new. Bytes that are not UTF-8 are taken
+ * as Latin-1. */
+strl_status strl__names_add(strl__names *names, const char *text, size_t length, uint32_t *index,
+                            strl_error *err);
 /* The index of a name, UINT32_MAX where it is unknown. */
 uint32_t strl__names_find(const strl__names *names, const char *text, size_t length);
 

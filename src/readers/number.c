@@ -1,7 +1,8 @@
 /* Reading decimal numbers. Three roads, each correctly rounded:
- *  - up to 2^53 and a power of ten up to 10^22, both exact as doubles: one division or product (Clinger 1990, "How to
- *    read floating point numbers accurately");
- *  - up to 19 digits and powers up to 10^27: the exact quotient or product in 128-bit integers, rounded once;
+ *  - up to 2^53 and a power of ten up to 10^22, both exact as doubles: one division or product
+ * (Clinger 1990, "How to read floating point numbers accurately");
+ *  - up to 19 digits and powers up to 10^27: the exact quotient or product in 128-bit integers,
+ * rounded once;
  *  - all else: the C library's strtod in the "C" locale, after the syntax was checked here. */
 #include "readers/number.h"
 
@@ -29,13 +30,15 @@ static double power_of_two(int exponent)
     return value;
 }
 
-/* (wide + a little, if sticky) * 2^exponent, rounded to nearest even. wide > 0; the result is a normal double. */
+/* (wide + a little, if sticky) * 2^exponent, rounded to nearest even. wide > 0; the result is a
+ * normal double. */
 static double round_wide(unsigned __int128 wide, bool sticky, int exponent)
 {
     uint64_t high = (uint64_t)(wide >> 64);
     int bits = high ? 128 - __builtin_clzll(high) : 64 - __builtin_clzll((uint64_t)wide);
     if (bits <= 53)
-        return (double)(uint64_t)wide * power_of_two(exponent); /* callers keep sticky out of this case */
+        return (double)(uint64_t)wide *
+               power_of_two(exponent); /* callers keep sticky out of this case */
     int shift = bits - 53;
     uint64_t mantissa = (uint64_t)(wide >> shift);
     unsigned __int128 rest = wide & (((unsigned __int128)1 << shift) - 1);
@@ -48,10 +51,34 @@ static double round_wide(unsigned __int128 wide, bool sticky, int exponent)
 static double scale_wide(uint64_t digits, int power)
 {
     static const uint64_t fives[WIDE_POWER_MAX + 1] = {
-        1u, 5u, 25u, 125u, 625u, 3125u, 15625u, 78125u, 390625u, 1953125u, 9765625u, 48828125u, 244140625u,
-        1220703125u, 6103515625u, 30517578125u, 152587890625u, 762939453125u, 3814697265625u, 19073486328125u,
-        95367431640625u, 476837158203125u, 2384185791015625u, 11920928955078125u, 59604644775390625u,
-        298023223876953125u, 1490116119384765625u, 7450580596923828125u,
+        1u,
+        5u,
+        25u,
+        125u,
+        625u,
+        3125u,
+        15625u,
+        78125u,
+        390625u,
+        1953125u,
+        9765625u,
+        48828125u,
+        244140625u,
+        1220703125u,
+        6103515625u,
+        30517578125u,
+        152587890625u,
+        762939453125u,
+        3814697265625u,
+        19073486328125u,
+        95367431640625u,
+        476837158203125u,
+        2384185791015625u,
+        11920928955078125u,
+        59604644775390625u,
+        298023223876953125u,
+        1490116119384765625u,
+        7450580596923828125u,
     };
     if (power >= 0)
         return round_wide((unsigned __int128)digits * fives[power], false, power);
@@ -119,7 +146,8 @@ static const char *parse_word(const char *at, bool negative, double *value)
 static const char *parse_microsoft_word(const char *at, bool negative, double *value)
 {
     bool infinite = starts_with(at + 1, "inf");
-    if (!infinite && !starts_with(at + 1, "qnan") && !starts_with(at + 1, "snan") && !starts_with(at + 1, "ind"))
+    if (!infinite && !starts_with(at + 1, "qnan") && !starts_with(at + 1, "snan") &&
+        !starts_with(at + 1, "ind"))
         return NULL;
     *value = !infinite ? __builtin_nan("") : negative ? -__builtin_inf() : __builtin_inf();
     at++;
@@ -190,9 +218,11 @@ const char *strl__number_parse(const char *at, double *value)
             return NULL;
     }
     const char *unsigned_token = token + (*token == '-' || *token == '+');
-    bool dropped = (digit_count > DIGITS_MAX && digit_count - leading_zeros(unsigned_token) > DIGITS_MAX) ||
-                   fraction_count > EXPONENT_CAP;
-    double magnitude = scale(unsigned_token, digits, dropped ? 0 : exponent - (int)fraction_count, dropped);
+    bool dropped =
+        (digit_count > DIGITS_MAX && digit_count - leading_zeros(unsigned_token) > DIGITS_MAX) ||
+        fraction_count > EXPONENT_CAP;
+    double magnitude =
+        scale(unsigned_token, digits, dropped ? 0 : exponent - (int)fraction_count, dropped);
     *value = negative ? -magnitude : magnitude;
     return at;
 }

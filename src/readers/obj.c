@@ -1,6 +1,7 @@
-/* Wavefront OBJ. Vertices and faces may stand in any order, so a first pass gathers v and vn (and reads the mtllibs), and
- * every further pass turns f into batches. o and g make parts, usemtl makes materials. Texture coordinates are checked but
- * not kept; free-form geometry and all other statements are passed over. */
+/* Wavefront OBJ. Vertices and faces may stand in any order, so a first pass gathers v and vn (and
+ * reads the mtllibs), and every further pass turns f into batches. o and g make parts, usemtl makes
+ * materials. Texture coordinates are checked but not kept; free-form geometry and all other
+ * statements are passed over. */
 #include <inttypes.h>
 #include <string.h>
 
@@ -27,7 +28,16 @@ typedef struct obj_state {
 } obj_state;
 
 typedef enum obj_keyword {
-    OBJ_VERTEX, OBJ_NORMAL, OBJ_FACE, OBJ_LINE, OBJ_POINT, OBJ_OBJECT, OBJ_GROUP, OBJ_USE_MATERIAL, OBJ_LIBRARY, OBJ_OTHER
+    OBJ_VERTEX,
+    OBJ_NORMAL,
+    OBJ_FACE,
+    OBJ_LINE,
+    OBJ_POINT,
+    OBJ_OBJECT,
+    OBJ_GROUP,
+    OBJ_USE_MATERIAL,
+    OBJ_LIBRARY,
+    OBJ_OTHER
 } obj_keyword;
 
 #define VERTEX_BYTES 28u /* three doubles and a colour */
@@ -35,7 +45,8 @@ typedef enum obj_keyword {
 
 static bool matches(const char *at, const char *word, size_t length)
 {
-    return memcmp(at, word, length) == 0 && (strl__is_blank(at[length]) || strl__is_line_end(at[length]));
+    return memcmp(at, word, length) == 0 &&
+           (strl__is_blank(at[length]) || strl__is_line_end(at[length]));
 }
 
 /* The keyword at the start of a statement; its bytes are passed. A whole token can be looked at. */
@@ -46,13 +57,15 @@ static obj_keyword take_keyword(strl__input *input)
         uint8_t length;
         obj_keyword keyword;
     } words[] = {
-        {"v", 1, OBJ_VERTEX},  {"f", 1, OBJ_FACE},   {"vn", 2, OBJ_NORMAL},          {"l", 1, OBJ_LINE},
-        {"p", 1, OBJ_POINT},   {"o", 1, OBJ_OBJECT}, {"g", 1, OBJ_GROUP},            {"fo", 2, OBJ_FACE},
-        {"usemtl", 6, OBJ_USE_MATERIAL},             {"mtllib", 6, OBJ_LIBRARY},
+        {"v", 1, OBJ_VERTEX},       {"f", 1, OBJ_FACE},  {"vn", 2, OBJ_NORMAL},
+        {"l", 1, OBJ_LINE},         {"p", 1, OBJ_POINT}, {"o", 1, OBJ_OBJECT},
+        {"g", 1, OBJ_GROUP},        {"fo", 2, OBJ_FACE}, {"usemtl", 6, OBJ_USE_MATERIAL},
+        {"mtllib", 6, OBJ_LIBRARY},
     };
     const char *at = input->at;
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
-        if (*at == *words[i].word && input->end - at >= words[i].length && matches(at, words[i].word, words[i].length)) {
+        if (*at == *words[i].word && input->end - at >= words[i].length &&
+            matches(at, words[i].word, words[i].length)) {
             input->at += words[i].length;
             return words[i].keyword;
         }
@@ -62,7 +75,8 @@ static obj_keyword take_keyword(strl__input *input)
 /* The first statement that is no comment must be one that OBJ files begin with. */
 static bool obj_recognises(const strl__input *input, uint64_t file_bytes)
 {
-    static const char *const words[] = {"v", "vn", "vt", "f", "o", "g", "s", "mtllib", "usemtl", "l", "p"};
+    static const char *const words[] = {"v", "vn",     "vt",     "f", "o", "g",
+                                        "s", "mtllib", "usemtl", "l", "p"};
     (void)file_bytes;
     const char *at = input->at;
     if (input->end - at >= 3 && memcmp(at, "\xef\xbb\xbf", 3) == 0)
@@ -77,7 +91,8 @@ static bool obj_recognises(const strl__input *input, uint64_t file_bytes)
     }
     for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
         size_t length = strlen(words[i]);
-        if (input->end - at > (ptrdiff_t)length && memcmp(at, words[i], length) == 0 && strl__is_blank(at[length]))
+        if (input->end - at > (ptrdiff_t)length && memcmp(at, words[i], length) == 0 &&
+            strl__is_blank(at[length]))
             return true;
     }
     return false;
@@ -87,14 +102,16 @@ static strl_status obj_open(strl_reader *reader, strl_error *err)
 {
     strl__input *input = &reader->input;
     strl__input_want(input, 2);
-    if (input->end - input->at >= 2 && (memcmp(input->at, "\xff\xfe", 2) == 0 || memcmp(input->at, "\xfe\xff", 2) == 0))
-        return strl__fail(err, STRL_ERR_UNSUPPORTED, "%s, byte 0: expected text in UTF-8, found UTF-16", reader->path);
+    if (input->end - input->at >= 2 &&
+        (memcmp(input->at, "\xff\xfe", 2) == 0 || memcmp(input->at, "\xfe\xff", 2) == 0))
+        return strl__fail(err, STRL_ERR_UNSUPPORTED,
+                          "%s, byte 0: expected text in UTF-8, found UTF-16", reader->path);
     reader->triangles_hint = reader->opened.bytes / 60 + 1;
     return STRL_OK;
 }
 
-static strl_status read_coordinates(strl__input *input, double *values, unsigned least, unsigned most, unsigned *count,
-                                    strl_error *err)
+static strl_status read_coordinates(strl__input *input, double *values, unsigned least,
+                                    unsigned most, unsigned *count, strl_error *err)
 {
     for (*count = 0; *count < most; (*count)++) {
         strl__text_skip_blanks(input);
@@ -148,17 +165,20 @@ static char *library_path(const strl_reader *reader, const char *name, size_t le
     return path;
 }
 
-static strl_status read_library(strl_reader *reader, const char *name, size_t length, bool *found, strl_error *err)
+static strl_status read_library(strl_reader *reader, const char *name, size_t length, bool *found,
+                                strl_error *err)
 {
     obj_state *obj = reader->state;
     char *path = library_path(reader, name, length);
-    strl_status status = path ? strl__mtl_read(path, &obj->library, found, err)
-                              : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", reader->path);
+    strl_status status =
+        path ? strl__mtl_read(path, &obj->library, found, err)
+             : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", reader->path);
     strl__free(path);
     return status;
 }
 
-/* mtllib NAME..: the whole line is tried first, because names with blanks are more common than several names. */
+/* mtllib NAME..: the whole line is tried first, because names with blanks are more common than
+ * several names. */
 static strl_status read_libraries(strl_reader *reader, strl_error *err)
 {
     strl__input *input = &reader->input;
@@ -186,10 +206,17 @@ static strl_status gather(strl_reader *reader, strl_error *err)
         if (input->at == input->end)
             return strl__input_status(input, err);
         switch (take_keyword(input)) {
-        case OBJ_VERTEX: status = read_vertex(reader, err); break;
-        case OBJ_NORMAL: status = read_normal(reader, err); break;
-        case OBJ_LIBRARY: status = read_libraries(reader, err); break;
-        default: break;
+        case OBJ_VERTEX:
+            status = read_vertex(reader, err);
+            break;
+        case OBJ_NORMAL:
+            status = read_normal(reader, err);
+            break;
+        case OBJ_LIBRARY:
+            status = read_libraries(reader, err);
+            break;
+        default:
+            break;
         }
     }
     return status;
@@ -198,7 +225,10 @@ static strl_status gather(strl_reader *reader, strl_error *err)
 static void build_tables(strl_reader *reader)
 {
     const bool big_endian = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
-    strl__layout vertex = {.stride = VERTEX_BYTES, .big_endian = big_endian, .has_position = true, .has_colour = true,
+    strl__layout vertex = {.stride = VERTEX_BYTES,
+                           .big_endian = big_endian,
+                           .has_position = true,
+                           .has_colour = true,
                            .has_alpha = true};
     strl__layout normal = {.stride = NORMAL_BYTES, .big_endian = big_endian, .has_normal = true};
     for (uint32_t i = 0; i < 4; i++)
@@ -272,32 +302,41 @@ static strl_status name_face(strl_reader *reader, strl_error *err)
     if (!status && !obj->material_known) {
         const obj_name *material = &obj->material;
         uint32_t defined = strl__names_find(&obj->library, material->text, material->length);
-        status = strl__names_add(&reader->materials, material->text, material->length, &obj->material_index, err);
+        status = strl__names_add(&reader->materials, material->text, material->length,
+                                 &obj->material_index, err);
         if (!status && defined != UINT32_MAX)
             reader->materials.items[obj->material_index].rgba = obj->library.items[defined].rgba;
         obj->material_known = !status;
     }
-    return status ? strl__fail_context(err, status, "%s, line %" PRIu64, reader->path, reader->input.line) : STRL_OK;
+    return status ? strl__fail_context(err, status, "%s, line %" PRIu64, reader->path,
+                                       reader->input.line)
+                  : STRL_OK;
 }
 
-static strl_status index_fail(strl_reader *reader, const char *what, int64_t found, uint64_t count, strl_error *err)
+static strl_status index_fail(strl_reader *reader, const char *what, int64_t found, uint64_t count,
+                              strl_error *err)
 {
     strl_status failed = strl__input_status(&reader->input, err);
     if (failed)
         return failed;
-    return strl__fail(err, STRL_ERR_FORMAT, "%s, line %" PRIu64 ": expected the index of one of %" PRIu64
-                      " %s, found %" PRId64, reader->path, reader->input.line, count, what, found);
+    return strl__fail(err, STRL_ERR_FORMAT,
+                      "%s, line %" PRIu64 ": expected the index of one of %" PRIu64
+                      " %s, found %" PRId64,
+                      reader->path, reader->input.line, count, what, found);
 }
 
-/* From the file's count (1 = first, -1 = last so far) to ours. False where there is no such thing. */
+/* From the file's count (1 = first, -1 = last so far) to ours. False where there is no such thing.
+ */
 static bool to_index(int64_t written, uint64_t seen, uint64_t count, uint64_t *index)
 {
-    *index = written > 0 ? (uint64_t)written - 1 : seen + (uint64_t)written; /* wraps where it is before the first */
+    *index = written > 0 ? (uint64_t)written - 1
+                         : seen + (uint64_t)written; /* wraps where it is before the first */
     return written != 0 && *index < count && (written > 0 || (uint64_t)-written <= seen);
 }
 
 /* v, v/vt, v//vn or v/vt/vn, where what stands after a slash may be missing. */
-static strl_status read_corner(strl_reader *reader, uint64_t *vertex, uint64_t *normal, strl_error *err)
+static strl_status read_corner(strl_reader *reader, uint64_t *vertex, uint64_t *normal,
+                               strl_error *err)
 {
     obj_state *obj = reader->state;
     strl__input *input = &reader->input;
@@ -335,7 +374,8 @@ static strl_status read_face(strl_reader *reader, strl_error *err)
         if (strl__text_at_line_end(&reader->input) || *reader->input.at == '#')
             break;
         if (face.corner_count == STRL__POLYGON_CORNERS_MAX)
-            return strl__fail(err, STRL_ERR_LIMIT, "%s, line %" PRIu64 ": expected at most %u corners in a face",
+            return strl__fail(err, STRL_ERR_LIMIT,
+                              "%s, line %" PRIu64 ": expected at most %u corners in a face",
                               reader->path, reader->input.line, STRL__POLYGON_CORNERS_MAX);
         size_t slot = batch->corner_count + face.corner_count++;
         uint64_t normal = STRL__NO_INDEX;
@@ -365,11 +405,20 @@ static strl_status read_statement(strl_reader *reader, strl_error *err)
     obj_state *obj = reader->state;
     strl__input *input = &reader->input;
     switch (take_keyword(input)) {
-    case OBJ_VERTEX: obj->vertices_seen++; break;
-    case OBJ_NORMAL: obj->normals_seen++; break;
-    case OBJ_FACE: return read_face(reader, err);
-    case OBJ_LINE: reader->drops.lines++; break;
-    case OBJ_POINT: reader->drops.points++; break;
+    case OBJ_VERTEX:
+        obj->vertices_seen++;
+        break;
+    case OBJ_NORMAL:
+        obj->normals_seen++;
+        break;
+    case OBJ_FACE:
+        return read_face(reader, err);
+    case OBJ_LINE:
+        reader->drops.lines++;
+        break;
+    case OBJ_POINT:
+        reader->drops.points++;
+        break;
     case OBJ_OBJECT:
         take_name(input, &obj->object);
         obj->group.length = 0;
@@ -383,7 +432,8 @@ static strl_status read_statement(strl_reader *reader, strl_error *err)
         take_name(input, &obj->material);
         obj->material_known = false;
         break;
-    default: break;
+    default:
+        break;
     }
     return STRL_OK;
 }

@@ -1,5 +1,6 @@
-/* Opening, recognising and driving a format. Five eighths of the budget are for windows on vertices and faces under way, an
- * eighth is for names, a 32nd for the input; the rest is for polygons and small change. */
+/* Opening, recognising and driving a format. Five eighths of the budget are for windows on vertices
+ * and faces under way, an eighth is for names, a 32nd for the input; the rest is for polygons and
+ * small change. */
 #include "readers/reader.h"
 
 #include <inttypes.h>
@@ -14,7 +15,8 @@
 #define INPUT_BYTES_MAX ((uint64_t)1 << 20)
 
 /* The most certain signature first. */
-static const strl__format *const formats[] = {&strl__format_ply, &strl__format_stl, &strl__format_obj};
+static const strl__format *const formats[] = {&strl__format_ply, &strl__format_stl,
+                                              &strl__format_obj};
 
 static bool has_extension(const char *path, const char *extension)
 {
@@ -30,7 +32,8 @@ static bool has_extension(const char *path, const char *extension)
 static strl_status recognise(strl_reader *reader, strl_error *err)
 {
     if (reader->opened.bytes == 0)
-        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected a mesh, found an empty file", reader->path);
+        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected a mesh, found an empty file",
+                          reader->path);
     strl__input_want(&reader->input, STRL__TOKEN_BYTES);
     strl_status status = strl__input_status(&reader->input, err);
     if (status)
@@ -43,9 +46,10 @@ static strl_status recognise(strl_reader *reader, strl_error *err)
             reader->format = formats[i];
     if (reader->format)
         return STRL_OK;
-    return strl__fail(err, STRL_ERR_UNSUPPORTED,
-                      "%s: expected a PLY, STL or OBJ file, found neither their first bytes nor their names",
-                      reader->path);
+    return strl__fail(
+        err, STRL_ERR_UNSUPPORTED,
+        "%s: expected a PLY, STL or OBJ file, found neither their first bytes nor their names",
+        reader->path);
 }
 
 static strl_status open_file(strl_reader *reader, const strl_reader_desc *desc, strl_error *err)
@@ -59,8 +63,9 @@ static strl_status open_file(strl_reader *reader, const strl_reader_desc *desc, 
         status = strl_file_stat(reader->file, &reader->opened, err);
     uint64_t input_bytes = reader->memory_bytes / 32;
     if (!status)
-        status = strl__input_init(&reader->input, reader->file,
-                                  (size_t)(input_bytes < INPUT_BYTES_MAX ? input_bytes : INPUT_BYTES_MAX), err);
+        status = strl__input_init(
+            &reader->input, reader->file,
+            (size_t)(input_bytes < INPUT_BYTES_MAX ? input_bytes : INPUT_BYTES_MAX), err);
     return status;
 }
 
@@ -76,13 +81,14 @@ static strl_status open_format(strl_reader *reader, strl_error *err)
     return reader->format->open(reader, err);
 }
 
-strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__format *format, strl_reader **out,
-                                 strl_error *err)
+strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__format *format,
+                                 strl_reader **out, strl_error *err)
 {
     *out = NULL;
     uint64_t memory_bytes = desc->memory_bytes ? desc->memory_bytes : MEMORY_DEFAULT;
     if (memory_bytes < STRL__READER_MEMORY_LEAST)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "%s: %" PRIu64 " bytes of memory are too few, a reader needs %" PRIu64,
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "%s: %" PRIu64 " bytes of memory are too few, a reader needs %" PRIu64,
                           desc->path, memory_bytes, STRL__READER_MEMORY_LEAST);
     strl_reader *reader = strl__alloc_zero(1, sizeof *reader);
     if (!reader)
@@ -143,7 +149,8 @@ strl_status strl__reader_init_batch(strl_reader *reader, bool indexed, strl_erro
     for (unsigned i = 0; i < 2; i++)
         if (indexed && tables[i]->count > 0) {
             desc.sorted = desc.sorted || !strl__table_is_resident(tables[i]);
-            desc.bytes -= strl__table_window_bytes(tables[i]); /* together at most half of the budget */
+            desc.bytes -=
+                strl__table_window_bytes(tables[i]); /* together at most half of the budget */
         }
     return strl__batch_init(&reader->batch, &desc, err);
 }
@@ -170,18 +177,19 @@ static strl_status read_batch(strl_reader *reader, strl_error *err)
     strl__batch_reset(&reader->batch);
     strl_status status = reader->format->fill(reader, err);
     if (!status && reader->batch.vertex)
-        status = strl__batch_resolve(&reader->batch, &reader->vertices, reader->normals.count ? &reader->normals : NULL,
-                                     err);
+        status = strl__batch_resolve(&reader->batch, &reader->vertices,
+                                     reader->normals.count ? &reader->normals : NULL, err);
     return status;
 }
 
-static strl_status next_triangles(strl_reader *reader, strl_triangle *triangles, size_t capacity, size_t *count,
-                                  strl_error *err)
+static strl_status next_triangles(strl_reader *reader, strl_triangle *triangles, size_t capacity,
+                                  size_t *count, strl_error *err)
 {
     strl_status status = make_ready(reader, err);
     while (!status && *count < capacity) {
         size_t added = 0;
-        status = strl__batch_emit(&reader->batch, triangles + *count, capacity - *count, &added, &reader->drops, err);
+        status = strl__batch_emit(&reader->batch, triangles + *count, capacity - *count, &added,
+                                  &reader->drops, err);
         *count += added;
         if (status || added > 0)
             continue;
@@ -192,8 +200,8 @@ static strl_status next_triangles(strl_reader *reader, strl_triangle *triangles,
     return status;
 }
 
-strl_status strl_reader_next(strl_reader *reader, strl_triangle *triangles, size_t capacity, size_t *count,
-                             strl_error *err)
+strl_status strl_reader_next(strl_reader *reader, strl_triangle *triangles, size_t capacity,
+                             size_t *count, strl_error *err)
 {
     *count = 0;
     if (!reader->failed) {
@@ -216,10 +224,11 @@ strl_status strl_reader_rewind(strl_reader *reader, strl_error *err)
         return status;
     if (now.bytes != reader->opened.bytes || now.modified_ns != reader->opened.modified_ns)
         return strl__fail(err, STRL_ERR_IO,
-                          "%s has changed while it was read: it had %" PRIu64 " bytes, now it has %" PRIu64
-                          " and a time of change %s",
+                          "%s has changed while it was read: it had %" PRIu64
+                          " bytes, now it has %" PRIu64 " and a time of change %s",
                           reader->path, reader->opened.bytes, now.bytes,
-                          now.modified_ns != reader->opened.modified_ns ? "of its own" : "as before");
+                          now.modified_ns != reader->opened.modified_ns ? "of its own"
+                                                                        : "as before");
     reader->started = reader->ended = reader->failed = false;
     reader->drops = (strl_reader_drops){0};
     strl__batch_reset(&reader->batch);

@@ -1,4 +1,5 @@
-/* Records of fixed size that hold the attributes of a corner as fields of any scalar type and byte order. */
+/* Records of fixed size that hold the attributes of a corner as fields of any scalar type and byte
+ * order. */
 #ifndef STRL_READERS_RECORD_H
 #define STRL_READERS_RECORD_H
 
@@ -8,7 +9,14 @@
 #include <string.h>
 
 typedef enum strl__scalar {
-    STRL__I8, STRL__U8, STRL__I16, STRL__U16, STRL__I32, STRL__U32, STRL__F32, STRL__F64
+    STRL__I8,
+    STRL__U8,
+    STRL__I16,
+    STRL__U16,
+    STRL__I32,
+    STRL__U32,
+    STRL__F32,
+    STRL__F64
 } strl__scalar;
 
 static inline unsigned strl__scalar_bytes(strl__scalar type)
@@ -53,19 +61,28 @@ static inline double strl__load_f64(const void *bytes, bool big_endian)
 static inline double strl__scalar_load(strl__scalar type, const void *bytes, bool big_endian)
 {
     switch (type) {
-    case STRL__I8: return *(const int8_t *)bytes;
-    case STRL__U8: return *(const uint8_t *)bytes;
-    case STRL__I16: return (int16_t)strl__load_16(bytes, big_endian);
-    case STRL__U16: return strl__load_16(bytes, big_endian);
-    case STRL__I32: return (int32_t)strl__load_32(bytes, big_endian);
-    case STRL__U32: return strl__load_32(bytes, big_endian);
-    case STRL__F32: return (double)strl__load_f32(bytes, big_endian);
-    case STRL__F64: break;
+    case STRL__I8:
+        return *(const int8_t *)bytes;
+    case STRL__U8:
+        return *(const uint8_t *)bytes;
+    case STRL__I16:
+        return (int16_t)strl__load_16(bytes, big_endian);
+    case STRL__U16:
+        return strl__load_16(bytes, big_endian);
+    case STRL__I32:
+        return (int32_t)strl__load_32(bytes, big_endian);
+    case STRL__U32:
+        return strl__load_32(bytes, big_endian);
+    case STRL__F32:
+        return (double)strl__load_f32(bytes, big_endian);
+    case STRL__F64:
+        break;
     }
     return strl__load_f64(bytes, big_endian);
 }
 
-/* A colour channel as 0..255: reals are 0..1, 16-bit integers 0..65535, other integers 0..255. Not a number: 255. */
+/* A colour channel as 0..255: reals are 0..1, 16-bit integers 0..65535, other integers 0..255. Not
+ * a number: 255. */
 uint8_t strl__colour_channel(strl__scalar type, double value);
 
 static inline uint32_t strl__pack_colour(uint8_t red, uint8_t green, uint8_t blue, uint8_t alpha)

@@ -112,8 +112,9 @@ bool strl__text_token_is_caseless(const strl__input *input, const char *lower)
 
 size_t strl__text_rest_of_line(const strl__input *input)
 {
-    const char *limit = (size_t)(input->end - input->at) < STRL__TOKEN_BYTES ? input->end
-                                                                            : input->at + STRL__TOKEN_BYTES - 1;
+    const char *limit = (size_t)(input->end - input->at) < STRL__TOKEN_BYTES
+                            ? input->end
+                            : input->at + STRL__TOKEN_BYTES - 1;
     const char *last = find_line_end(input->at, limit);
     while (last > input->at && strl__is_blank(last[-1]))
         last--;

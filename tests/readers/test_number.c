@@ -28,11 +28,42 @@ static void every_form_is_read_like_strtod(void **state)
 {
     (void)state;
     static const char *const texts[] = {
-        "0", "-0", "+1", "1.", ".5", "-.5e1", "007", "1e5", "1E+05", "1e-5", "123456789012345678901234567890",
-        "0.000000000000000000000000000001", "9007199254740993", "9007199254740992", "9007199254740995", "1e22", "1e23",
-        "8.5e-27", "1e308", "1.7976931348623157e308", "1e309", "-1e400", "4.9e-324", "2e-324", "1e-400", "2.2250738585072011e-308",
-        "18446744073709551615", "18446744073709551616", "9999999999999999999", "1e99999999999", "1e-99999999999",
-        "0.30000000000000004", "93.87400100000001", "0.00012345678901234567", "0e999999", "1e+0000000000000000000001",
+        "0",
+        "-0",
+        "+1",
+        "1.",
+        ".5",
+        "-.5e1",
+        "007",
+        "1e5",
+        "1E+05",
+        "1e-5",
+        "123456789012345678901234567890",
+        "0.000000000000000000000000000001",
+        "9007199254740993",
+        "9007199254740992",
+        "9007199254740995",
+        "1e22",
+        "1e23",
+        "8.5e-27",
+        "1e308",
+        "1.7976931348623157e308",
+        "1e309",
+        "-1e400",
+        "4.9e-324",
+        "2e-324",
+        "1e-400",
+        "2.2250738585072011e-308",
+        "18446744073709551615",
+        "18446744073709551616",
+        "9999999999999999999",
+        "1e99999999999",
+        "1e-99999999999",
+        "0.30000000000000004",
+        "93.87400100000001",
+        "0.00012345678901234567",
+        "0e999999",
+        "1e+0000000000000000000001",
     };
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
         assert_like_strtod(texts[i]);
@@ -44,10 +75,12 @@ static void random_doubles_survive_all_usual_notations(void **state)
     static const char *const formats[] = {"%.17g", "%.9g", "%.6f", "%e", "%.15g", "%g", "%.12f"};
     char text[512];
     for (uint64_t i = 1; i < 30000; i++) {
-        double value = (double)(int64_t)strl__mix64(i) * ldexp(1, (int)(strl__mix64(~i) % 160) - 140);
+        double value =
+            (double)(int64_t)strl__mix64(i) * ldexp(1, (int)(strl__mix64(~i) % 160) - 140);
         snprintf(text, sizeof text, formats[i % 7], value);
         assert_like_strtod(text);
-        snprintf(text, sizeof text, "%llu.%llue%d", (unsigned long long)(strl__mix64(3 * i) >> (i % 64)),
+        snprintf(text, sizeof text, "%llu.%llue%d",
+                 (unsigned long long)(strl__mix64(3 * i) >> (i % 64)),
                  (unsigned long long)(strl__mix64(5 * i) >> (i % 61)), (int)(i % 60) - 30);
         assert_like_strtod(text);
     }
@@ -62,7 +95,8 @@ static void the_locale_does_not_matter(void **state)
         found = setlocale(LC_NUMERIC, names[i]) != NULL;
     double short_road, long_road;
     const char *after_short = strl__number_parse("1.5", &short_road);
-    const char *after_long = strl__number_parse("1.50000000000000000000000000000000000e0", &long_road);
+    const char *after_long =
+        strl__number_parse("1.50000000000000000000000000000000000e0", &long_road);
     setlocale(LC_NUMERIC, "C");
     assert_true(*after_short == 0 && *after_long == 0);
     assert_true(short_road == 1.5 && long_road == 1.5);
@@ -73,7 +107,8 @@ static void the_locale_does_not_matter(void **state)
 static void words_for_what_is_not_finite_are_read(void **state)
 {
     (void)state;
-    static const char *const nans[] = {"nan", "NaN", "-nan", "nan(ind)", "-nan(snan)", "1.#QNAN", "-1.#IND", "1.#IND00"};
+    static const char *const nans[] = {"nan",        "NaN",     "-nan",    "nan(ind)",
+                                       "-nan(snan)", "1.#QNAN", "-1.#IND", "1.#IND00"};
     static const char *const infinities[] = {"inf", "-INF", "+Infinity", "1.#INF", "-1.#INF00"};
     double value;
     for (size_t i = 0; i < sizeof nans / sizeof *nans; i++) {
@@ -82,14 +117,16 @@ static void words_for_what_is_not_finite_are_read(void **state)
     }
     for (size_t i = 0; i < sizeof infinities / sizeof *infinities; i++) {
         const char *after = strl__number_parse(infinities[i], &value);
-        assert_true(after && *after == 0 && isinf(value) && (value < 0) == (infinities[i][0] == '-'));
+        assert_true(after && *after == 0 && isinf(value) &&
+                    (value < 0) == (infinities[i][0] == '-'));
     }
 }
 
 static void what_is_no_number_is_refused(void **state)
 {
     (void)state;
-    static const char *const texts[] = {"", "-", "+", ".", "-.", "e5", ".e5", "1e", "1e+", "x", "--1", "in", "na", "1.#x", "#"};
+    static const char *const texts[] = {"",    "-", "+",   ".",  "-.", "e5",   ".e5", "1e",
+                                        "1e+", "x", "--1", "in", "na", "1.#x", "#"};
     double value;
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
         if (strl__number_parse(texts[i], &value))
@@ -108,7 +145,8 @@ static void integers_are_read_up_to_eighteen_digits(void **state)
     assert_true(*strl__integer_parse("+7 ", &value) == ' ' && value == 7);
     assert_true(*strl__integer_parse("0000000000000000000000000001", &value) == 0 && value == 1);
     assert_true(*strl__integer_parse("0", &value) == 0 && value == 0);
-    assert_true(*strl__integer_parse("999999999999999999", &value) == 0 && value == 999999999999999999);
+    assert_true(*strl__integer_parse("999999999999999999", &value) == 0 &&
+                value == 999999999999999999);
     assert_null(strl__integer_parse("1000000000000000000", &value));
     assert_null(strl__integer_parse("", &value));
     assert_null(strl__integer_parse("-", &value));

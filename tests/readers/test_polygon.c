@@ -24,8 +24,8 @@ static double outline_area(const double (*points)[3], uint32_t count)
     return area;
 }
 
-/* Integer coordinates keep the sums exact. No triangle is turned round and together they have the outline's area: then
- * they cover a simple polygon without overlap. */
+/* Integer coordinates keep the sums exact. No triangle is turned round and together they have the
+ * outline's area: then they cover a simple polygon without overlap. */
 static void assert_covers(const double (*points)[3], uint32_t count)
 {
     strl__polygon polygon = {0};
@@ -53,12 +53,13 @@ static void assert_covers(const double (*points)[3], uint32_t count)
 /* In all rotations and both directions. */
 static void assert_covers_any_way(const double (*points)[3], uint32_t count)
 {
-    double (*turned)[3] = malloc(count * sizeof *turned);
+    double(*turned)[3] = malloc(count * sizeof *turned);
     for (uint32_t first = 0; first < count; first++)
         for (unsigned reversed = 0; reversed < 2; reversed++) {
             for (uint32_t i = 0; i < count; i++)
-                memcpy(turned[reversed ? count - 1 - i : i], points[(first + i) % count], sizeof *turned);
-            assert_covers((const double (*)[3])turned, count);
+                memcpy(turned[reversed ? count - 1 - i : i], points[(first + i) % count],
+                       sizeof *turned);
+            assert_covers((const double(*)[3])turned, count);
         }
     free(turned);
 }
@@ -68,9 +69,12 @@ static void convex_and_concave_polygons_are_covered_once(void **state)
     (void)state;
     static const double square[4][3] = {{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}};
     static const double arrow[4][3] = {{0, 0, 0}, {4, 4, 0}, {8, 0, 0}, {4, 9, 1}};
-    static const double l_shape[6][3] = {{0, 0, 0}, {4, 0, 0}, {4, 1, 0}, {1, 1, 0}, {1, 4, 0}, {0, 4, 0}};
-    static const double star[8][3] = {{0, 9, 0}, {1, 1, 0}, {9, 0, 0}, {1, -1, 0}, {0, -9, 0}, {-1, -1, 0}, {-9, 0, 0}, {-1, 1, 0}};
-    static const double collinear[7][3] = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {4, 0, 0}, {4, 4, 0}, {2, 4, 0}, {0, 4, 0}};
+    static const double l_shape[6][3] = {{0, 0, 0}, {4, 0, 0}, {4, 1, 0},
+                                         {1, 1, 0}, {1, 4, 0}, {0, 4, 0}};
+    static const double star[8][3] = {{0, 9, 0},  {1, 1, 0},   {9, 0, 0},  {1, -1, 0},
+                                      {0, -9, 0}, {-1, -1, 0}, {-9, 0, 0}, {-1, 1, 0}};
+    static const double collinear[7][3] = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {4, 0, 0},
+                                           {4, 4, 0}, {2, 4, 0}, {0, 4, 0}};
     assert_covers_any_way(square, 4);
     assert_covers_any_way(arrow, 4);
     assert_covers_any_way(l_shape, 6);
@@ -92,7 +96,7 @@ static void combs_and_spirals_of_many_corners_are_covered(void **state)
 {
     (void)state;
     enum { TEETH = 400 };
-    double (*comb)[3] = calloc(2 * TEETH + 2, sizeof *comb);
+    double(*comb)[3] = calloc(2 * TEETH + 2, sizeof *comb);
     for (unsigned i = 0; i < 2 * TEETH; i++) {
         comb[i][0] = i;
         comb[i][1] = i % 2 ? 1000 : 1 + i % 7;
@@ -101,14 +105,15 @@ static void combs_and_spirals_of_many_corners_are_covered(void **state)
     comb[2 * TEETH][1] = -5;
     comb[2 * TEETH + 1][0] = -1;
     comb[2 * TEETH + 1][1] = -5;
-    assert_covers((const double (*)[3])comb, 2 * TEETH + 2);
+    assert_covers((const double(*)[3])comb, 2 * TEETH + 2);
     free(comb);
     /* A square spiral, out along one wall and back along the other. */
     enum { ARMS = 60 };
-    double (*spiral)[3] = calloc(2 * ARMS, sizeof *spiral);
+    double(*spiral)[3] = calloc(2 * ARMS, sizeof *spiral);
     for (unsigned arm = 0; arm < ARMS; arm++) {
         double reach = 4 * (arm / 4 + 1);
-        const double x[4] = {reach, reach, -reach, -reach}, y[4] = {-reach + 4, reach, reach, -reach};
+        const double x[4] = {reach, reach, -reach, -reach},
+                     y[4] = {-reach + 4, reach, reach, -reach};
         for (unsigned wall = 0; wall < 2; wall++) {
             double *point = spiral[wall ? 2 * ARMS - 1 - arm : arm];
             double inset = wall ? 1 : 0;
@@ -116,11 +121,12 @@ static void combs_and_spirals_of_many_corners_are_covered(void **state)
             point[1] = y[arm % 4] + (arm % 4 == 0 || arm % 4 == 3 ? inset : -inset);
         }
     }
-    assert_covers((const double (*)[3])spiral, 2 * ARMS);
+    assert_covers((const double(*)[3])spiral, 2 * ARMS);
     free(spiral);
 }
 
-/* Random star-shaped outlines in random planes: the triangles' vector areas add up to the outline's. */
+/* Random star-shaped outlines in random planes: the triangles' vector areas add up to the
+ * outline's. */
 static void tilted_polygons_keep_their_orientation(void **state)
 {
     (void)state;
@@ -132,7 +138,8 @@ static void tilted_polygons_keep_their_orientation(void **state)
             u[axis] = (double)(int)(strl__mix64(++seed) % 21) - 10;
             v[axis] = (double)(int)(strl__mix64(++seed) % 21) - 10;
         }
-        double normal[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+        double normal[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                            u[0] * v[1] - u[1] * v[0]};
         if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0)
             continue;
         for (unsigned i = 0; i < 12; i++) {
@@ -143,12 +150,14 @@ static void tilted_polygons_keep_their_orientation(void **state)
         strl__polygon polygon = {0};
         assert_true(strl__polygon_triangulate(&polygon, points[0], sizeof points[0], 12));
         for (unsigned i = 0; i < 10; i++) {
-            const double *a = points[polygon.triangles[3 * i]], *b = points[polygon.triangles[3 * i + 1]],
+            const double *a = points[polygon.triangles[3 * i]],
+                         *b = points[polygon.triangles[3 * i + 1]],
                          *c = points[polygon.triangles[3 * i + 2]];
             double along = 0;
             for (unsigned axis = 0; axis < 3; axis++) {
                 unsigned p = (axis + 1) % 3, q = (axis + 2) % 3;
-                along += normal[axis] * ((b[p] - a[p]) * (c[q] - a[q]) - (b[q] - a[q]) * (c[p] - a[p]));
+                along +=
+                    normal[axis] * ((b[p] - a[p]) * (c[q] - a[q]) - (b[q] - a[q]) * (c[p] - a[p]));
             }
             assert_true(along >= 0);
         }
@@ -160,7 +169,7 @@ static void any_corners_at_all_give_all_triangles_in_bounded_time(void **state)
 {
     (void)state;
     const uint32_t count = STRL__POLYGON_CORNERS_MAX;
-    double (*points)[3] = calloc(count, sizeof *points);
+    double(*points)[3] = calloc(count, sizeof *points);
     strl__polygon polygon = {0};
     for (unsigned kind = 0; kind < 4; kind++) { /* equal, collinear, random, huge */
         for (uint32_t i = 0; i < count; i++)

@@ -1,5 +1,7 @@
-/* The models that are too large for this repository, where they are at hand: in the folder named by STRL_DATA, or in
- * ../shared/data beside the checkout. Their triangle counts come from the list that describes them. */
+/* The models that are too large for this repository, where they are at hand: in the folder named by
+ * STRL_DATA, or in
+ * ../shared/data beside the checkout. Their triangle counts come from the list that describes them.
+ */
 #include "reader_test.h"
 
 typedef struct real_model {
@@ -10,14 +12,14 @@ typedef struct real_model {
 } real_model;
 
 static const real_model models[] = {
-    {"scans/bunny.ply", 69451, 1, "ply"},         {"scans/lucy.ply", 99970, 1, "ply"},
-    {"scans/horse.ply", 96966, 1, "ply"},         {"scans/turbineblade.ply", 199034, 1, "ply"},
-    {"scans/igea.ply", 268686, 1, "ply"},         {"scans/dragon_scans.ply", 879576, 1, "ply"},
-    {"iso/iso_engine.ply", 593754, 1, "ply"},     {"iso/iso_cthead.ply", 607770, 1, "ply"},
-    {"scans/dragon.obj", 100000, 1, "obj"},       {"scans/nefertiti.obj", 99938, 1, "obj"},
-    {"scans/skull.obj", 100002, 1, "obj"},        {"scans/ogre.obj", 124008, 1, "obj"},
-    {"scans/beast.obj", 64618, 1, "obj"},         {"arch/buildings.obj", 400020, 1, "obj"},
-    {"arch/spaceship.obj", 257480, 86, "obj"},    {"cad/motorBike.obj", 331653, 67, "obj"},
+    {"scans/bunny.ply", 69451, 1, "ply"},      {"scans/lucy.ply", 99970, 1, "ply"},
+    {"scans/horse.ply", 96966, 1, "ply"},      {"scans/turbineblade.ply", 199034, 1, "ply"},
+    {"scans/igea.ply", 268686, 1, "ply"},      {"scans/dragon_scans.ply", 879576, 1, "ply"},
+    {"iso/iso_engine.ply", 593754, 1, "ply"},  {"iso/iso_cthead.ply", 607770, 1, "ply"},
+    {"scans/dragon.obj", 100000, 1, "obj"},    {"scans/nefertiti.obj", 99938, 1, "obj"},
+    {"scans/skull.obj", 100002, 1, "obj"},     {"scans/ogre.obj", 124008, 1, "obj"},
+    {"scans/beast.obj", 64618, 1, "obj"},      {"arch/buildings.obj", 400020, 1, "obj"},
+    {"arch/spaceship.obj", 257480, 86, "obj"}, {"cad/motorBike.obj", 331653, 67, "obj"},
     {"cad/ship_hull.stl", 116062, 1, "stl"},
 };
 
@@ -57,7 +59,9 @@ static void check_model(const real_model *model, const char *name)
     assert_int_equal(small.count, model->triangles);
     assert_int_equal(strl_reader_part_count(reader), model->parts);
     assert_int_equal(strl_reader_bytes_done(reader), info.file_bytes);
-    assert_int_equal(small.drops.nonfinite + small.drops.degenerate_faces + small.drops.lines + small.drops.points, 0);
+    assert_int_equal(small.drops.nonfinite + small.drops.degenerate_faces + small.drops.lines +
+                         small.drops.points,
+                     0);
     strl_reader_close(reader);
     read_test_file(name, 0, &large);
     assert_true(large.checksum == small.checksum);

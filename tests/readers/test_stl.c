@@ -45,20 +45,23 @@ static void a_binary_file_of_another_size_is_refused(void **state)
     FILE *file = fopen(test_path("long.stl"), "ab");
     fputc('\n', file);
     fclose(file);
-    assert_refused("long.stl", "byte 80: announces 3 triangles, for which 234 bytes were expected, found a file of 235");
+    assert_refused(
+        "long.stl",
+        "byte 80: announces 3 triangles, for which 234 bytes were expected, found a file of 235");
     stl.data[83] = 0xff;
     write_test_file("huge.stl", stl.data, stl.size);
     assert_refused("huge.stl", "announces 4278190083 triangles");
     strl__free(stl.data);
 }
 
-static const char two_solids[] = "solid first one\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 1 0 0\n"
-                                 "   vertex 0 1 0\n  endloop\n endfacet\nendsolid first one\n"
-                                 "SOLID second # by hand\n# a remark\n\tFacet Normal nan 0 0 OUTER LOOP Vertex 0 0 0 vertex 1 0 0\r\n"
-                                 "vertex 1. 1 .0e2 vertex +0 1 -0 endloop endfacet facet outer loop vertex 0 0 0\r"
-                                 "vertex 2 0 0 endloop endfacet facet normal 1 1 1 outer loop vertex 0 0 nan vertex 1 0 0 "
-                                 "vertex 0 1 0 endloop endfacet\nendsolid\nsolid first one\nfacet normal 0 0 0 outer loop "
-                                 "vertex 0 0 1 vertex 1 0 1 vertex 0 1 1e0 endloop endfacet endsolid first one\n";
+static const char two_solids[] =
+    "solid first one\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 1 0 0\n"
+    "   vertex 0 1 0\n  endloop\n endfacet\nendsolid first one\n"
+    "SOLID second # by hand\n# a remark\n\tFacet Normal nan 0 0 OUTER LOOP Vertex 0 0 0 vertex 1 0 0\r\n"
+    "vertex 1. 1 .0e2 vertex +0 1 -0 endloop endfacet facet outer loop vertex 0 0 0\r"
+    "vertex 2 0 0 endloop endfacet facet normal 1 1 1 outer loop vertex 0 0 nan vertex 1 0 0 "
+    "vertex 0 1 0 endloop endfacet\nendsolid\nsolid first one\nfacet normal 0 0 0 outer loop "
+    "vertex 0 0 1 vertex 1 0 1 vertex 0 1 1e0 endloop endfacet endsolid first one\n";
 
 static void solids_of_a_text_are_parts(void **state)
 {
@@ -91,23 +94,28 @@ static void every_beginning_of_a_text_is_refused_or_read(void **state)
 {
     (void)state;
     size_t refused = read_every_beginning("cut.stl", two_solids, sizeof two_solids - 1);
-    assert_in_range(refused, sizeof two_solids - 80, sizeof two_solids - 1); /* readable only between solids */
+    assert_in_range(refused, sizeof two_solids - 80,
+                    sizeof two_solids - 1); /* readable only between solids */
 }
 
 static void bad_texts_are_refused_with_a_line(void **state)
 {
     (void)state;
     static const char *const cases[][2] = {
-        {"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0\n0\nvertex 1 0 up\n", "line 6: expected a coordinate, found 'up'"},
-        {"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex", "line 5: expected a coordinate, found the end of the file"},
+        {"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0\n0\nvertex 1 0 up\n",
+         "line 6: expected a coordinate, found 'up'"},
+        {"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex",
+         "line 5: expected a coordinate, found the end of the file"},
         {"solid\nface normal 0 0 1\n", "line 2: expected 'facet' or 'endsolid', found 'face'"},
-        {"solid\nfacet normal 0 0 1\nfacet", "line 3: expected 'outer loop', 'vertex', 'endloop' or 'endfacet', found 'facet'"},
+        {"solid\nfacet normal 0 0 1\nfacet",
+         "line 3: expected 'outer loop', 'vertex', 'endloop' or 'endfacet', found 'facet'"},
         {"solid x\nendsolid x\nv 0 0 0\n", "line 3: expected 'solid', found 'v'"},
         {"solid x\n", "line 2: expected 'facet' or 'endsolid', found the end of the file"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
         assert_text_refused("bad.stl", cases[i][0], cases[i][1]);
-    assert_text_refused("words.stl", "nothing of the kind\n", "line 1: expected 'solid', found 'nothing'");
+    assert_text_refused("words.stl", "nothing of the kind\n",
+                        "line 1: expected 'solid', found 'nothing'");
 }
 
 /* More solids than the budget has room for names: refused, not swallowed. */
@@ -117,8 +125,11 @@ static void names_without_end_are_refused(void **state)
     FILE *file = fopen(test_path("names.stl"), "wb");
     assert_non_null(file);
     for (unsigned i = 0; i < 20000; i++)
-        fprintf(file, "solid a rather long name for a solid, which is number %u of very many of its kind\nfacet normal 0 0 0\n"
-                "outer loop\nvertex 0 0 0\nvertex 0 1 0\nvertex 1 0 0\nendloop\nendfacet\nendsolid\n", i);
+        fprintf(
+            file,
+            "solid a rather long name for a solid, which is number %u of very many of its kind\nfacet normal 0 0 0\n"
+            "outer loop\nvertex 0 0 0\nvertex 0 1 0\nvertex 1 0 0\nendloop\nendfacet\nendsolid\n",
+            i);
     fclose(file);
     assert_refused("names.stl", "bytes of names");
     read_result result;
