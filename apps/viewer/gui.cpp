@@ -1,0 +1,276 @@
+#include "viewer/gui.h"
+
+#include <cinttypes>
+#include <cstdio>
+#include <new>
+
+#include <backends/imgui_impl_glfw.h>
+#include <backends/imgui_impl_opengl3.h>
+#include <imgui.h>
+
+extern "C" {
+#include "base/fail.h"
+}
+
+struct strl_gui {
+    ImGuiContext *context;
+    float scale;
+};
+
+namespace
+{
+
+const ImVec4 faint = ImVec4(0.62f, 0.66f, 0.70f, 1), warning = ImVec4(1.0f, 0.68f, 0.25f, 1);
+const ImU32 line_colour = IM_COL32(255, 200, 60, 220);
+const float panel_width = 290, margin = 12;
+
+/* 1234567 -> "1.23 M". */
+void format_count(char *text, size_t size, uint64_t value)
+{
+    const char *units[] = {"", " K", " M", " G", " T"};
+    double scaled = (double)value;
+    int unit = 0;
+    while (scaled >= 9999.5 && unit < 4)
+        scaled /= 1000, unit++;
+    std::snprintf(text, size, unit == 0 ? "%.0f%s" : scaled < 100 ? "%.2f%s" : "%.0f%s", scaled, units[unit]);
+}
+
+void format_bytes(char *text, size_t size, uint64_t value)
+{
+    const char *units[] = {"B", "KiB", "MiB", "GiB", "TiB"};
+    double scaled = (double)value;
+    int unit = 0;
+    while (scaled >= 1000 && unit < 4)
+        scaled /= 1024, unit++;
+    std::snprintf(text, size, unit == 0 || scaled >= 100 ? "%.0f %s" : "%.1f %s", scaled, units[unit]);
+}
+
+void apply_style(float scale)
+{
+    ImGui::StyleColorsDark();
+    ImGuiStyle &style = ImGui::GetStyle();
+    style.WindowRounding = 6;
+    style.FrameRounding = style.GrabRounding = 4;
+    style.WindowBorderSize = 0;
+    style.WindowPadding = ImVec2(12, 10);
+    style.Colors[ImGuiCol_WindowBg] = ImVec4(0.07f, 0.08f, 0.10f, 0.82f);
+    style.Colors[ImGuiCol_PlotHistogram] = ImVec4(0.26f, 0.52f, 0.80f, 1);
+    style.ScaleAllSizes(scale);
+    ImFontConfig font;
+    font.SizePixels = 13 * scale;
+    ImGui::GetIO().Fonts->AddFontDefault(&font);
+}
+
+void row(const char *name, const char *value)
+{
+    ImGui::TableNextRow();
+    ImGui::TableNextColumn();
+    ImGui::TextColored(faint, "%s", name);
+    ImGui::TableNextColumn();
+    ImGui::TextUnformatted(value);
+}
+
+void count_row(const char *name, uint64_t value)
+{
+    char text[32];
+    format_count(text, sizeof text, value);
+    row(name, text);
+}
+
+void real_row(const char *name, const char *format, double value)
+{
+    char text[32];
+    std::snprintf(text, sizeof text, format, value);
+    row(name, text);
+}
+
+void budget(const char *name, uint64_t used, uint64_t most)
+{
+    char used_text[32], most_text[32], text[80];
+    format_bytes(used_text, sizeof used_text, used);
+    format_bytes(most_text, sizeof most_text, most);
+    std::snprintf(text, sizeof text, "%s %s of %s", name, used_text, most_text);
+    ImGui::ProgressBar(most ? (float)((double)used / (double)most) : 0, ImVec2(-1, 0), text);
+}
+
+void heading(const char *text)
+{
+    ImGui::Spacing();
+    ImGui::TextColored(faint, "%s", text);
+    ImGui::Separator();
+}
+
+void show_controls(const strl_gui_facts *facts, strl_gui_controls *controls)
+{
+    ImGui::SetNextItemWidth(-1);
+    ImGui::SliderFloat("##error", &controls->error_px, STRL_GUI_LEAST_ERROR_PX, STRL_GUI_MOST_ERROR_PX, "pixel error %.2f",
+                       ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp);
+    int mode = controls->fly;
+    ImGui::RadioButton("orbit", &mode, 0);
+    ImGui::SameLine();
+    ImGui::RadioButton("fly", &mode, 1);
+    controls->fly = mode != 0;
+    if (controls->fly) {
+        ImGui::SameLine();
+        ImGui::TextColored(faint, "%.3g units/s", facts->speed);
+    }
+    int debug = controls->debug;
+    ImGui::SetNextItemWidth(-1);
+    ImGui::Combo("##colours", &debug, "colours of the model\0colours by cluster\0colours by level\0colours by error\0");
+    controls->debug = (strl_debug_colour)debug;
+    ImGui::Checkbox("wireframe", &controls->wireframe);
+    ImGui::SameLine();
+    ImGui::Checkbox("flat", &controls->flat);
+    ImGui::SameLine();
+    ImGui::Checkbox("freeze", &controls->frozen);
+    controls->home |= ImGui::Button("home");
+    ImGui::SameLine();
+    controls->reset |= ImGui::Button("reset");
+    ImGui::SameLine();
+    controls->screenshot |= ImGui::Button("picture");
+    ImGui::SameLine();
+    controls->help ^= ImGui::Button("help");
+}
+
+void show_statistics(const strl_gui_facts *facts)
+{
+    heading("frame");
+    if (!ImGui::BeginTable("statistics", 2, ImGuiTableFlags_SizingStretchSame))
+        return;
+    if (facts->idle)
+        row("frames/s", "still");
+    else
+        real_row("frames/s", "%.1f", facts->fps);
+    real_row("frame", "%.1f ms", facts->frame_ms);
+    real_row("select", "%.2f ms", facts->select_ms);
+    count_row("triangles", facts->triangles);
+    count_row("nodes", facts->nodes);
+    count_row("culled", facts->nodes_culled);
+    count_row("draws", facts->draws);
+    count_row("requests", facts->requests);
+    count_row("missing nodes", facts->missing_nodes);
+    real_row("allowed error", "%.2f px", facts->allowed_error_px);
+    real_row("largest error", "%.2f px", facts->max_error_px);
+    if (facts->faults)
+        count_row("faults", facts->faults);
+    ImGui::EndTable();
+}
+
+void show_panel(float scale, const strl_gui_facts *facts, strl_gui_controls *controls)
+{
+    char text[32];
+    ImGui::SetNextWindowPos(ImVec2(margin * scale, margin * scale), ImGuiCond_FirstUseEver);
+    ImGui::SetNextWindowSizeConstraints(ImVec2(panel_width * scale, 0), ImVec2(panel_width * scale, FLT_MAX));
+    ImGui::Begin("Stroll", NULL, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav);
+    format_count(text, sizeof text, facts->model_triangles);
+    ImGui::TextWrapped("%s", facts->model);
+    ImGui::TextColored(faint, "%s triangles", text);
+    show_controls(facts, controls);
+    heading("memory");
+    budget("nodes", facts->resident_bytes, facts->memory_bytes);
+    budget("GPU", facts->gpu_bytes, facts->gpu_memory_bytes);
+    show_statistics(facts);
+    if (facts->last_fault[0]) {
+        ImGui::PushStyleColor(ImGuiCol_Text, warning);
+        ImGui::TextWrapped("%s", facts->last_fault);
+        ImGui::PopStyleColor();
+    }
+    ImGui::PushStyleColor(ImGuiCol_Text, faint);
+    ImGui::TextWrapped("%s", facts->device);
+    ImGui::PopStyleColor();
+    ImGui::End();
+}
+
+const ImGuiWindowFlags overlay_flags = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoNav |
+                                       ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_NoSavedSettings;
+
+void show_help(const char *keys)
+{
+    ImVec2 size = ImGui::GetIO().DisplaySize;
+    ImGui::SetNextWindowPos(ImVec2(size.x * 0.5f, size.y * 0.5f), ImGuiCond_Always, ImVec2(0.5f, 0.5f));
+    ImGui::Begin("##help", NULL, overlay_flags);
+    ImGui::TextUnformatted(keys);
+    ImGui::End();
+}
+
+void show_message(float scale, const char *message)
+{
+    ImVec2 size = ImGui::GetIO().DisplaySize;
+    ImGui::SetNextWindowPos(ImVec2(size.x * 0.5f, size.y - margin * scale), ImGuiCond_Always, ImVec2(0.5f, 1));
+    ImGui::Begin("##message", NULL, overlay_flags);
+    ImGui::TextUnformatted(message);
+    ImGui::End();
+}
+
+void show_lines(const strl_gui_facts *facts)
+{
+    ImDrawList *list = ImGui::GetBackgroundDrawList();
+    ImVec2 scale = ImGui::GetIO().DisplayFramebufferScale;
+    if (!(scale.x > 0) || !(scale.y > 0))
+        return;
+    for (uint32_t i = 0; i < facts->line_count; i++) {
+        const float *at = facts->lines[i];
+        list->AddLine(ImVec2(at[0] / scale.x, at[1] / scale.y), ImVec2(at[2] / scale.x, at[3] / scale.y), line_colour, 1.5f);
+    }
+}
+
+} // namespace
+
+strl_status strl_gui_create(struct GLFWwindow *window, double scale, strl_gui **gui, strl_error *err)
+{
+    *gui = new (std::nothrow) strl_gui{};
+    if (!*gui)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for the panel");
+    (*gui)->scale = (float)scale;
+    (*gui)->context = ImGui::CreateContext();
+    ImGui::GetIO().IniFilename = NULL; /* a viewer leaves no files behind */
+    apply_style((*gui)->scale);
+    if (ImGui_ImplGlfw_InitForOpenGL(window, true)) {
+        if (ImGui_ImplOpenGL3_Init("#version 330 core"))
+            return STRL_OK;
+        ImGui_ImplGlfw_Shutdown();
+    }
+    ImGui::DestroyContext((*gui)->context);
+    delete *gui;
+    *gui = NULL;
+    return strl__fail(err, STRL_ERR_UNSUPPORTED, "the panel cannot be drawn with this GL system");
+}
+
+void strl_gui_destroy(strl_gui *gui)
+{
+    if (!gui)
+        return;
+    ImGui::SetCurrentContext(gui->context);
+    ImGui_ImplOpenGL3_Shutdown();
+    ImGui_ImplGlfw_Shutdown();
+    ImGui::DestroyContext(gui->context);
+    delete gui;
+}
+
+void strl_gui_show(strl_gui *gui, const strl_gui_facts *facts, strl_gui_controls *controls)
+{
+    ImGui::SetCurrentContext(gui->context);
+    ImGui_ImplOpenGL3_NewFrame();
+    ImGui_ImplGlfw_NewFrame();
+    ImGui::NewFrame();
+    show_lines(facts);
+    show_panel(gui->scale, facts, controls);
+    if (controls->help)
+        show_help(facts->keys);
+    if (facts->message[0])
+        show_message(gui->scale, facts->message);
+    ImGui::Render();
+    ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
+}
+
+bool strl_gui_takes_mouse(const strl_gui *gui)
+{
+    ImGui::SetCurrentContext(gui->context);
+    return ImGui::GetIO().WantCaptureMouse;
+}
+
+bool strl_gui_takes_keyboard(const strl_gui *gui)
+{
+    ImGui::SetCurrentContext(gui->context);
+    return ImGui::GetIO().WantTextInput;
+}

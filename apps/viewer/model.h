@@ -1,0 +1,25 @@
+/* A container opened for walking: source, decoding threads and walk. */
+#ifndef STRL_VIEWER_MODEL_H
+#define STRL_VIEWER_MODEL_H
+
+#include "jobs/pool.h"
+#include "stroll/walk.h"
+
+typedef struct strl_viewer_model {
+    strl_walk *walk;
+    strl_pool *pool; /* decodes */
+    strl_executor executor;
+    double bounds[6];
+    unsigned up_axis;
+    uint64_t triangles; /* of the finest level */
+} strl_viewer_model;
+
+/* The model stays where it is until strl_viewer_model_close. STRL_ERR_ARGUMENT where path is no container. */
+strl_status strl_viewer_model_open(strl_viewer_model *model, const char *path, uint64_t memory_bytes, double error_px,
+                                   strl_error *err);
+void strl_viewer_model_close(strl_viewer_model *model);
+
+/* Near and far of a list as seen by another camera than the walk's. False where nothing visible lies before it. */
+bool strl_viewer_set_range(strl_draw_list *list, const strl_camera *camera);
+
+#endif

@@ -1,0 +1,27 @@
+/* `stroll view`: a window on a container, with fly and orbit, pixel error and statistics. */
+#ifndef STRL_VIEWER_VIEWER_H
+#define STRL_VIEWER_VIEWER_H
+
+#include <stdint.h>
+
+#include "stroll/error.h"
+#include "stroll/render.h"
+
+/* Zero-initialise: every 0 but path takes its default. Strings are borrowed for the call. */
+typedef struct strl_viewer_desc {
+    const char *path;          /* a container */
+    const char *screenshots;   /* the folder where pictures go, made at the first; NULL = the current one */
+    strl_backend backend;      /* STRL_BACKEND_NULL is no window's */
+    uint32_t size[2];          /* of the window in screen units; 0 = 1280x720 */
+    double error_px;           /* 0 = 1 */
+    uint64_t memory_bytes;     /* of decoded nodes; 0 = 512 MiB */
+    uint64_t gpu_memory_bytes; /* of buffers of nodes; 0 = 512 MiB */
+} strl_viewer_desc;
+
+/* Runs until the window is closed. On the program's first thread; STRL_ERR_UNSUPPORTED where there is no display. */
+strl_status strl_viewer_run(const strl_viewer_desc *desc, strl_error *err);
+
+/* Keys and mouse, one a line, for people. */
+extern const char strl_viewer_keys[];
+
+#endif
