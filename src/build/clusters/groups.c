@@ -6,7 +6,7 @@
 #include "build/clusters/hierarchy.h"
 
 #define LEAST_SHARED 5u   /* the paper's j */
-#define MERGED_SOON 2u    /* condition 1: not merged within so many levels anyway */
+#define MERGED_SOON 1u    /* condition 1: not merged within so many levels anyway */
 #define SIMILAR_ERROR 4.f /* condition 2: error ranges of the members differ by no more than this factor */
 
 bool strl_adjacency_add(strl_adjacency *adjacency, uint32_t a, uint32_t b, uint32_t count)

@@ -7,6 +7,9 @@
 #include "base/memory.h"
 #include "build/ingest/internal.h"
 
+#define SHARED_WEIGHT 4u /* of one shared position, against 1 of a neighbour on the curve */
+#define CURVE_REACH 2u
+
 typedef struct pair {
     uint32_t position[3];
     uint32_t cell;
@@ -126,7 +129,7 @@ static strl_status take_connected(void *context, uint64_t index, unsigned slot, 
     (void)worker;
     strl_status status = strl_spill_append(c->ingest->shared, out->shared, out->shared_count * sizeof *out->shared, err);
     for (size_t i = 0; i < out->edge_count && !status; i++)
-        if (!count_edge(c, out->edges[i], 1))
+        if (!count_edge(c, out->edges[i], SHARED_WEIGHT))
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the graph of %u cells", c->ingest->cell_count);
     release(out);
     if (!status)
@@ -144,9 +147,22 @@ static int compare_edges(const void *a, const void *b)
     return x->b < y->b ? -1 : x->b > y->b;
 }
 
+/* Cells that follow each other on the curve are near each other, if not connected: a weak edge keeps them together where
+ * nothing else decides (the paper's inverse distance). */
+static bool add_curve_edges(connecting *c)
+{
+    for (uint32_t cell = 0; cell + 1 < c->ingest->cell_count; cell++)
+        for (uint32_t ahead = 1; ahead <= CURVE_REACH && cell + ahead < c->ingest->cell_count; ahead++)
+            if (!count_edge(c, (uint64_t)cell << 32 | (cell + ahead), 1))
+                return false;
+    return true;
+}
+
 static strl_status list_edges(connecting *c, strl_error *err)
 {
     strl_ingest *ingest = c->ingest;
+    if (!add_curve_edges(c))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for the graph of %u cells", ingest->cell_count);
     ingest->edges = strl__alloc(c->used, sizeof *ingest->edges);
     if (!ingest->edges)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for the graph of %u cells", ingest->cell_count);

@@ -7,8 +7,11 @@
 #include "base/memory.h"
 #include "build/ingest/internal.h"
 
-#define LEAST_CELL_TRIANGLES 32u
+#define CELL_TRIANGLES 48u
 #define CELL_BYTES_OF_MEMORY 1536u /* what a cell costs in cell table, graph and partition, generously */
+
+#define BLOCK 512u        /* triangles within which sheets are told apart */
+#define BLOCK_TABLE 4096u /* a power of two above 3 * BLOCK * 2 */
 
 /* A lattice position and the cell that has it: one record of a pair spill. */
 typedef struct pair {
@@ -98,29 +101,130 @@ done:
     return status;
 }
 
-/* Cuts where the curve makes its largest step in reach, so that cells are compact. */
-static bool cut_cells(const sorting *s, sorted_bucket *out, const keyed *keys)
+/* Where to end a run that begins at `at` and may have `most` items: where the curve makes its largest step in reach, so that runs are
+ * compact. */
+static uint64_t run_end(const keyed *keys, uint64_t at, uint64_t most, uint64_t count)
 {
-    uint64_t at = 0;
-    while (at < out->count) {
-        uint64_t end = at + s->cell_triangles, best = out->count;
-        if (end < out->count) {
-            uint64_t widest = 0;
-            best = end;
-            for (uint64_t i = at + s->cell_triangles / 2; i <= end; i++) {
-                uint64_t step = keys[i - 1].key ^ keys[i].key;
-                if (step > widest) {
-                    widest = step;
-                    best = i;
-                }
-            }
+    uint64_t widest = 0, best = at + most;
+    if (count - at <= most)
+        return count;
+    for (uint64_t i = at + most / 2; i <= at + most; i++) {
+        uint64_t step = keys[i - 1].key ^ keys[i].key;
+        if (step > widest) {
+            widest = step;
+            best = i;
         }
-        if (!strl__grow(&out->cells, &out->cell_capacity, out->cell_count + 1, sizeof *out->cells))
-            return false;
-        out->cells[out->cell_count++] = (uint32_t)(best - at);
-        at = best;
+    }
+    return best;
+}
+
+/* Room for the triangles of one block. */
+typedef struct block {
+    uint32_t *component;  /* [3 * BLOCK] union-find over corners; then, per triangle, its component */
+    uint32_t *table;      /* [BLOCK_TABLE] corner + 1 by position */
+    uint32_t *order;      /* [BLOCK] */
+    keyed *keys;          /* [BLOCK] */
+    uint8_t *records;     /* [BLOCK] packed */
+    uint32_t run[BLOCK];  /* triangles of each component, in new order */
+    uint32_t runs;
+} block;
+
+static uint32_t component_root(uint32_t *component, uint32_t at)
+{
+    while (component[at] != at)
+        at = component[at] = component[component[at]];
+    return at;
+}
+
+/* Corners at one position and corners of one triangle belong together. */
+static void find_components(block *b, const uint8_t *records, size_t bytes, uint32_t count)
+{
+    memset(b->table, 0, BLOCK_TABLE * sizeof *b->table);
+    for (uint32_t corner = 0; corner < 3 * count; corner++) {
+        uint32_t position[3], slot;
+        memcpy(position, records + corner / 3 * bytes + 12 * (corner % 3), 12);
+        slot = (uint32_t)strl__mix64(position[0] ^ strl__mix64((uint64_t)position[1] << 32 | position[2])) &
+               (BLOCK_TABLE - 1);
+        while (b->table[slot]) {
+            uint32_t other = b->table[slot] - 1;
+            if (!memcmp(records + other / 3 * bytes + 12 * (other % 3), position, 12))
+                break;
+            slot = (slot + 1) & (BLOCK_TABLE - 1);
+        }
+        if (!b->table[slot])
+            b->table[slot] = corner + 1;
+        b->component[corner] = corner;
+        uint32_t partners[2] = {b->table[slot] - 1, corner - corner % 3};
+        for (int i = 0; i < 2; i++) {
+            uint32_t x = component_root(b->component, corner), y = component_root(b->component, partners[i]);
+            b->component[x > y ? x : y] = x > y ? y : x;
+        }
+    }
+}
+
+/* Sheets that pass through one block are laid one after the other, each in the order of the curve: cells then hold pieces of
+ * one sheet, and clusters of layered models keep short borders. */
+static void separate_sheets(block *b, uint8_t *records, keyed *keys, size_t bytes, uint32_t count)
+{
+    uint32_t placed = 0;
+    find_components(b, records, bytes, count);
+    for (uint32_t t = 0; t < count; t++)
+        b->order[t] = component_root(b->component, 3 * t) / 3; /* the component's first triangle */
+    b->runs = 0;
+    for (uint32_t first = 0; first < count; first++) {
+        if (b->order[first] != first)
+            continue;
+        uint32_t before = placed;
+        for (uint32_t t = first; t < count; t++)
+            if (b->order[t] == first) {
+                memcpy(b->records + placed * bytes, records + t * bytes, bytes);
+                b->keys[placed++] = keys[t];
+            }
+        b->run[b->runs++] = placed - before;
+    }
+    memcpy(records, b->records, count * bytes);
+    memcpy(keys, b->keys, count * sizeof *keys);
+}
+
+/* Cells of one block: pieces of one component, small components together. */
+static bool cut_block(const sorting *s, sorted_bucket *out, const block *b, const keyed *keys)
+{
+    uint64_t at = 0, end = 0, pending = 0;
+    for (uint32_t i = 0; i < b->runs; i++) {
+        end += b->run[i];
+        pending += b->run[i];
+        if (pending < s->cell_triangles / 4 && i + 1 < b->runs)
+            continue;
+        while (at < end) {
+            uint64_t cut = run_end(keys, at, s->cell_triangles, end);
+            if (!strl__grow(&out->cells, &out->cell_capacity, out->cell_count + 1, sizeof *out->cells))
+                return false;
+            out->cells[out->cell_count++] = (uint32_t)(cut - at);
+            at = cut;
+        }
+        pending = 0;
     }
     return true;
+}
+
+static bool cut_cells(const sorting *s, sorted_bucket *out, keyed *keys)
+{
+    size_t bytes = strl_soup_bytes(s->ingest);
+    block b = {.component = strl__alloc(3 * BLOCK, sizeof *b.component), .table = strl__alloc(BLOCK_TABLE, sizeof *b.table),
+               .order = strl__alloc(BLOCK, sizeof *b.order), .keys = strl__alloc(BLOCK, sizeof *b.keys),
+               .records = strl__alloc(BLOCK, bytes)};
+    bool good = b.component && b.table && b.order && b.keys && b.records;
+    for (uint64_t at = 0, end; at < out->count && good; at = end) {
+        end = run_end(keys, at, BLOCK, out->count);
+        separate_sheets(&b, out->records + at * bytes, keys + at, bytes, (uint32_t)(end - at));
+        good = cut_block(s, out, &b, keys + at);
+    }
+    strl__free(b.component);
+    strl__free(b.table);
+    strl__free(b.order);
+    strl__free(b.keys);
+    strl__free(b.records);
+    return good;
 }
 
 /* The different positions of one cell, found by a small table that is cleared from cell to cell. */
@@ -242,8 +346,8 @@ strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest,
 {
     sorting s = {.context = context, .ingest = ingest, .buckets = buckets, .pairs = pairs};
     uint64_t most_cells = context->memory_bytes / CELL_BYTES_OF_MEMORY;
-    uint64_t least = ingest->triangle_count * 4 / 3 / most_cells + 1;
-    s.cell_triangles = least < 2 * LEAST_CELL_TRIANGLES ? 2 * LEAST_CELL_TRIANGLES : (uint32_t)least;
+    uint64_t least = ingest->triangle_count * 2 / most_cells + 1;
+    s.cell_triangles = least < CELL_TRIANGLES ? CELL_TRIANGLES : (uint32_t)least;
     unsigned window = strl_pool_workers(context->pool);
     s.slots = strl__alloc_zero(strl_pool_window(context->pool, window), sizeof *s.slots);
     strl_status status = s.slots ? strl_spill_open(context->spills, "soup", 0, &ingest->soup, err)
