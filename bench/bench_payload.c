@@ -1,5 +1,5 @@
-/* How small and how fast the payload codec is: encodes and decodes displaced grids, whose half of the vertices are steps, and prints
- * one JSON line a grid with medians and the range of the timed rounds. One core, processor time. */
+/* How small and how fast the payload codec is: encodes and decodes displaced grids, whose half of the vertices are
+ * steps, and prints one JSON line a grid with medians and the range of the timed rounds. One core, processor time. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -35,7 +35,8 @@ static struct timing summarise(double *seconds)
     return (struct timing){seconds[ROUNDS / 2], seconds[0], seconds[ROUNDS - 1]};
 }
 
-static strl_status time_encode(const strl_pm *pm, strl_arena *scratch, strl_writer *payload, struct timing *timing, strl_error *err)
+static strl_status time_encode(const strl_pm *pm, strl_arena *scratch, strl_writer *payload, struct timing *timing,
+                               strl_error *err)
 {
     double seconds[ROUNDS];
     strl_status status = STRL_OK;
@@ -103,11 +104,12 @@ static strl_status bench_hills(uint32_t side, double spacing, double rough, strl
         printf("{\"bench\":\"payload\",\"commit\":\"%s\",", STRL_COMMIT);
         print_cpu();
         printf(",\"spacing\":%g,\"rough\":%g,\"vertices\":%" PRIu32 ",\"triangles\":%" PRIu32 ",\"steps\":%" PRIu32
-               ",\"bytes\":%zu,\"bytes_per_vertex\":%.3f,\"decode_mtri_per_s\":%.2f,\"decode_slowest\":%.2f,\"decode_fastest\":%.2f,"
+               ",\"bytes\":%zu,\"bytes_per_vertex\":%.3f,\"decode_mtri_per_s\":%.2f,\"decode_slowest\":%.2f,"
+               "\"decode_fastest\":%.2f,"
                "\"encode_mtri_per_s\":%.2f,\"encode_slowest\":%.2f,\"encode_fastest\":%.2f}\n",
                spacing, rough, pm.vertex_count, pm.triangle_count, pm.step_count, payload.size,
-               (double)payload.size / pm.vertex_count, mtri / decode.median, mtri / decode.slowest, mtri / decode.fastest,
-               mtri / encode.median, mtri / encode.slowest, mtri / encode.fastest);
+               (double)payload.size / pm.vertex_count, mtri / decode.median, mtri / decode.slowest,
+               mtri / decode.fastest, mtri / encode.median, mtri / encode.slowest, mtri / encode.fastest);
     }
     strl__free(payload.data);
     strl_arena_deinit(&decoded);

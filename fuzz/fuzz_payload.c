@@ -1,4 +1,5 @@
-/* Hostile node payloads: refused with a sentence, or decoded to a mesh that keeps every invariant and survives another round. */
+/* Hostile node payloads: refused with a sentence, or decoded to a mesh that keeps every invariant and survives another
+ * round. */
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -35,7 +36,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if ((peek && !status) || (status && (status != STRL_ERR_FORMAT || !err.message[0])))
         abort();
     if (!status) {
-        if (strl_pm_check(&pm, &err) || sizes.vertex_count != pm.vertex_count || sizes.triangle_count != pm.triangle_count)
+        if (strl_pm_check(&pm, &err) || sizes.vertex_count != pm.vertex_count ||
+            sizes.triangle_count != pm.triangle_count)
             abort();
         encode_again(&pm, &arena);
     }

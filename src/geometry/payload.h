@@ -1,5 +1,8 @@
 /* The payload codec: a progressive mesh to bytes and back. docs/format.md, "Node payload", is normative.
- * Lossless for all of strl_pm but the errors, which are rounded up to a logarithmic scale (the claim stays a bound). */
+ * Lossless for all of strl_pm but the errors, which are rounded up to a logarithmic scale (the claim stays a bound: at
+ * most 4.5 % more). What strl_pm leaves open is not kept: base vertices come back in another order, triangles in
+ * another order within their step, and corners rotated; steps, their vertices, the palette and every state stay what
+ * they were. */
 #ifndef STRL_GEOMETRY_PAYLOAD_H
 #define STRL_GEOMETRY_PAYLOAD_H
 
@@ -11,7 +14,8 @@
 #include "geometry/progressive.h"
 #include "stroll/error.h"
 
-/* Appends the payload of pm to writer. pm must satisfy the invariants of progressive.h; scratch is rewound on return. */
+/* Appends the payload of pm to writer. pm must satisfy the invariants of progressive.h, which is checked; scratch is
+ * rewound on return. On failure writer keeps its size. */
 strl_status strl_payload_encode(const strl_pm *pm, strl_arena *scratch, strl_writer *writer, strl_error *err);
 
 /* Sizes announced by a payload's head, checked against the limits of progressive.h and against `size`. */
@@ -21,8 +25,9 @@ typedef struct strl_payload_sizes {
 } strl_payload_sizes;
 strl_status strl_payload_peek(const void *data, size_t size, strl_payload_sizes *sizes, strl_error *err);
 
-/* Decodes a payload of exactly `size` bytes; the arrays of *pm live in `arena`. Hostile bytes fail with STRL_ERR_FORMAT; whatever is
- * accepted satisfies every invariant of progressive.h. Thread-safe on different arenas. */
+/* Decodes a payload of exactly `size` bytes; the arrays of *pm live in `arena`. Hostile bytes fail with
+ * STRL_ERR_FORMAT; whatever is accepted satisfies every invariant of progressive.h. Scratch memory comes and goes apart
+ * from the arena, within what its limit leaves. Thread-safe on different arenas. */
 strl_status strl_payload_decode(const void *data, size_t size, strl_arena *arena, strl_pm *pm, strl_error *err);
 
 #endif

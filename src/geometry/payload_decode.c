@@ -21,19 +21,22 @@ static strl_status read_head(strl_cursor *cursor, strl_payload_sizes *sizes, uin
     if (cursor->failed)
         return strl__fail(err, STRL_ERR_FORMAT, "node payload of %zu bytes is too short for its head", cursor->size);
     if (version != 1 || *flags > (FLAG_COLOUR | FLAG_PALETTE_INDEX))
-        return strl__fail(err, STRL_ERR_FORMAT, "node payload has version %u and flags %u, expected 1 and at most 3", version,
-                          *flags);
+        return strl__fail(err, STRL_ERR_FORMAT, "node payload has version %u and flags %u, expected 1 and at most 3",
+                          version, *flags);
     if (sizes->triangle_count > STRL_PM_MAX_TRIANGLES || sizes->base_triangle_count > sizes->triangle_count ||
         sizes->base_vertex_count > sizes->vertex_count || sizes->palette_count < 1 ||
         sizes->step_count > sizes->vertex_count - sizes->base_vertex_count)
-        return strl__fail(err, STRL_ERR_FORMAT, "node payload announces %" PRIu32 " vertices (base %" PRIu32 "), %" PRIu32
-                          " triangles (base %" PRIu32 "), %" PRIu32 " steps and %" PRIu32 " palette entries, which cannot be",
-                          sizes->vertex_count, sizes->base_vertex_count, sizes->triangle_count, sizes->base_triangle_count,
-                          sizes->step_count, sizes->palette_count);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node payload announces %" PRIu32 " vertices (base %" PRIu32 "), %" PRIu32
+                          " triangles (base %" PRIu32 "), %" PRIu32 " steps and %" PRIu32
+                          " palette entries, which cannot be",
+                          sizes->vertex_count, sizes->base_vertex_count, sizes->triangle_count,
+                          sizes->base_triangle_count, sizes->step_count, sizes->palette_count);
     uint64_t items = (uint64_t)sizes->vertex_count + sizes->triangle_count + sizes->palette_count;
     if (items > (uint64_t)cursor->size * STRL__MAX_ITEMS_A_BYTE)
-        return strl__fail(err, STRL_ERR_FORMAT, "node payload announces %" PRIu64 " items, more than its %zu bytes can hold",
-                          items, cursor->size);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node payload announces %" PRIu64 " items, more than its %zu bytes can hold", items,
+                          cursor->size);
     return STRL_OK;
 }
 
@@ -44,7 +47,8 @@ strl_status strl_payload_peek(const void *data, size_t size, strl_payload_sizes 
     return read_head(&cursor, sizes, &flags, err);
 }
 
-static strl_status allocate(const strl_payload_sizes *sizes, uint8_t flags, strl_arena *arena, strl_pm *pm, strl_error *err)
+static strl_status allocate(const strl_payload_sizes *sizes, uint8_t flags, strl_arena *arena, strl_pm *pm,
+                            strl_error *err)
 {
     uint32_t vertices = sizes->vertex_count, states = sizes->step_count + 1;
     bool colour = flags & FLAG_COLOUR, palette_index = flags & FLAG_PALETTE_INDEX;
@@ -63,8 +67,9 @@ static strl_status allocate(const strl_payload_sizes *sizes, uint8_t flags, strl
     pm->geometric_error = strl_arena_alloc(arena, states, sizeof *pm->geometric_error);
     pm->appearance_error = strl_arena_alloc(arena, states, sizeof *pm->appearance_error);
     pm->palette = strl_arena_alloc(arena, sizes->palette_count, sizeof *pm->palette);
-    if (!pm->position || !pm->normal || (colour && !pm->colour) || (palette_index && !pm->palette_index) || !pm->parent ||
-        !pm->triangle || !pm->vertex_end || !pm->triangle_end || !pm->geometric_error || !pm->appearance_error || !pm->palette)
+    if (!pm->position || !pm->normal || (colour && !pm->colour) || (palette_index && !pm->palette_index) ||
+        !pm->parent || !pm->triangle || !pm->vertex_end || !pm->triangle_end || !pm->geometric_error ||
+        !pm->appearance_error || !pm->palette)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to decode a node payload");
     memset(pm->parent, 0, sizes->base_vertex_count * sizeof *pm->parent);
     return STRL_OK;
@@ -92,8 +97,8 @@ static strl_status decode_parts(struct strl__decoder *d, strl_cursor *cursor)
     return status;
 }
 
-/* Makes scratch one block of about what a decode needs: blocks that come and go cost more page faults than the decoding. Where
- * more is needed, the arena grows as usual. It keeps to what the caller's arena may still take. */
+/* Makes scratch one block of about what a decode needs: blocks that come and go cost more page faults than the
+ * decoding. Where more is needed, the arena grows as usual. It keeps to what the caller's arena may still take. */
 static void reserve(const struct strl__decoder *d, size_t size, const strl_arena *arena, strl_arena *scratch)
 {
     size_t limit = 0, wanted = 2 * size + (size_t)d->sizes.vertex_count * 128 + (size_t)d->sizes.triangle_count * 64 +

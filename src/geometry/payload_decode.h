@@ -23,7 +23,8 @@ strl_status strl__decode_steps(struct strl__decoder *decoder);
 /* Normals, colours, palette, errors. */
 strl_status strl__decode_attributes(struct strl__decoder *decoder);
 
-static inline void strl__pull_position(struct strl__streams_in *in, unsigned id, const uint32_t predicted[3], int32_t position[3])
+static inline void strl__pull_position(struct strl__streams_in *in, unsigned id, const uint32_t predicted[3],
+                                       int32_t position[3])
 {
     for (unsigned k = 0; k < 3; k++)
         position[k] = (int32_t)(predicted[k] + strl__unzigzag(strl__pull(in, id + k)));

@@ -1,5 +1,5 @@
-/* What a node payload says of vertices beside their position, and of states and palette. docs/format-payload.md, "Attributes",
- * is normative. Runs when the finest state is known. */
+/* What a node payload says of vertices beside their position, and of states and palette. docs/format-payload.md,
+ * "Attributes", is normative. Runs when the finest state is known. */
 #include "geometry/payload_decode.h"
 
 #include "base/fail.h"
@@ -60,7 +60,8 @@ static void decode_palette(struct strl__decoder *d)
     }
 }
 
-/* The first state's code; then, until the finest state: how many states keep it, and by how much it falls after them. */
+/* The first state's code; then, until the finest state: how many states keep it, and by how much it falls after them.
+ */
 static bool decode_errors(struct strl__decoder *d, unsigned id, float *error)
 {
     uint32_t code = strl__pull(&d->in, id), state = 0, last = d->sizes.step_count;

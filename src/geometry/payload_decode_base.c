@@ -121,8 +121,8 @@ static bool decode_operation(struct strl__decoder *d, struct strl__front *front)
     for (unsigned k = 0; k < 3; k++)
         strl__front_count(front, corner[k]);
     const int32_t(*position)[3] = (const int32_t(*)[3])d->mesh.position;
-    return !strl__same_position(position, corner[0], corner[1]) && !strl__same_position(position, corner[1], corner[2]) &&
-           !strl__same_position(position, corner[2], corner[0]);
+    return !strl__same_position(position, corner[0], corner[1]) &&
+           !strl__same_position(position, corner[1], corner[2]) && !strl__same_position(position, corner[2], corner[0]);
 }
 
 strl_status strl__decode_base(struct strl__decoder *d)
@@ -132,7 +132,8 @@ strl_status strl__decode_base(struct strl__decoder *d)
         return strl__fail(d->err, STRL_ERR_MEMORY, "no memory to decode a node payload");
     while (d->mesh.triangle_count < d->sizes.base_triangle_count)
         if (d->in.failed || !decode_operation(d, &front))
-            return strl__fail(d->err, STRL_ERR_FORMAT, "node payload's base mesh is broken at triangle %" PRIu32 " of %" PRIu32,
+            return strl__fail(d->err, STRL_ERR_FORMAT,
+                              "node payload's base mesh is broken at triangle %" PRIu32 " of %" PRIu32,
                               d->mesh.triangle_count, d->sizes.base_triangle_count);
     while (d->mesh.vertex_count < d->sizes.base_vertex_count) { /* vertices of no base triangle */
         uint32_t predicted[3], vertex, from = latest(d, predicted);

@@ -51,14 +51,16 @@ static bool add_triangle(struct splitter *s, uint32_t a, uint32_t b, uint32_t c)
     return true;
 }
 
-/* A wedge whose corners are an arc. The neighbours differ in position from u already; v must differ from them and from u. */
+/* A wedge whose corners are an arc. The neighbours differ in position from u already; v must differ from them and from
+ * u. */
 static bool decode_arc(struct splitter *s, const struct wedge *w, unsigned kind)
 {
     struct strl__star *star = &s->star;
     struct strl__mesh *mesh = &s->d->mesh;
     const int32_t(*position)[3] = (const int32_t(*)[3])mesh->position;
     const int32_t *origin = position[w->parent], *v = position[w->vertex];
-    uint32_t start = strl__pull(&s->d->in, STRL__STREAM_START), count = strl__pull(&s->d->in, STRL__STREAM_ARC), place = start;
+    uint32_t start = strl__pull(&s->d->in, STRL__STREAM_START), count = strl__pull(&s->d->in, STRL__STREAM_ARC),
+             place = start;
     struct strl__mean mean = {0};
     bool sound = count < star->count;
     if (!sound || start >= star->count)
@@ -192,8 +194,8 @@ static bool decode_step(struct splitter *s)
     return true;
 }
 
-/* Brings the list of a step to come into the cache: its parent is known but where steps between add more than one vertex. The
- * hops are a fixed number, because a loop that ends with the list would be mispredicted. */
+/* Brings the list of a step to come into the cache: its parent is known but where steps between add more than one
+ * vertex. The hops are a fixed number, because a loop that ends with the list would be mispredicted. */
 static inline void prefetch(const struct strl__decoder *d, uint32_t step)
 {
     enum { AHEAD = 2, HOPS = 7 };
@@ -224,8 +226,9 @@ strl_status strl__decode_steps(struct strl__decoder *d)
         d->pm->triangle_end[step] = d->mesh.triangle_count;
     }
     if (d->mesh.vertex_count != d->sizes.vertex_count || d->mesh.triangle_count != d->sizes.triangle_count)
-        return strl__fail(d->err, STRL_ERR_FORMAT, "node payload's steps end with %" PRIu32 " vertices and %" PRIu32
-                          " triangles, announced were %" PRIu32 " and %" PRIu32, d->mesh.vertex_count, d->mesh.triangle_count,
-                          d->sizes.vertex_count, d->sizes.triangle_count);
+        return strl__fail(d->err, STRL_ERR_FORMAT,
+                          "node payload's steps end with %" PRIu32 " vertices and %" PRIu32
+                          " triangles, announced were %" PRIu32 " and %" PRIu32,
+                          d->mesh.vertex_count, d->mesh.triangle_count, d->sizes.vertex_count, d->sizes.triangle_count);
     return STRL_OK;
 }

@@ -5,8 +5,8 @@
 
 #include "base/fail.h"
 
-/* Walks every triangle from the finest state back to its birth; where `record`, its corners there and the corners that arrive at
- * each vertex by a step. Otherwise only counts the arrivals. */
+/* Walks every triangle from the finest state back to its birth; where `record`, its corners there and the corners that
+ * arrive at each vertex by a step. Otherwise only counts the arrivals. */
 static void walk_triangles(struct strl__encoder *e, bool record)
 {
     const strl_pm *pm = e->pm;
@@ -100,8 +100,8 @@ strl_status strl_payload_encode(const strl_pm *pm, strl_arena *scratch, strl_wri
     if (!status)
         status = strl__encode_attributes(&e);
     if (!status)
-        status = strl__streams_write(&e.out, start, (uint64_t)pm->vertex_count + pm->triangle_count + pm->palette_count, writer,
-                                     err);
+        status = strl__streams_write(&e.out, start, (uint64_t)pm->vertex_count + pm->triangle_count + pm->palette_count,
+                                     writer, err);
     if (status && writer->size > start)
         writer->size = start;
     strl__streams_deinit(&e.out);

@@ -1,4 +1,5 @@
-/* The encoder's parts: it runs the decoder's mesh, in the decoder's numbers, beside the caller's. Internal to the payload codec. */
+/* The encoder's parts: it runs the decoder's mesh, in the decoder's numbers, beside the caller's. Internal to the
+ * payload codec. */
 #ifndef STRL_GEOMETRY_PAYLOAD_ENCODE_H
 #define STRL_GEOMETRY_PAYLOAD_ENCODE_H
 
@@ -27,14 +28,16 @@ strl_status strl__encode_steps(struct strl__encoder *encoder);
 strl_status strl__encode_attributes(struct strl__encoder *encoder);
 
 /* Writes vertex's position, which the mesh holds already, as a residual. */
-static inline void strl__push_position(struct strl__encoder *encoder, unsigned id, const uint32_t predicted[3], uint32_t vertex)
+static inline void strl__push_position(struct strl__encoder *encoder, unsigned id, const uint32_t predicted[3],
+                                       uint32_t vertex)
 {
     for (unsigned k = 0; k < 3; k++)
         strl__push(&encoder->out, id + k, strl__zigzag((uint32_t)encoder->mesh.position[vertex][k] - predicted[k]));
 }
 
 /* Adds pm's triangle t to the mesh with corner `first` of pm in front: the vertices are the decoder's. */
-static inline void strl__encode_triangle(struct strl__encoder *encoder, uint32_t t, unsigned first, const uint32_t corner[3])
+static inline void strl__encode_triangle(struct strl__encoder *encoder, uint32_t t, unsigned first,
+                                         const uint32_t corner[3])
 {
     encoder->triangle_of[t] = encoder->mesh.triangle_count;
     encoder->rotation[t] = (uint8_t)((3 - first) % 3);

@@ -1,4 +1,5 @@
-/* Writing normals, colours, palette and errors of a node payload. docs/format-payload.md, "Attributes", is normative. */
+/* Writing normals, colours, palette and errors of a node payload. docs/format-payload.md, "Attributes", is normative.
+ */
 #include "geometry/payload_encode.h"
 
 #include "base/fail.h"
@@ -31,7 +32,10 @@ static bool encode_normals(struct strl__encoder *e)
 }
 
 /* A difference of bytes as the nearest number from -128 to 127. */
-static uint32_t byte_residual(uint32_t difference) { return strl__zigzag(((difference + 128u) & 255u) - 128u); }
+static uint32_t byte_residual(uint32_t difference)
+{
+    return strl__zigzag(((difference + 128u) & 255u) - 128u);
+}
 
 static void encode_colours(struct strl__encoder *e)
 {

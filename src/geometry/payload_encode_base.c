@@ -55,8 +55,8 @@ static bool walker_init(struct walker *w)
     return true;
 }
 
-/* An unwritten triangle with the directed edge (from, to) of pm's vertices: 3 t + corner of `from`, or STRL__NONE. Forgets the
- * written ones that it meets, or an edge of very many triangles would cost their square. */
+/* An unwritten triangle with the directed edge (from, to) of pm's vertices: 3 t + corner of `from`, or STRL__NONE.
+ * Forgets the written ones that it meets, or an edge of very many triangles would cost their square. */
 static uint32_t find_edge(struct walker *w, uint32_t from, uint32_t to)
 {
     uint32_t *link = &w->edge_bucket[edge_slot(w, from, to)];
@@ -87,7 +87,8 @@ static uint32_t *find_place(struct walker *w, uint32_t vertex)
     }
 }
 
-/* Gives pm's vertex the next number. Returns its twin's number, or STRL__NONE where it is alone at its position so far. */
+/* Gives pm's vertex the next number. Returns its twin's number, or STRL__NONE where it is alone at its position so far.
+ */
 static uint32_t number_vertex(struct walker *w, uint32_t vertex, uint32_t from)
 {
     struct strl__encoder *e = w->e;
@@ -171,7 +172,8 @@ static unsigned choose_operation(struct walker *w, uint32_t vertex)
         return STRL__OP_TWIN;
     }
     uint32_t predicted[3];
-    const int32_t *p = e->mesh.position[gate->start], *q = e->mesh.position[gate->end], *r = e->mesh.position[gate->behind];
+    const int32_t *p = e->mesh.position[gate->start], *q = e->mesh.position[gate->end],
+                  *r = e->mesh.position[gate->behind];
     for (unsigned k = 0; k < 3; k++)
         predicted[k] = (uint32_t)p[k] + (uint32_t)q[k] - (uint32_t)r[k];
     strl__push_position(e, STRL__STREAM_BASE_POSITION, predicted, count);

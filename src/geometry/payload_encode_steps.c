@@ -8,9 +8,9 @@
 struct recorder {
     struct strl__encoder *e;
     struct strl__star star;
-    uint32_t *arc;       /* [triangles], places of the corners that move, in the order in which the decoder moves them */
-    uint16_t *ends;      /* [vertices], the last step's vertex for which a moving triangle (u, x, y) had this y */
-    uint16_t *stamp;     /* [4 * triangles], the last step's vertex to which a corner went */
+    uint32_t *arc;   /* [triangles], places of the corners that move, in the order in which the decoder moves them */
+    uint16_t *ends;  /* [vertices], the last step's vertex for which a moving triangle (u, x, y) had this y */
+    uint16_t *stamp; /* [4 * triangles], the last step's vertex to which a corner went */
     uint32_t step_first; /* first vertex of the step */
     uint32_t vertex, parent;
     uint32_t moved;  /* corners that go from parent to vertex */
@@ -230,7 +230,8 @@ strl_status strl__encode_steps(struct strl__encoder *e)
     r.added = strl_arena_alloc(e->scratch, triangles, sizeof *r.added);
     r.arc = strl_arena_alloc(e->scratch, triangles, sizeof *r.arc);
     r.ends = strl_arena_alloc_zero(e->scratch, e->pm->vertex_count, sizeof *r.ends);
-    if (!r.stamp || !r.added || !r.arc || !r.ends || !strl__star_init(&r.star, e->pm->vertex_count, triangles, e->scratch))
+    if (!r.stamp || !r.added || !r.arc || !r.ends ||
+        !strl__star_init(&r.star, e->pm->vertex_count, triangles, e->scratch))
         return strl__fail(e->err, STRL_ERR_MEMORY, "no memory to encode a node payload");
     for (uint32_t step = 1; step <= e->pm->step_count; step++) {
         encode_step(&r, step);

@@ -1,6 +1,7 @@
-/* The front of the base mesh's traversal: rings of gates, as in the cut-border machine (Gumhold and Strasser 1998). A gate is a
- * directed edge of a known triangle behind which the next triangle may lie; consecutive gates of a ring share a vertex. Encoder
- * and decoder run the same operations. docs/format-payload.md, "Base mesh", is normative. Internal to the payload codec. */
+/* The front of the base mesh's traversal: rings of gates, as in the cut-border machine (Gumhold and Strasser 1998). A
+ * gate is a directed edge of a known triangle behind which the next triangle may lie; consecutive gates of a ring share
+ * a vertex. Encoder and decoder run the same operations. docs/format-payload.md, "Base mesh", is normative. Internal to
+ * the payload codec. */
 #ifndef STRL_GEOMETRY_PAYLOAD_FRONT_H
 #define STRL_GEOMETRY_PAYLOAD_FRONT_H
 
@@ -64,7 +65,8 @@ static inline void strl__gates_join(struct strl__front *front, uint32_t gate, ui
     front->gate[next].previous = gate;
 }
 
-static inline void strl__gate_set(struct strl__front *front, uint32_t gate, uint32_t start, uint32_t end, uint32_t behind)
+static inline void strl__gate_set(struct strl__front *front, uint32_t gate, uint32_t start, uint32_t end,
+                                  uint32_t behind)
 {
     struct strl__gate *g = &front->gate[gate];
     g->start = (uint16_t)start;
@@ -81,15 +83,15 @@ static inline bool strl__gate_closes(const struct strl__front *front, uint32_t g
     return n->end == g->start && g->next != gate && g->state == STRL__GATE_LIVE && n->state == STRL__GATE_LIVE;
 }
 
-/* Takes pairs of gates that are the two sides of one edge out of the ring, beginning at `gate`. Returns the gate to go on with,
- * or STRL__NONE where the ring is used up. */
+/* Takes pairs of gates that are the two sides of one edge out of the ring, beginning at `gate`. Returns the gate to go
+ * on with, or STRL__NONE where the ring is used up. */
 uint32_t strl__front_zip(struct strl__front *front, uint32_t gate);
 
 /* A triangle (a, b, c) apart from all gates: its three edges become a ring. */
 void strl__front_seed(struct strl__front *front, uint32_t a, uint32_t b, uint32_t c);
 
-/* STRL__OP_SPLIT: the current gate (a, b) becomes (a, c), followed by a new gate (c, b). Where c lies on a ring, the rings are
- * cut and joined there. */
+/* STRL__OP_SPLIT: the current gate (a, b) becomes (a, c), followed by a new gate (c, b). Where c lies on a ring, the
+ * rings are cut and joined there. */
 void strl__front_split(struct strl__front *front, uint32_t c);
 
 /* Applies an operation to the current gate; c: the new triangle's third vertex, unless it is STRL__OP_BORDER. */

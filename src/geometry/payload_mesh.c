@@ -1,6 +1,7 @@
 #include "geometry/payload_mesh.h"
 
-bool strl__mesh_init(struct strl__mesh *mesh, uint32_t vertices, uint32_t triangles, int32_t (*position)[3], strl_arena *scratch)
+bool strl__mesh_init(struct strl__mesh *mesh, uint32_t vertices, uint32_t triangles, int32_t (*position)[3],
+                     strl_arena *scratch)
 {
     *mesh = (struct strl__mesh){.position = position, .heads = triangles * 4};
     mesh->corner = strl_arena_alloc(scratch, (size_t)triangles * 4 + vertices, sizeof *mesh->corner);
@@ -57,7 +58,8 @@ void strl__normal_predict(const uint64_t sum[4], uint32_t predicted[2])
         all |= magnitude[k];
     }
     int width = 64 - __builtin_clzll(all), shift = width > 18 ? width - 18 : 0;
-    int32_t x = (int32_t)(magnitude[0] >> shift), y = (int32_t)(magnitude[1] >> shift), z = (int32_t)(magnitude[2] >> shift);
+    int32_t x = (int32_t)(magnitude[0] >> shift), y = (int32_t)(magnitude[1] >> shift),
+            z = (int32_t)(magnitude[2] >> shift);
     int32_t length = x + y + z;
     if (length == 0) {
         predicted[0] = predicted[1] = 512;

@@ -1,5 +1,5 @@
-/* The growing mesh that encoder and decoder of a node payload keep alike: triangles of the current state, and for each vertex
- * the list of its triangles by falling number. Internal to the payload codec. */
+/* The growing mesh that encoder and decoder of a node payload keep alike: triangles of the current state, and for each
+ * vertex the list of its triangles by falling number. Internal to the payload codec. */
 #ifndef STRL_GEOMETRY_PAYLOAD_MESH_H
 #define STRL_GEOMETRY_PAYLOAD_MESH_H
 
@@ -12,8 +12,9 @@
 
 #define STRL__NONE 0xffffffffu
 
-/* Corner k of triangle t has the number 4 t + k; every fourth is unused. Behind them lies one head for each vertex: the list of
- * the corners at a vertex is a ring through its head, newest first. What a walk round a vertex needs lies together. */
+/* Corner k of triangle t has the number 4 t + k; every fourth is unused. Behind them lies one head for each vertex: the
+ * list of the corners at a vertex is a ring through its head, newest first. What a walk round a vertex needs lies
+ * together. */
 struct strl__corner {
     uint32_t next, previous;
     uint16_t wing[2]; /* the vertices that follow in the triangle */
@@ -22,16 +23,23 @@ struct strl__corner {
 struct strl__mesh {
     int32_t (*position)[3];
     struct strl__corner *corner;
-    uint32_t heads;  /* the number of vertex 0's head */
-    uint16_t *twin;  /* [vertices], rings of vertices known to share a position */
+    uint32_t heads;                        /* the number of vertex 0's head */
+    uint16_t *twin;                        /* [vertices], rings of vertices known to share a position */
     uint32_t vertex_count, triangle_count; /* so far */
 };
 
-bool strl__mesh_init(struct strl__mesh *mesh, uint32_t vertices, uint32_t triangles, int32_t (*position)[3], strl_arena *scratch);
+bool strl__mesh_init(struct strl__mesh *mesh, uint32_t vertices, uint32_t triangles, int32_t (*position)[3],
+                     strl_arena *scratch);
 
 /* (k + 1) % 3 and (k + 2) % 3 for k < 3, without a branch. */
-static inline unsigned strl__next3(unsigned k) { return 9u >> (2 * k) & 3; }
-static inline unsigned strl__last3(unsigned k) { return 18u >> (2 * k) & 3; }
+static inline unsigned strl__next3(unsigned k)
+{
+    return 9u >> (2 * k) & 3;
+}
+static inline unsigned strl__last3(unsigned k)
+{
+    return 18u >> (2 * k) & 3;
+}
 
 static inline void strl__mesh_push_corner(struct strl__mesh *mesh, uint32_t corner, uint32_t vertex)
 {
@@ -117,7 +125,8 @@ static inline void strl__star_build(struct strl__star *star, const struct strl__
     star->count = count;
 }
 
-/* The place of the triangle that follows (vertex, x, y) round the vertex: the last with y for its x. STRL__NONE without one. */
+/* The place of the triangle that follows (vertex, x, y) round the vertex: the last with y for its x. STRL__NONE without
+ * one. */
 static inline uint32_t strl__star_follower(const struct strl__star *star, uint16_t y)
 {
     uint32_t place = star->begins[y];
@@ -125,8 +134,8 @@ static inline uint32_t strl__star_follower(const struct strl__star *star, uint16
 }
 
 /* ---- how a step's vertex v splits from its parent u ----
- * An arc of triangles round u, from (u, a, .) to (u, ., b), moves to v. By the bits of its kind, a triangle (v, u, a) closes the
- * gap at its start and (v, b, u) that at its end. What is no arc is said corner by corner. */
+ * An arc of triangles round u, from (u, a, .) to (u, ., b), moves to v. By the bits of its kind, a triangle (v, u, a)
+ * closes the gap at its start and (v, b, u) that at its end. What is no arc is said corner by corner. */
 enum { STRL__KIND_START = 1, STRL__KIND_END = 2, STRL__KIND_GENERAL = 4 };
 
 /* Predicts a new vertex: the mean of its parent and `count` neighbours, in integers that wrap. */

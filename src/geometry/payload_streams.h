@@ -1,5 +1,5 @@
-/* The numbers of a node payload: streams of unsigned 32-bit values, each coded as a symbol (static rANS) and raw low bits.
- * docs/format-payload.md, "Streams" and "Numbers", is normative. Internal to the payload codec. */
+/* The numbers of a node payload: streams of unsigned 32-bit values, each coded as a symbol (static rANS) and raw low
+ * bits. docs/format-payload.md, "Streams" and "Numbers", is normative. Internal to the payload codec. */
 #ifndef STRL_GEOMETRY_PAYLOAD_STREAMS_H
 #define STRL_GEOMETRY_PAYLOAD_STREAMS_H
 
@@ -43,7 +43,8 @@ enum {
 #define STRL__RANS_LOW (1u << 16)
 /* A stream's mode: up to 32 = so many raw bits a value; this = symbols with a table. */
 #define STRL__MODE_TABLE 33u
-/* Values, vertices and triangles together that one byte of payload may stand for: what bounds the memory of a decoder. */
+/* Values, vertices and triangles together that one byte of payload may stand for: what bounds the memory of a decoder.
+ */
 #define STRL__MAX_ITEMS_A_BYTE 256u
 
 /* A value's symbol: itself below 16, then two a power of two, with all but the two leading bits raw. */
@@ -55,15 +56,24 @@ static inline unsigned strl__symbol_of(uint32_t value)
     return 16 + 2 * (bits - 5) + ((value >> (bits - 2)) & 1);
 }
 
-static inline unsigned strl__symbol_raw_bits(unsigned symbol) { return symbol < 16 ? 0 : (symbol - 16) / 2 + 3; }
+static inline unsigned strl__symbol_raw_bits(unsigned symbol)
+{
+    return symbol < 16 ? 0 : (symbol - 16) / 2 + 3;
+}
 
 static inline uint32_t strl__symbol_base(unsigned symbol)
 {
     return symbol < 16 ? symbol : (2u | (symbol & 1)) << strl__symbol_raw_bits(symbol);
 }
 
-static inline uint32_t strl__zigzag(uint32_t difference) { return (difference << 1) ^ (0u - (difference >> 31)); }
-static inline uint32_t strl__unzigzag(uint32_t value) { return (value >> 1) ^ (0u - (value & 1)); }
+static inline uint32_t strl__zigzag(uint32_t difference)
+{
+    return (difference << 1) ^ (0u - (difference >> 31));
+}
+static inline uint32_t strl__unzigzag(uint32_t value)
+{
+    return (value >> 1) ^ (0u - (value & 1));
+}
 
 /* ---- writing ---- */
 struct strl__stream_out {
@@ -88,10 +98,10 @@ static inline void strl__push(struct strl__streams_out *streams, unsigned id, ui
         strl__push_growing(streams, id, value);
 }
 
-/* Appends the coded streams to writer: the last part of a payload that starts at byte `start` of writer, padded as the format
- * asks; item_count = vertices + triangles + palette entries. */
-strl_status strl__streams_write(const struct strl__streams_out *streams, size_t start, uint64_t item_count, strl_writer *writer,
-                                strl_error *err);
+/* Appends the coded streams to writer: the last part of a payload that starts at byte `start` of writer, padded as the
+ * format asks; item_count = vertices + triangles + palette entries. */
+strl_status strl__streams_write(const struct strl__streams_out *streams, size_t start, uint64_t item_count,
+                                strl_writer *writer, strl_error *err);
 void strl__streams_deinit(struct strl__streams_out *streams);
 
 /* ---- reading ---- */

@@ -1,5 +1,5 @@
-/* Bytes to number streams. Both sections are copied with zeros behind them, so that the inner loop loads words without a check
- * for each: it checks once a group of four values, before the next group can pass the zeros. */
+/* Bytes to number streams. Both sections are copied with zeros behind them, so that the inner loop loads words without
+ * a check for each: it checks once a group of four values, before the next group can pass the zeros. */
 #include "geometry/payload_streams.h"
 
 #include <inttypes.h>
@@ -8,7 +8,10 @@
 
 #include "base/fail.h"
 
-enum { GROUP = STRL__RANS_STATES, PADDING_BYTES = 32 }; /* a group reads at most 8 bytes of words and 16 of bits, loads 8 */
+enum {
+    GROUP = STRL__RANS_STATES,
+    PADDING_BYTES = 32
+}; /* a group reads at most 8 bytes of words and 16 of bits, loads 8 */
 
 struct reader {
     const uint8_t *words; /* the next word's bytes, with padding behind words_end */
@@ -69,17 +72,23 @@ static unsigned read_table(struct reader *reader, slot_table slots)
     return alphabet;
 }
 
-
 static const struct {
     uint32_t base, bits;
 } symbols[STRL__SYMBOLS] = {
-#define DIRECT(v) {v, 0}
-#define OCTAVE(raw) {2u << (raw), raw}, {3u << (raw), raw}
-    DIRECT(0), DIRECT(1), DIRECT(2), DIRECT(3), DIRECT(4), DIRECT(5), DIRECT(6), DIRECT(7), DIRECT(8), DIRECT(9), DIRECT(10),
-    DIRECT(11), DIRECT(12), DIRECT(13), DIRECT(14), DIRECT(15), OCTAVE(3), OCTAVE(4), OCTAVE(5), OCTAVE(6), OCTAVE(7), OCTAVE(8),
-    OCTAVE(9), OCTAVE(10), OCTAVE(11), OCTAVE(12), OCTAVE(13), OCTAVE(14), OCTAVE(15), OCTAVE(16), OCTAVE(17), OCTAVE(18),
-    OCTAVE(19), OCTAVE(20), OCTAVE(21), OCTAVE(22), OCTAVE(23), OCTAVE(24), OCTAVE(25), OCTAVE(26), OCTAVE(27), OCTAVE(28),
-    OCTAVE(29), OCTAVE(30),
+#define DIRECT(v)                                                                                                      \
+    {                                                                                                                  \
+        v, 0                                                                                                           \
+    }
+#define OCTAVE(raw)                                                                                                    \
+    {2u << (raw), raw},                                                                                                \
+    {                                                                                                                  \
+        3u << (raw), raw                                                                                               \
+    }
+    DIRECT(0),  DIRECT(1),  DIRECT(2),  DIRECT(3),  DIRECT(4),  DIRECT(5),  DIRECT(6),  DIRECT(7),  DIRECT(8),
+    DIRECT(9),  DIRECT(10), DIRECT(11), DIRECT(12), DIRECT(13), DIRECT(14), DIRECT(15), OCTAVE(3),  OCTAVE(4),
+    OCTAVE(5),  OCTAVE(6),  OCTAVE(7),  OCTAVE(8),  OCTAVE(9),  OCTAVE(10), OCTAVE(11), OCTAVE(12), OCTAVE(13),
+    OCTAVE(14), OCTAVE(15), OCTAVE(16), OCTAVE(17), OCTAVE(18), OCTAVE(19), OCTAVE(20), OCTAVE(21), OCTAVE(22),
+    OCTAVE(23), OCTAVE(24), OCTAVE(25), OCTAVE(26), OCTAVE(27), OCTAVE(28), OCTAVE(29), OCTAVE(30),
 #undef DIRECT
 #undef OCTAVE
 };
@@ -108,7 +117,8 @@ static inline uint32_t finish_value(uint32_t symbol, const uint8_t *bits, uint64
     return symbols[symbol].base + (raw & ((1u << raw_bits) - 1));
 }
 
-/* The symbols of `count` values, in groups of one from each state: the states are independent, so their latencies overlap. */
+/* The symbols of `count` values, in groups of one from each state: the states are independent, so their latencies
+ * overlap. */
 static bool read_symbols(struct reader *reader, const uint32_t *slots, uint32_t *values, uint32_t count)
 {
     const uint8_t *words = reader->words, *end = reader->words_end;
@@ -150,7 +160,8 @@ static bool read_raw_bits(struct reader *reader, uint32_t *values, uint32_t coun
 static bool read_coded(struct reader *reader, slot_table slots, uint32_t *values, uint32_t count)
 {
     unsigned alphabet = read_table(reader, slots);
-    return alphabet && read_symbols(reader, slots, values, count) && (alphabet <= 16 || read_raw_bits(reader, values, count));
+    return alphabet && read_symbols(reader, slots, values, count) &&
+           (alphabet <= 16 || read_raw_bits(reader, values, count));
 }
 
 static strl_status read_stream(struct reader *reader, uint64_t *item_limit, slot_table slots, strl_arena *scratch,
@@ -159,8 +170,9 @@ static strl_status read_stream(struct reader *reader, uint64_t *item_limit, slot
     unsigned length = take_bits(reader, 5);
     uint32_t count = length ? 1u << (length - 1) | take_bits(reader, length - 1) : 0;
     if (count > *item_limit)
-        return strl__fail(err, STRL_ERR_FORMAT, "node payload has a stream of %" PRIu32 " values where its size allows %" PRIu64,
-                          count, *item_limit);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node payload has a stream of %" PRIu32 " values where its size allows %" PRIu64, count,
+                          *item_limit);
     *item_limit -= count;
     unsigned mode = count ? take_bits(reader, 6) : 0;
     uint32_t *values = strl_arena_alloc(scratch, count, sizeof *values);
@@ -180,15 +192,16 @@ static strl_status read_stream(struct reader *reader, uint64_t *item_limit, slot
     return STRL_OK;
 }
 
-/* All was used, and nothing more: the coder came back to where its encoder began, and the bits are padded with zeros as far as
- * needed and no further. */
+/* All was used, and nothing more: the coder came back to where its encoder began, and the bits are padded with zeros as
+ * far as needed and no further. */
 static bool ended_well(const struct reader *reader, size_t payload_bytes, uint64_t items)
 {
     for (unsigned i = 0; i < STRL__RANS_STATES; i++)
         if (reader->state[i] != STRL__RANS_LOW)
             return false;
     uint64_t used = (reader->bit_at + 7) / 8, there = reader->bit_end / 8;
-    if (reader->words != reader->words_end || (used < there && (uint64_t)(payload_bytes - 1) * STRL__MAX_ITEMS_A_BYTE >= items))
+    if (reader->words != reader->words_end ||
+        (used < there && (uint64_t)(payload_bytes - 1) * STRL__MAX_ITEMS_A_BYTE >= items))
         return false;
     if (reader->bit_at % 8 && reader->bits[reader->bit_at / 8] >> (reader->bit_at % 8))
         return false;
@@ -219,8 +232,10 @@ strl_status strl__streams_read(strl_cursor *cursor, size_t payload_bytes, uint64
     for (unsigned i = 0; i < STRL__RANS_STATES; i++)
         reader.state[i] = strl_cursor_u32(cursor);
     if (cursor->failed || word_count > strl_cursor_left(cursor) / 2 || item_count > item_limit)
-        return strl__fail(err, STRL_ERR_FORMAT, "node payload announces %" PRIu32 " words and %" PRIu64
-                          " items, more than its %zu bytes can hold", word_count, item_count, payload_bytes);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node payload announces %" PRIu32 " words and %" PRIu64
+                          " items, more than its %zu bytes can hold",
+                          word_count, item_count, payload_bytes);
     size_t bit_bytes = strl_cursor_left(cursor) - (size_t)word_count * 2;
     reader.words = padded_copy(cursor, (size_t)word_count * 2, scratch);
     reader.bits = padded_copy(cursor, bit_bytes, scratch);

@@ -1,5 +1,5 @@
-/* Number streams to bytes: histogram, table, raw bits, and static rANS (Duda 2013) with four interleaved states. A decoder runs
- * forward, so the symbols are coded backward, last stream first. */
+/* Number streams to bytes: histogram, table, raw bits, and static rANS (Duda 2013) with four interleaved states. A
+ * decoder runs forward, so the symbols are coded backward, last stream first. */
 #include "geometry/payload_streams.h"
 
 #include <math.h>
@@ -25,8 +25,8 @@ void strl__streams_deinit(struct strl__streams_out *streams)
 }
 
 struct table {
-    unsigned mode;           /* raw bits, or STRL__MODE_TABLE */
-    unsigned alphabet;       /* symbols 0..alphabet-1 */
+    unsigned mode;     /* raw bits, or STRL__MODE_TABLE */
+    unsigned alphabet; /* symbols 0..alphabet-1 */
     uint16_t frequency[STRL__SYMBOLS];
     uint16_t start[STRL__SYMBOLS];
 };
@@ -48,7 +48,10 @@ static void put_bits(struct bit_writer *bits, unsigned count, uint32_t value)
     }
 }
 
-static unsigned bit_length(uint32_t value) { return value ? 32 - (unsigned)__builtin_clz(value) : 0; }
+static unsigned bit_length(uint32_t value)
+{
+    return value ? 32 - (unsigned)__builtin_clz(value) : 0;
+}
 
 /* Scales counts to frequencies that sum to STRL__PROBABILITY_ONE, each present symbol at least 1. */
 static void normalise(const uint32_t *count, uint32_t total, struct table *table)
@@ -75,7 +78,8 @@ static void normalise(const uint32_t *count, uint32_t total, struct table *table
         table->start[s] = (uint16_t)start;
 }
 
-/* The bits that the stream costs with its table, table included; the choice between the modes needs no more precision. */
+/* The bits that the stream costs with its table, table included; the choice between the modes needs no more precision.
+ */
 static double table_bits(const struct table *table, const uint32_t *count)
 {
     double bits = 7;
@@ -132,7 +136,7 @@ static void write_raw(const struct strl__stream_out *stream, const struct table 
 }
 
 struct rans_writer {
-    uint8_t *words; /* filled from the end, two bytes a word */
+    uint8_t *words;         /* filled from the end, two bytes a word */
     size_t first, capacity; /* bytes */
     uint32_t state[STRL__RANS_STATES];
 };
@@ -147,7 +151,8 @@ static void code_stream(const struct strl__stream_out *stream, const struct tabl
             strl__store_le(rans->words + rans->first, 2, x & 0xffff);
             x >>= 16;
         }
-        rans->state[i % STRL__RANS_STATES] = ((x / frequency) << STRL__PROBABILITY_BITS) + x % frequency + table->start[symbol];
+        rans->state[i % STRL__RANS_STATES] =
+            ((x / frequency) << STRL__PROBABILITY_BITS) + x % frequency + table->start[symbol];
     }
 }
 
@@ -167,8 +172,8 @@ static void write_sections(const struct rans_writer *rans, struct bit_writer *bi
     strl_writer_bytes(writer, bits->out.data, bits->out.size);
 }
 
-strl_status strl__streams_write(const struct strl__streams_out *streams, size_t start, uint64_t item_count, strl_writer *writer,
-                                strl_error *err)
+strl_status strl__streams_write(const struct strl__streams_out *streams, size_t start, uint64_t item_count,
+                                strl_writer *writer, strl_error *err)
 {
     struct table table[STRL__STREAM_COUNT];
     struct bit_writer bits = {0};

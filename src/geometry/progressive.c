@@ -8,8 +8,8 @@
 static strl_status check_counts(const strl_pm *pm, strl_error *err)
 {
     if (pm->vertex_count > STRL_PM_MAX_VERTICES)
-        return strl__fail(err, STRL_ERR_LIMIT, "progressive mesh has %" PRIu32 " vertices, more than %u", pm->vertex_count,
-                          STRL_PM_MAX_VERTICES);
+        return strl__fail(err, STRL_ERR_LIMIT, "progressive mesh has %" PRIu32 " vertices, more than %u",
+                          pm->vertex_count, STRL_PM_MAX_VERTICES);
     if (pm->triangle_count > STRL_PM_MAX_TRIANGLES)
         return strl__fail(err, STRL_ERR_LIMIT, "progressive mesh has %" PRIu32 " triangles, more than %u",
                           pm->triangle_count, STRL_PM_MAX_TRIANGLES);
@@ -35,13 +35,14 @@ static strl_status check_ends(const strl_pm *pm, strl_error *err)
         float geometric = s ? pm->geometric_error[s - 1] : STRL_PM_MAX_ERROR;
         float appearance = s ? pm->appearance_error[s - 1] : STRL_PM_MAX_ERROR;
         if (!error_is_sound(pm->geometric_error[s], geometric) || !error_is_sound(pm->appearance_error[s], appearance))
-            return strl__fail(err, STRL_ERR_FORMAT, "state %" PRIu32 " has errors %g and %g, expected 0 to %g and 0 to %g", s,
-                              (double)pm->geometric_error[s], (double)pm->appearance_error[s], (double)geometric,
-                              (double)appearance);
+            return strl__fail(
+                err, STRL_ERR_FORMAT, "state %" PRIu32 " has errors %g and %g, expected 0 to %g and 0 to %g", s,
+                (double)pm->geometric_error[s], (double)pm->appearance_error[s], (double)geometric, (double)appearance);
     }
     if (pm->vertex_end[pm->step_count] != pm->vertex_count || pm->triangle_end[pm->step_count] != pm->triangle_count)
-        return strl__fail(err, STRL_ERR_FORMAT, "the finest state does not hold all %" PRIu32 " vertices and %" PRIu32
-                          " triangles", pm->vertex_count, pm->triangle_count);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "the finest state does not hold all %" PRIu32 " vertices and %" PRIu32 " triangles",
+                          pm->vertex_count, pm->triangle_count);
     return STRL_OK;
 }
 
@@ -66,11 +67,13 @@ static strl_status check_vertices(const strl_pm *pm, strl_error *err)
     for (uint32_t s = 1; s <= pm->step_count; s++)
         for (uint32_t first = pm->vertex_end[s - 1], v = first; v < pm->vertex_end[s]; v++) {
             if (pm->parent[v] >= first)
-                return strl__fail(err, STRL_ERR_FORMAT, "vertex %" PRIu32 " of step %" PRIu32 " has parent %u, expected less than %"
-                                  PRIu32, v, s, pm->parent[v], first);
+                return strl__fail(err, STRL_ERR_FORMAT,
+                                  "vertex %" PRIu32 " of step %" PRIu32 " has parent %u, expected less than %" PRIu32,
+                                  v, s, pm->parent[v], first);
             if (!same_position(pm, v, first))
-                return strl__fail(err, STRL_ERR_FORMAT, "step %" PRIu32 " adds vertices %" PRIu32 " and %" PRIu32
-                                  " at different positions", s, first, v);
+                return strl__fail(err, STRL_ERR_FORMAT,
+                                  "step %" PRIu32 " adds vertices %" PRIu32 " and %" PRIu32 " at different positions",
+                                  s, first, v);
         }
     return STRL_OK;
 }
@@ -80,24 +83,27 @@ static bool is_degenerate(const strl_pm *pm, const uint32_t c[3])
     return same_position(pm, c[0], c[1]) || same_position(pm, c[1], c[2]) || same_position(pm, c[2], c[0]);
 }
 
-/* Walks a triangle born in state s from the finest state back to its birth. Vertices are numbered in the order of steps, so
- * the largest corner is the next one that a coarser state resolves to its parent. */
+/* Walks a triangle born in state s from the finest state back to its birth. Vertices are numbered in the order of
+ * steps, so the largest corner is the next one that a coarser state resolves to its parent. */
 static strl_status check_triangle(const strl_pm *pm, uint32_t t, uint32_t s, uint64_t *moves, strl_error *err)
 {
     uint32_t c[3] = {pm->triangle[t][0], pm->triangle[t][1], pm->triangle[t][2]};
     if (c[0] >= pm->vertex_count || c[1] >= pm->vertex_count || c[2] >= pm->vertex_count)
-        return strl__fail(err, STRL_ERR_FORMAT, "triangle %" PRIu32 " names vertices %" PRIu32 " %" PRIu32 " %" PRIu32 " of %"
-                          PRIu32, t, c[0], c[1], c[2], pm->vertex_count);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "triangle %" PRIu32 " names vertices %" PRIu32 " %" PRIu32 " %" PRIu32 " of %" PRIu32, t,
+                          c[0], c[1], c[2], pm->vertex_count);
     for (;;) {
         if (is_degenerate(pm, c))
-            return strl__fail(err, STRL_ERR_FORMAT, "triangle %" PRIu32 " has two corners at one position in some state: vertices %"
-                              PRIu32 " %" PRIu32 " %" PRIu32, t, c[0], c[1], c[2]);
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "triangle %" PRIu32 " has two corners at one position in some state: vertices %" PRIu32
+                              " %" PRIu32 " %" PRIu32,
+                              t, c[0], c[1], c[2]);
         uint32_t *latest = c[0] > c[1] ? &c[0] : &c[1];
         latest = c[2] > *latest ? &c[2] : latest;
         if (*latest < pm->vertex_end[s]) {
             if (s && *latest < pm->vertex_end[s - 1])
-                return strl__fail(err, STRL_ERR_FORMAT, "triangle %" PRIu32 " of step %" PRIu32 " holds no vertex of that step", t,
-                                  s);
+                return strl__fail(err, STRL_ERR_FORMAT,
+                                  "triangle %" PRIu32 " of step %" PRIu32 " holds no vertex of that step", t, s);
             return STRL_OK;
         }
         *latest = pm->parent[*latest];

@@ -129,7 +129,10 @@ static size_t assert_round_trip(const strl_pm *pm)
 }
 
 /* ---- meshes ---- */
-static struct test_mesh hills(strl_arena *arena) { return test_mesh_hills(17, 14, 200, 0.4, 5, arena); }
+static struct test_mesh hills(strl_arena *arena)
+{
+    return test_mesh_hills(17, 14, 200, 0.4, 5, arena);
+}
 
 /* A torus of lattice positions; a sphere is one whose inner radius is nothing but the poles' rows, see below. */
 static struct test_mesh torus(strl_arena *arena)
@@ -174,7 +177,8 @@ static struct test_mesh sphere(strl_arena *arena)
     return mesh;
 }
 
-/* Hills cut along two lines that cross: vertices there exist two or four times, with colours and palette entries of their own. */
+/* Hills cut along two lines that cross: vertices there exist two or four times, with colours and palette entries of
+ * their own. */
 static struct test_mesh seams(strl_arena *arena)
 {
     struct test_mesh plain = hills(arena), mesh = test_mesh_make(plain.vertex_count * 4, plain.triangle_count, arena);
@@ -211,7 +215,8 @@ static struct test_mesh fins(strl_arena *arena)
     struct test_mesh mesh = test_mesh_make(LONG + SHEETS * LONG * WIDE, 2 * SHEETS * (LONG - 1) * WIDE, arena);
     uint32_t t = 0;
     for (uint32_t v = 0; v < mesh.vertex_count; v++) {
-        uint32_t along = v % LONG, sheet = v < LONG ? 0 : (v / LONG - 1) / WIDE, out = v < LONG ? 0 : (v / LONG - 1) % WIDE + 1;
+        uint32_t along = v % LONG, sheet = v < LONG ? 0 : (v / LONG - 1) / WIDE,
+                 out = v < LONG ? 0 : (v / LONG - 1) % WIDE + 1;
         mesh.position[v][0] = (int32_t)(along * 1000);
         mesh.position[v][1] = (int32_t)lrint(out * 800 * cos(sheet * 1.2566));
         mesh.position[v][2] = (int32_t)lrint(out * 800 * sin(sheet * 1.2566));
@@ -219,7 +224,8 @@ static struct test_mesh fins(strl_arena *arena)
     for (uint32_t sheet = 0; sheet < SHEETS; sheet++)
         for (uint32_t out = 0; out < WIDE; out++)
             for (uint32_t i = 0; i + 1 < LONG; i++) {
-                uint16_t a = (uint16_t)(i + (out ? LONG * (sheet * WIDE + out) : 0)), b = (uint16_t)(i + LONG * (sheet * WIDE + out + 1));
+                uint16_t a = (uint16_t)(i + (out ? LONG * (sheet * WIDE + out) : 0)),
+                         b = (uint16_t)(i + LONG * (sheet * WIDE + out + 1));
                 uint16_t c = (uint16_t)(a + 1), d = (uint16_t)(b + 1);
                 bool turned = sheet > 2;
                 memcpy(mesh.triangle[t++], (uint16_t[3]){a, turned ? c : b, turned ? b : c}, 6);
@@ -313,13 +319,23 @@ static void the_smallest_meshes_come_back(void **state)
 {
     (void)state;
     int32_t position[4][3] = {{INT32_MIN, 0, 0}, {INT32_MAX, INT32_MIN, 5}, {0, INT32_MAX, INT32_MIN}, {1, 2, 3}};
-    uint16_t normal[4][2] = {{0, 0}, {1023, 1023}, {0, 1023}, {512, 511}}, parent[4] = {0}, triangle[1][3] = {{0, 1, 2}};
+    uint16_t normal[4][2] = {{0, 0}, {1023, 1023}, {0, 1023}, {512, 511}}, parent[4] = {0},
+             triangle[1][3] = {{0, 1, 2}};
     uint32_t vertex_end[2] = {3, 4}, triangle_end[2] = {1, 1}, colour[4] = {1, 0xffffffffu, 0x80ff0001u, 3};
     float geometric[2] = {0x1p64f, 0}, appearance[2] = {0x1p-140f, 0};
     strl_palette_entry palette = {UINT32_MAX, 0, 0x80000000u};
-    strl_pm pm = {.vertex_count = 3, .triangle_count = 1, .palette_count = 1, .position = position, .normal = normal,
-                  .parent = parent, .triangle = triangle, .vertex_end = vertex_end, .triangle_end = triangle_end,
-                  .geometric_error = geometric, .appearance_error = appearance, .palette = &palette};
+    strl_pm pm = {.vertex_count = 3,
+                  .triangle_count = 1,
+                  .palette_count = 1,
+                  .position = position,
+                  .normal = normal,
+                  .parent = parent,
+                  .triangle = triangle,
+                  .vertex_end = vertex_end,
+                  .triangle_end = triangle_end,
+                  .geometric_error = geometric,
+                  .appearance_error = appearance,
+                  .palette = &palette};
     assert_round_trip(&pm); /* one triangle, no step */
     pm.vertex_count = 4;
     pm.step_count = 1;
@@ -502,13 +518,13 @@ static void the_checker_finds_what_is_broken(void **state)
     test_pm_make(&mesh, &(struct test_pm_desc){.keep = 60, .seed = 3}, &arena, &pm);
     assert_int_equal(strl_pm_check(&pm, &err), STRL_OK);
     uint32_t last = pm.vertex_count - 1, steps = pm.step_count;
-#define BREAK(place, wrong)                                    \
-    do {                                                       \
-        __typeof__(place) kept = place;                        \
-        place = wrong;                                         \
-        assert_int_not_equal(strl_pm_check(&pm, &err), STRL_OK); \
-        assert_true(err.message[0]);                           \
-        place = kept;                                          \
+#define BREAK(place, wrong)                                                                                            \
+    do {                                                                                                               \
+        __typeof__(place) kept = place;                                                                                \
+        place = wrong;                                                                                                 \
+        assert_int_not_equal(strl_pm_check(&pm, &err), STRL_OK);                                                       \
+        assert_true(err.message[0]);                                                                                   \
+        place = kept;                                                                                                  \
     } while (0)
     BREAK(pm.vertex_count, 65536);
     BREAK(pm.palette_count, 0);

@@ -1,5 +1,5 @@
-/* Progressive meshes for tests and benchmarks of the payload codec: a mesh and half-edge collapses on it, random ones or ones
- * that keep the shape. Not a simplifier for users: no quadrics, no limits. */
+/* Progressive meshes for tests and benchmarks of the payload codec: a mesh and half-edge collapses on it, random ones
+ * or ones that keep the shape. Not a simplifier for users: no quadrics, no limits. */
 #ifndef STRL_TESTS_GEOMETRY_TEST_PM_H
 #define STRL_TESTS_GEOMETRY_TEST_PM_H
 
@@ -32,9 +32,15 @@ struct test_pm_desc {
     unsigned virtual_percent; /* collapses onto any vertex, not a neighbour */
 };
 
-static inline uint64_t test_random(uint64_t *state) { return strl__mix64(*state += 0x9e3779b97f4a7c15u); }
+static inline uint64_t test_random(uint64_t *state)
+{
+    return strl__mix64(*state += 0x9e3779b97f4a7c15u);
+}
 
-static inline uint32_t test_below(uint64_t *state, uint32_t bound) { return (uint32_t)((test_random(state) >> 32) * bound >> 32); }
+static inline uint32_t test_below(uint64_t *state, uint32_t bound)
+{
+    return (uint32_t)((test_random(state) >> 32) * bound >> 32);
+}
 
 struct test_collapse {
     uint32_t group, target;
@@ -161,8 +167,8 @@ static inline void test_normal(const int32_t p[3], const int32_t q[3], const int
         n[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
 }
 
-/* What collapsing group v onto u costs: the largest distance of u from the planes of v's triangles and a little of the length;
- * infinite where a triangle turns over or the link condition fails. */
+/* What collapsing group v onto u costs: the largest distance of u from the planes of v's triangles and a little of the
+ * length; infinite where a triangle turns over or the link condition fails. */
 static inline double test_cost(const struct test_simplifier *s, uint32_t v, uint32_t u)
 {
     const int32_t(*position)[3] = (const int32_t(*)[3])s->mesh->position;
@@ -173,7 +179,8 @@ static inline double test_cost(const struct test_simplifier *s, uint32_t v, uint
     for (uint32_t c = s->corner_head[v]; c != UINT32_MAX; c = s->corner_next[c]) {
         if (!test_corner_at(s, c, v))
             continue;
-        const int32_t *q = position[s->corner[c / 3][(c % 3 + 1) % 3]], *r = position[s->corner[c / 3][(c % 3 + 2) % 3]];
+        const int32_t *q = position[s->corner[c / 3][(c % 3 + 1) % 3]],
+                      *r = position[s->corner[c / 3][(c % 3 + 2) % 3]];
         double before[3], after[3], dot = 0, offset = 0, size = 0, size_after = 0;
         test_normal(pv, q, r, before);
         test_normal(pu, q, r, after);
@@ -282,7 +289,8 @@ static inline void test_random_collapses(struct test_simplifier *s, const struct
     }
 }
 
-static inline void test_fill_attributes(const struct test_mesh *mesh, const uint32_t *old_vertex, strl_pm *pm, strl_arena *arena)
+static inline void test_fill_attributes(const struct test_mesh *mesh, const uint32_t *old_vertex, strl_pm *pm,
+                                        strl_arena *arena)
 {
     pm->position = strl_arena_alloc(arena, pm->vertex_count, 12);
     pm->normal = strl_arena_alloc(arena, pm->vertex_count, 4);
@@ -314,7 +322,8 @@ static inline void test_record(const struct test_simplifier *s, strl_pm *pm, str
     pm->triangle_end = strl_arena_alloc(arena, steps + 1, 4);
     pm->geometric_error = strl_arena_alloc(arena, steps + 1, 4);
     pm->appearance_error = strl_arena_alloc(arena, steps + 1, 4);
-    uint32_t *number = strl_arena_alloc(arena, pm->vertex_count, 4), *old_vertex = strl_arena_alloc(arena, pm->vertex_count, 4);
+    uint32_t *number = strl_arena_alloc(arena, pm->vertex_count, 4),
+             *old_vertex = strl_arena_alloc(arena, pm->vertex_count, 4);
     uint32_t *old_triangle = strl_arena_alloc(arena, pm->triangle_count, 4);
     for (uint32_t v = 0; v < pm->vertex_count; v++)
         if (!s->dead_group[s->group[v]])
@@ -348,7 +357,8 @@ static inline void test_record(const struct test_simplifier *s, strl_pm *pm, str
     test_fill_attributes(mesh, old_vertex, pm, arena);
 }
 
-static inline void test_pm_make(const struct test_mesh *mesh, const struct test_pm_desc *desc, strl_arena *arena, strl_pm *pm)
+static inline void test_pm_make(const struct test_mesh *mesh, const struct test_pm_desc *desc, strl_arena *arena,
+                                strl_pm *pm)
 {
     struct test_simplifier s = test_simplifier_make(mesh, arena);
     struct test_pm_desc plan = *desc;
@@ -392,7 +402,8 @@ static inline void test_mesh_normals(struct test_mesh *mesh)
 }
 
 /* A grid of columns x rows vertices; closed round where wrapped (the last column or row joins the first). */
-static inline struct test_mesh test_mesh_grid(uint32_t columns, uint32_t rows, bool wrap_x, bool wrap_y, strl_arena *arena)
+static inline struct test_mesh test_mesh_grid(uint32_t columns, uint32_t rows, bool wrap_x, bool wrap_y,
+                                              strl_arena *arena)
 {
     uint32_t across = columns - !wrap_x, down = rows - !wrap_y, t = 0;
     struct test_mesh mesh = test_mesh_make(columns * rows, 2 * across * down, arena);
@@ -408,8 +419,8 @@ static inline struct test_mesh test_mesh_grid(uint32_t columns, uint32_t rows, b
 }
 
 /* Hills on a grid with `spacing` lattice units between vertices, and as much noise as `rough` (0..1) of the spacing. */
-static inline struct test_mesh test_mesh_hills(uint32_t columns, uint32_t rows, double spacing, double rough, uint64_t seed,
-                                               strl_arena *arena)
+static inline struct test_mesh test_mesh_hills(uint32_t columns, uint32_t rows, double spacing, double rough,
+                                               uint64_t seed, strl_arena *arena)
 {
     struct test_mesh mesh = test_mesh_grid(columns, rows, false, false, arena);
     for (uint32_t v = 0; v < mesh.vertex_count; v++) {
@@ -418,7 +429,8 @@ static inline struct test_mesh test_mesh_hills(uint32_t columns, uint32_t rows, 
             noise[k] = rough * ((double)test_below(&seed, 1u << 20) / (1u << 20) - 0.5);
         mesh.position[v][0] = (int32_t)lrint(spacing * (x + noise[0]));
         mesh.position[v][1] = (int32_t)lrint(spacing * (y + noise[1]));
-        mesh.position[v][2] = (int32_t)lrint(spacing * (6 * sin(x * 0.13) * cos(y * 0.11) + 1.5 * sin(x * 0.7 + y * 0.4) + noise[2]));
+        mesh.position[v][2] =
+            (int32_t)lrint(spacing * (6 * sin(x * 0.13) * cos(y * 0.11) + 1.5 * sin(x * 0.7 + y * 0.4) + noise[2]));
     }
     test_mesh_normals(&mesh);
     return mesh;
