@@ -5,6 +5,7 @@
 #include <stdint.h>
 #include <cmocka.h>
 
+#include "render/glcommon/context.h"
 #include "render/patches.h"
 #include "stroll/render.h"
 
@@ -160,7 +161,6 @@ static void cells_far_beyond_32_bits_draw_like_cells_near_zero(void **state)
         strl_camera distant = camera;
         distant.eye[2] += 6e6;
         distant.fov_y_deg = 0.001;
-        near.stats.items = 0;
         strl_draw_list list = at_zero.list;
         list.far_distance = 1e8;
         shoot_once((strl_renderer_desc){.backend = backend}, &distant, &list, NULL, &near);
@@ -416,6 +416,32 @@ static void an_image_drawn_in_parts_is_the_whole_image(void **state)
     patches_deinit(&all);
 }
 
+static void a_renderer_draws_with_the_context_its_caller_made_and_resizes(void **state)
+{
+    (void)state;
+    static picture own, borrowed;
+    patches all;
+    patches_init(&all, (patches_desc){.side = 3});
+    strl_camera camera = patches_camera(&all, WIDTH, HEIGHT, 0.25), small = patches_camera(&all, 40, 30, 0.25);
+    const strl_gl_context_desc wanted[] = {{.major = 4, .minor = 5}, {.major = 3, .minor = 3}, {.gles = true, .major = 3}};
+    const strl_backend backends[] = {STRL_BACKEND_GL45, STRL_BACKEND_GL3, STRL_BACKEND_GL3};
+    shoot_once((strl_renderer_desc){.backend = STRL_BACKEND_GL45}, &camera, &all.list, NULL, &own);
+    for (int c = 0; c < 3; c++) {
+        strl_gl_context *context = NULL;
+        assert_int_equal(strl__gl_context_create(&wanted[c], &context, NULL), STRL_OK);
+        strl_renderer *renderer = make((strl_renderer_desc){.backend = backends[c], .current_context = true});
+        assert_int_equal(strl_renderer_resize(renderer, 40, 30, NULL), STRL_OK);
+        assert_int_equal(strl_renderer_draw(renderer, &small, &all.list, NULL, NULL, NULL), STRL_OK);
+        assert_int_equal(strl_renderer_resize(renderer, WIDTH, HEIGHT, NULL), STRL_OK);
+        assert_int_equal(strl_renderer_read_colour(renderer, borrowed.rgba[0], NULL), STRL_ERR_ARGUMENT);
+        shoot(renderer, &camera, &all.list, NULL, &borrowed);
+        assert_int_equal(count_different(&own, &borrowed, 2), 0);
+        strl_renderer_destroy(renderer);
+        strl__gl_context_destroy(context);
+    }
+    patches_deinit(&all);
+}
+
 static void a_wrong_call_is_refused_with_a_sentence(void **state)
 {
     (void)state;
@@ -455,6 +481,7 @@ int main(void)
         cmocka_unit_test(float_positions_draw_like_lattice_positions),
         cmocka_unit_test(a_placement_moves_the_model_and_not_its_look),
         cmocka_unit_test(an_image_drawn_in_parts_is_the_whole_image),
+        cmocka_unit_test(a_renderer_draws_with_the_context_its_caller_made_and_resizes),
         cmocka_unit_test(a_wrong_call_is_refused_with_a_sentence),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
