@@ -1,5 +1,17 @@
 #include "geometry/mesh.h"
 
+#include <math.h>
+
+float strl_drift_length(const strl_drift *drift)
+{
+    float sum = 0;
+    for (int k = 0; k < 3; k++) {
+        float far = -drift->least[k] > drift->most[k] ? -drift->least[k] : drift->most[k];
+        sum += far * far;
+    }
+    return sqrtf(sum) * (1 + 1e-6f); /* whatever the rounding, the length is a bound */
+}
+
 bool strl_mesh_create(strl_mesh *mesh, uint32_t points, uint32_t wedges, uint32_t triangles, strl_arena *arena)
 {
     *mesh = (strl_mesh){.point_count = points, .wedge_count = wedges, .triangle_count = triangles};
@@ -7,9 +19,9 @@ bool strl_mesh_create(strl_mesh *mesh, uint32_t points, uint32_t wedges, uint32_
     mesh->flags = strl_arena_alloc_zero(arena, points, sizeof *mesh->flags);
     mesh->wedge = strl_arena_alloc(arena, wedges, sizeof *mesh->wedge);
     mesh->triangle = strl_arena_alloc(arena, triangles, sizeof *mesh->triangle);
-    mesh->error = strl_arena_alloc(arena, triangles, sizeof *mesh->error);
+    mesh->drift = strl_arena_alloc(arena, triangles, sizeof *mesh->drift);
     mesh->deviation = strl_arena_alloc(arena, triangles, sizeof *mesh->deviation);
     mesh->shift = strl_arena_alloc(arena, triangles, sizeof *mesh->shift);
-    return mesh->position && mesh->flags && mesh->wedge && mesh->triangle && mesh->error && mesh->deviation &&
+    return mesh->position && mesh->flags && mesh->wedge && mesh->triangle && mesh->drift && mesh->deviation &&
            mesh->shift;
 }

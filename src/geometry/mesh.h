@@ -16,6 +16,15 @@ typedef struct strl_wedge {
     uint32_t palette;   /* opaque: wedges of different palette are never merged into one */
 } strl_wedge;
 
+/* Where the points of a piece of surface have gone since the start: every way from a point to its image lies in this box.
+ * Boxes of successive moves add up, so moves to and fro do not count twice as they would as lengths. Lattice units. */
+typedef struct strl_drift {
+    float least[3], most[3]; /* least <= 0 <= most */
+} strl_drift;
+
+/* The longest way in the box. */
+float strl_drift_length(const strl_drift *drift);
+
 /* Point flags. */
 #define STRL_POINT_KEPT 1u    /* must not be removed: another node has it too, or the caller says so */
 #define STRL_POINT_OUTSIDE 2u /* known to nodes outside the piece: it must not get into parts that do not have it yet */
@@ -27,7 +36,8 @@ typedef struct strl_mesh {
     uint8_t *holders;        /* [point_count] a bit for each part of the piece that has the point; NULL = one part */
     strl_wedge *wedge;       /* [wedge_count] */
     uint32_t (*triangle)[3]; /* [triangle_count] wedges, counter-clockwise; three different points */
-    float *error;            /* [triangle_count] bound of the distance that this piece of surface has moved so far, lattice units */
+    strl_drift *drift;       /* [triangle_count] of this piece of surface */
+    float start_error;       /* lattice units: distance of the start from the input, to be added to every drift */
     float *deviation;        /* [triangle_count] how much its attributes have changed so far, 0..1 */
     float *shift;            /* [triangle_count] appearance error so far, lattice units */
 } strl_mesh;

@@ -132,7 +132,7 @@ static void fill_errors(strl_pm *pm, const strl_mesh *mesh, const strl_simplifie
 {
     float geometric = 0, appearance = 0;
     for (uint32_t t = 0; t < mesh->triangle_count; t++) {
-        geometric = fmaxf(geometric, mesh->error[t]);
+        geometric = fmaxf(geometric, strl_drift_length(&mesh->drift[t]) + mesh->start_error);
         appearance = fmaxf(appearance, mesh->shift[t]);
     }
     pm->geometric_error[pm->step_count] = geometric;
@@ -189,6 +189,7 @@ strl_status strl_mesh_after(const strl_mesh *mesh, const strl_simplified *simpli
     renumber(mesh, simplified, points, wedges, &counts);
     if (!strl_mesh_create(base, counts.point_count, counts.wedge_count, counts.triangle_count, arena))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a mesh of %u triangles", counts.triangle_count);
+    base->start_error = mesh->start_error;
     for (uint32_t p = 0; p < mesh->point_count; p++)
         if (points[p] != NO_INDEX) {
             memcpy(base->position[points[p]], mesh->position[p], sizeof *base->position);
@@ -205,7 +206,7 @@ strl_status strl_mesh_after(const strl_mesh *mesh, const strl_simplified *simpli
             continue;
         for (int c = 0; c < 3; c++)
             base->triangle[to][c] = wedges[simplified->corner[t][c]];
-        base->error[to] = simplified->error[t];
+        base->drift[to] = simplified->drift[t];
         base->deviation[to] = simplified->deviation[t];
         base->shift[to++] = simplified->shift[t];
     }

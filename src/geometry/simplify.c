@@ -159,10 +159,10 @@ static bool allocate_result(simplifier *s, strl_simplified *result, strl_arena *
     result->wedge_parent = strl_arena_alloc(arena, mesh->wedge_count, sizeof *result->wedge_parent);
     result->removed_at = strl_arena_alloc(arena, triangles, sizeof *result->removed_at);
     result->corner = s->corner = strl_arena_alloc(arena, triangles, sizeof *s->corner);
-    result->error = s->error = strl_arena_alloc(arena, triangles, sizeof *s->error);
+    result->drift = s->drift = strl_arena_alloc(arena, triangles, sizeof *s->drift);
     result->deviation = s->deviation = strl_arena_alloc(arena, triangles, sizeof *s->deviation);
     result->shift = s->shift = strl_arena_alloc(arena, triangles, sizeof *s->shift);
-    return result->collapses && result->wedge_parent && result->removed_at && s->corner && s->error && s->deviation &&
+    return result->collapses && result->wedge_parent && result->removed_at && s->corner && s->drift && s->deviation &&
            s->shift;
 }
 
@@ -193,11 +193,11 @@ static void load(simplifier *s, strl_simplified *result)
                 s->corner_next[s->tail[p]] = corner;
             s->tail[p] = corner;
         }
-        s->error[t] = mesh->error[t];
+        s->drift[t] = mesh->drift[t];
         s->deviation[t] = mesh->deviation[t];
         s->shift[t] = mesh->shift[t];
         result->removed_at[t] = UINT32_MAX;
-        result->geometric = strl__larger(result->geometric, mesh->error[t]);
+        result->geometric = strl__larger(result->geometric, strl_drift_length(&mesh->drift[t]) + mesh->start_error);
         result->appearance = strl__larger(result->appearance, mesh->shift[t]);
     }
     s->triangles_left = mesh->triangle_count;
@@ -225,6 +225,10 @@ static void map_wedges(simplifier *s, const strl_star *star, uint32_t to, strl_s
 void strl__apply_collapse(simplifier *s, const strl_star *star, const collapse_plan *plan, strl_simplified *result)
 {
     uint32_t u = star->point, v = plan->to;
+    strl_drift drift[STAR_MAX];
+    uint32_t image;
+    double weights[3];
+    strl__collapse_drift(s, star, v, drift, &image, weights);
     map_wedges(s, star, v, result);
     for (uint32_t i = 0; i < star->count; i++) {
         uint32_t t = star->triangle[i];
@@ -235,7 +239,7 @@ void strl__apply_collapse(simplifier *s, const strl_star *star, const collapse_p
             continue;
         }
         s->corner[t][star->corner[i]] = result->wedge_parent[s->corner[t][star->corner[i]]];
-        s->error[t] = plan->geometric;
+        s->drift[t] = drift[i];
         s->deviation[t] = plan->deviation;
         s->shift[t] = plan->shift;
     }

@@ -3,9 +3,9 @@
  *
  * Every collapse u -> v carries a local bound of the two-sided distance between the patch before and after. Where both
  * patches are height fields over one polygon along the patch's normal, the bound is their largest difference in height, which
- * is attained at u or where an old spoke crosses a new one; everywhere, |u - v| is a bound too, because moving u linearly
- * onto v maps the old patch onto the new one. A triangle's error is the largest error of the triangles it replaces plus the bound,
- * so it bounds the distance to the surface that the errors at the start referred to. */
+ * is attained at u or where an old spoke crosses a new one; everywhere, the way from u to v is a bound too, because moving u
+ * linearly onto v maps the old patch onto the new one. These maps are chained: a triangle's drift is the box that holds the
+ * drifts of the triangles it overlaps, plus its own move, so its length bounds the distance to the start. */
 #ifndef STRL_GEOMETRY_SIMPLIFY_H
 #define STRL_GEOMETRY_SIMPLIFY_H
 
@@ -44,7 +44,8 @@ typedef struct strl_simplified {
     uint32_t *wedge_parent;      /* [wedge_count] the wedge that a removed one fell onto; itself where it was kept */
     uint32_t *removed_at;        /* [triangle_count] index of the collapse that removed it; UINT32_MAX = still there */
     uint32_t (*corner)[3];       /* [triangle_count] current wedges of the triangles still there */
-    float *error, *deviation, *shift; /* [triangle_count] of the triangles still there, as in strl_mesh */
+    strl_drift *drift;           /* [triangle_count] of the triangles still there, as in strl_mesh */
+    float *deviation, *shift;    /* the same */
     uint32_t triangles_left;
     float geometric, appearance; /* largest over the triangles, at the end; at the start where nothing collapsed */
     strl_simplify_rung rung;     /* the furthest rung a collapse needed */

@@ -26,7 +26,8 @@ typedef struct polygon {
     uint32_t v_at;               /* index of v in the polygon */
     flat x[STAR_MAX + 1];
     flat u;                      /* u, or its nearest point on the new boundary edge */
-    double moved;                /* |u - that point|; 0 for a closed fan */
+    double moved[3];             /* from u to that point; 0 for a closed fan */
+    double normal[3];            /* unit */
 } polygon;
 
 static bool frame_of(const simplifier *s, const uint32_t *ring, uint32_t count, const double *v,
@@ -87,16 +88,20 @@ static bool build_patch(const simplifier *s, const strl_star *star, uint32_t to,
     double axis[3][3], on_edge[3] = {u[0], u[1], u[2]};
     if (!frame_of(s, ring, count, v, axis))
         return false;
-    patch->moved = 0;
+    for (int i = 0; i < 3; i++) {
+        patch->moved[i] = 0;
+        patch->normal[i] = axis[2][i];
+    }
     if (!star->closed) { /* u slides to the new boundary edge first */
         const double *a = s->position[ring[patch->v_at == 0 ? count - 1 : 0]];
         double d[3] = {a[0] - v[0], a[1] - v[1], a[2] - v[2]};
         double along = ((u[0] - v[0]) * d[0] + (u[1] - v[1]) * d[1] + (u[2] - v[2]) * d[2]) /
                        (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
         along = along < 0 ? 0 : along > 1 ? 1 : along;
-        for (int i = 0; i < 3; i++)
+        for (int i = 0; i < 3; i++) {
             on_edge[i] = v[i] + along * d[i];
-        patch->moved = distance(u, on_edge);
+            patch->moved[i] = on_edge[i] - u[i];
+        }
     }
     for (uint32_t i = 0; i < count; i++)
         patch->x[i] = flatten(s->position[ring[i]], v, axis);
@@ -133,55 +138,71 @@ static double height_in(const flat *a, const flat *b, double s, double t, double
     return weights[1] * a->h + weights[2] * b->h;
 }
 
-/* Height difference at u; image: fan index of the triangle that holds it. */
-static double gap_at_u(const polygon *patch, uint32_t last, uint32_t *image, double weights[3])
+/* How far the new surface lies above the old one, per new triangle (by fan index); 0 is always among the values, because the
+ * patches agree on the rim. */
+typedef struct gap_range {
+    double least[STAR_MAX], most[STAR_MAX];
+} gap_range;
+
+static void note_gap(gap_range *gaps, uint32_t triangle, double gap)
+{
+    if (gap < gaps->least[triangle])
+        gaps->least[triangle] = gap;
+    if (gap > gaps->most[triangle])
+        gaps->most[triangle] = gap;
+}
+
+/* Notes the gap at u and returns the fan index of the new triangle that holds it; NO_INDEX where there is none. */
+static uint32_t note_gap_at_u(const polygon *patch, uint32_t last, gap_range *gaps, double weights[3])
 {
     double best = -INFINITY, gap = 0;
+    uint32_t image = NO_INDEX;
     for (uint32_t i = 0; i < last; i++) {
         uint32_t j = i + 1 == patch->count ? 0 : i + 1;
         if (i == patch->v_at || j == patch->v_at)
             continue;
         double w[3];
         double height = height_in(&patch->x[i], &patch->x[j], patch->u.s, patch->u.t, w);
-        double inside = fmin(w[0], fmin(w[1], w[2])); /* the triangle that u is most inside of; rounding may put it outside of all */
-        if (inside > best) {
+        double inside = w[1] < w[2] ? w[1] : w[2];
+        inside = w[0] < inside ? w[0] : inside;
+        if (inside > best) { /* the triangle that u is most inside of; rounding may put it outside of all */
             best = inside;
-            gap = fabs(height - patch->u.h);
-            *image = i;
+            gap = height - patch->u.h;
+            image = i;
             for (int k = 0; k < 3; k++)
                 weights[k] = w[k];
         }
     }
-    return gap;
+    if (image != NO_INDEX)
+        note_gap(gaps, image, gap);
+    return image;
 }
 
-/* Largest height difference where an old spoke u-x[i] crosses a new one v-x[j]. */
-static double gap_at_crossings(const polygon *patch)
+/* Notes the gaps where old spokes u-x[i] cross new ones v-x[j], for the triangles on both sides of the new spoke. */
+static void note_gaps_at_crossings(const polygon *patch, gap_range *gaps)
 {
-    double gap = 0;
     uint32_t n = patch->count;
     for (uint32_t j = 0; j < n; j++) {
-        if (j == patch->v_at || (j + 1) % n == patch->v_at || (patch->v_at + 1) % n == j)
+        uint32_t after = j + 1 == n ? 0 : j + 1, before = j == 0 ? n - 1 : j - 1;
+        if (j == patch->v_at || after == patch->v_at || before == patch->v_at)
             continue;
         const flat *d = &patch->x[j];
-        double side_u = cross2(d->s, d->t, patch->u.s, patch->u.t);
+        double side_u = cross2(d->s, d->t, patch->u.s, patch->u.t), length2 = d->s * d->s + d->t * d->t;
         for (uint32_t i = 0; i < n; i++) {
-            if (i == j || i == patch->v_at)
-                continue;
             const flat *x = &patch->x[i];
             double side_x = cross2(d->s, d->t, x->s, x->t);
-            if ((side_u > 0) == (side_x > 0) || side_u == side_x)
+            if (i == j || i == patch->v_at || (side_u > 0) == (side_x > 0) || side_u == side_x)
                 continue;
             double along = side_u / (side_u - side_x); /* on the old spoke, from u */
             double s = patch->u.s + along * (x->s - patch->u.s), t = patch->u.t + along * (x->t - patch->u.t);
-            double on_new = (s * d->s + t * d->t) / (d->s * d->s + d->t * d->t);
+            double on_new = (s * d->s + t * d->t) / length2;
             if (on_new < 0 || on_new > 1)
                 continue;
-            double difference = fabs(patch->u.h + along * (x->h - patch->u.h) - on_new * d->h);
-            gap = fmax(gap, difference);
+            double gap = on_new * d->h - (patch->u.h + along * (x->h - patch->u.h));
+            note_gap(gaps, j, gap);
+            note_gap(gaps, before, gap);
         }
     }
-    return gap;
 }
 
 /* A vanishing triangle (u, v, x) falls onto the edge v-x. Where no other triangle keeps that edge, its points are
@@ -213,24 +234,101 @@ static double lost_edge_length(const simplifier *s, const strl_star *star, uint3
     return most;
 }
 
-double strl__collapse_bound(const simplifier *s, const strl_star *star, uint32_t to, uint32_t *image, double weights[3])
+static void unite(strl_drift *drift, const strl_drift *other)
 {
-    double straight = distance(s->position[star->point], s->position[to]);
+    for (int k = 0; k < 3; k++) {
+        drift->least[k] = other->least[k] < drift->least[k] ? other->least[k] : drift->least[k];
+        drift->most[k] = other->most[k] > drift->most[k] ? other->most[k] : drift->most[k];
+    }
+}
+
+/* Adds a move by t * way, t in [0, 1]; `more` in every direction. */
+static void add_way(strl_drift *drift, const double way[3], double more)
+{
+    for (int k = 0; k < 3; k++) {
+        drift->least[k] += (float)((way[k] < 0 ? way[k] : 0) - more);
+        drift->most[k] += (float)((way[k] > 0 ? way[k] : 0) + more);
+    }
+}
+
+/* Every point of the star goes towards v by a share of the way from u. */
+static void drift_straight(const simplifier *s, const strl_star *star, uint32_t to, double lost, strl_drift *drift)
+{
+    strl_drift all = {0};
+    double way[3];
+    for (int k = 0; k < 3; k++)
+        way[k] = s->position[to][k] - s->position[star->point][k];
+    for (uint32_t i = 0; i < star->count; i++)
+        unite(&all, &s->drift[star->triangle[i]]);
+    add_way(&all, way, lost);
+    for (uint32_t i = 0; i < star->count; i++)
+        drift[i] = all;
+}
+
+/* A new triangle overlaps the old triangles between v and itself on its side of u; the one that holds u may overlap all.
+ * (An old triangle whose base lies beyond a new spoke has its apex, u, on this side of it, or both on the other.) */
+static void drift_by_height(const simplifier *s, const strl_star *star, const polygon *patch, const gap_range *gaps,
+                            uint32_t fan_image, double lost, strl_drift *drift)
+{
+    uint32_t n = star->count, first = star->closed ? patch->v_at : 0;
+    uint32_t at_image = (fan_image + n - first) % n;
+    strl_drift all = {0};
+    for (int side = 0; side < 2; side++) {
+        strl_drift sum = {0};
+        for (uint32_t m = 0; m < n; m++) {
+            uint32_t from_v = side ? n - 1 - m : m, old = star->order[(first + from_v) % n];
+            unite(&sum, &s->drift[star->triangle[old]]);
+            if (from_v == at_image)
+                break;
+            drift[old] = sum;
+        }
+        unite(&all, &sum);
+    }
+    drift[star->order[fan_image]] = all;
+    for (uint32_t i = 0; i < n; i++) {
+        double low[3], high[3];
+        for (int k = 0; k < 3; k++) {
+            low[k] = gaps->least[i] * patch->normal[k];
+            high[k] = gaps->most[i] * patch->normal[k];
+        }
+        strl_drift *own = &drift[star->order[i]];
+        add_way(own, patch->moved, lost);
+        add_way(own, low, 0);
+        add_way(own, high, 0);
+    }
+}
+
+float strl__collapse_drift(const simplifier *s, const strl_star *star, uint32_t to, strl_drift drift[STAR_MAX],
+                           uint32_t *image, double weights[3])
+{
+    polygon patch;
+    gap_range gaps;
+    uint32_t fan_image = NO_INDEX;
     *image = NO_INDEX;
     weights[0] = 1, weights[1] = weights[2] = 0;
-    polygon patch;
-    if (!star->manifold || !build_patch(s, star, to, &patch))
-        return straight + lost_edge_length(s, star, to);
-    uint32_t last = star->closed ? patch.count : patch.count - 1;
-    uint32_t lost_from = star->closed ? 0 : 1; /* a manifold fan of two or more triangles keeps all its edges */
-    double lost = star->count <= 2 + lost_from ? lost_edge_length(s, star, to) : 0;
-    if (!is_height_field(&patch, star->closed))
-        return straight + lost;
-    uint32_t fan_index = NO_INDEX;
-    double gap = gap_at_u(&patch, last, &fan_index, weights);
-    if (fan_index == NO_INDEX)
-        return straight + lost;
-    *image = star->order[fan_index];
-    gap = fmax(gap, gap_at_crossings(&patch));
-    return fmin(straight, gap + patch.moved) + lost;
+    bool flat_enough = star->manifold && build_patch(s, star, to, &patch) && is_height_field(&patch, star->closed);
+    if (flat_enough) {
+        uint32_t last = star->closed ? patch.count : patch.count - 1;
+        for (uint32_t i = 0; i < last; i++)
+            gaps.least[i] = gaps.most[i] = 0;
+        fan_image = note_gap_at_u(&patch, last, &gaps, weights);
+        if (fan_image != NO_INDEX)
+            note_gaps_at_crossings(&patch, &gaps);
+    }
+    /* a manifold fan of more than two or three triangles keeps the edges of those that vanish */
+    bool keeps_edges = star->manifold && star->count > (star->closed ? 2u : 3u);
+    double lost = keeps_edges ? 0 : lost_edge_length(s, star, to);
+    if (fan_image == NO_INDEX) {
+        drift_straight(s, star, to, lost, drift);
+    } else {
+        *image = star->order[fan_image];
+        drift_by_height(s, star, &patch, &gaps, fan_image, lost, drift);
+    }
+    float longest = 0;
+    for (uint32_t i = 0; i < star->count; i++)
+        if (star->next[i] != to && star->previous[i] != to) {
+            float length = strl_drift_length(&drift[i]);
+            longest = length > longest ? length : longest;
+        }
+    return longest;
 }

@@ -189,12 +189,12 @@ void strl__plan_collapse(simplifier *s, const strl_star *star, uint32_t to, coll
 {
     uint32_t image;
     double weights[3];
-    double bound = strl__collapse_bound(s, star, to, &image, weights);
-    float error = 0, deviation = 0, shift = 0;
+    strl_drift drift[STAR_MAX];
+    float moved = strl__collapse_drift(s, star, to, drift, &image, weights);
+    float deviation = 0, shift = 0;
     double longest = 0;
     for (uint32_t i = 0; i < star->count; i++) {
         uint32_t t = star->triangle[i];
-        error = strl__larger(error, s->error[t]);
         deviation = strl__larger(deviation, s->deviation[t]);
         shift = strl__larger(shift, s->shift[t]);
     }
@@ -203,8 +203,7 @@ void strl__plan_collapse(simplifier *s, const strl_star *star, uint32_t to, coll
         longest += (u[i] - v[i]) * (u[i] - v[i]);
     float change = attribute_change(s, star, to, image, weights);
     plan->to = to;
-    plan->bound = nextafterf((float)bound, INFINITY);
-    plan->geometric = nextafterf(error + plan->bound, INFINITY);
+    plan->geometric = nextafterf(moved + s->mesh->start_error, INFINITY);
     plan->deviation = sqrtf(deviation * deviation + change * change);
     plan->shift = strl__larger(shift, (float)sqrt(longest) * fminf(1, plan->deviation));
     plan->key = strl__larger(plan->geometric, plan->shift);

@@ -31,8 +31,7 @@ typedef struct strl_star {
 /* What a collapse would do. */
 typedef struct collapse_plan {
     uint32_t to;
-    float bound;      /* distance moved, lattice units */
-    float geometric;  /* the error of the new patch */
+    float geometric;  /* the error of the new patch, lattice units */
     float deviation;  /* the same of attributes */
     float shift;      /* appearance error of the new patch */
     float key;
@@ -51,7 +50,8 @@ typedef struct simplifier {
     uint32_t *corner_next;  /* [3 * triangle_count] next corner at the same point */
     uint32_t *head, *tail;  /* per point, corners */
     bool *dead;             /* per triangle */
-    float *error, *deviation, *shift; /* per triangle */
+    strl_drift *drift;      /* per triangle */
+    float *deviation, *shift; /* per triangle */
     uint8_t *holders;       /* per point, a copy that follows the collapses; NULL where the mesh has none */
     uint32_t *stamp;        /* per point, against `tick` */
     uint32_t tick;
@@ -82,8 +82,10 @@ unsigned strl__star_uses(const strl_star *star, uint32_t point);
 /* The wedge of v that a wedge of u falls onto. *exact: a triangle of the edge says so; else it is the one of v's that looks most
  * like it, of the same palette where the rung does not allow others. NO_INDEX = none. */
 uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32_t to, uint32_t wedge, bool *exact);
-/* Bound of the two-sided distance between the patch before and after u -> v (never above |u - v| plus what lost edges cost).
- * *image: index in the star of the triangle whose image holds u's, weights of (v, next, previous) there; NO_INDEX = v itself. */
-double strl__collapse_bound(const simplifier *s, const strl_star *star, uint32_t to, uint32_t *image, double weights[3]);
+/* What u -> v does to the triangles that stay: drift[i] for triangle i of the star, untouched for those that vanish. *image:
+ * index in the star of the triangle whose image holds u's, weights of (v, next, previous) there; NO_INDEX = v itself. Returns the
+ * largest length, 0 where no triangle stays. */
+float strl__collapse_drift(const simplifier *s, const strl_star *star, uint32_t to, strl_drift drift[STAR_MAX],
+                           uint32_t *image, double weights[3]);
 
 #endif

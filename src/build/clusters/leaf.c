@@ -144,6 +144,7 @@ static strl_status weld(const strl_hierarchy *hierarchy, const strl_soup_triangl
     uint32_t *owner, *point_of;
     if (!strl_mesh_create(&soup.mesh, 3 * count, 3 * count, count, arena))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a cluster of %u triangles", count);
+    soup.mesh.start_error = hierarchy->ingest->leaf_error;
     for (int k = 0; k < 3; k++)
         soup.anchor[k] = triangles[0].corner[0].position[k];
     for (uint32_t t = 0; t < count; t++) {
@@ -156,7 +157,7 @@ static strl_status weld(const strl_hierarchy *hierarchy, const strl_soup_triangl
                                                .colour = corner->colour, .palette = triangles[t].palette};
             soup.mesh.triangle[t][c] = at;
         }
-        soup.mesh.error[t] = hierarchy->ingest->leaf_error;
+        soup.mesh.drift[t] = (strl_drift){0};
         soup.mesh.deviation[t] = soup.mesh.shift[t] = 0;
     }
     return strl_node_mesh_merge((const strl_node_mesh *const *)list, 1, arena, node, &owner, &point_of, err);

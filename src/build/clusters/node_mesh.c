@@ -19,7 +19,8 @@ void strl_node_mesh_write(const strl_node_mesh *node, strl_writer *writer)
     strl_writer_bytes(writer, mesh->position, mesh->point_count * sizeof *mesh->position);
     strl_writer_bytes(writer, mesh->wedge, mesh->wedge_count * sizeof *mesh->wedge);
     strl_writer_bytes(writer, mesh->triangle, mesh->triangle_count * sizeof *mesh->triangle);
-    strl_writer_bytes(writer, mesh->error, mesh->triangle_count * sizeof *mesh->error);
+    strl_writer_f32(writer, mesh->start_error);
+    strl_writer_bytes(writer, mesh->drift, mesh->triangle_count * sizeof *mesh->drift);
     strl_writer_bytes(writer, mesh->deviation, mesh->triangle_count * sizeof *mesh->deviation);
     strl_writer_bytes(writer, mesh->shift, mesh->triangle_count * sizeof *mesh->shift);
     if (node->share_first) {
@@ -51,7 +52,8 @@ strl_status strl_node_mesh_read(const void *data, size_t size, strl_arena *arena
                 copy_out(&cursor, mesh->position, points, sizeof *mesh->position) &&
                 copy_out(&cursor, mesh->wedge, wedges, sizeof *mesh->wedge) &&
                 copy_out(&cursor, mesh->triangle, triangles, sizeof *mesh->triangle) &&
-                copy_out(&cursor, mesh->error, triangles, sizeof *mesh->error) &&
+                copy_out(&cursor, &mesh->start_error, 1, sizeof mesh->start_error) &&
+                copy_out(&cursor, mesh->drift, triangles, sizeof *mesh->drift) &&
                 copy_out(&cursor, mesh->deviation, triangles, sizeof *mesh->deviation) &&
                 copy_out(&cursor, mesh->shift, triangles, sizeof *mesh->shift);
     if (good && shares != NO_INDEX) {
@@ -136,7 +138,7 @@ static bool merge_one(const strl_node_mesh *node, uint32_t which, strl_node_mesh
         uint32_t at = to->triangle_count++;
         for (int c = 0; c < 3; c++)
             to->triangle[at][c] = wedge_of[from->triangle[t][c]];
-        to->error[at] = from->error[t];
+        to->drift[at] = from->drift[t];
         to->deviation[at] = from->deviation[t];
         to->shift[at] = from->shift[t];
         owner[at] = which;
@@ -159,6 +161,7 @@ strl_status strl_node_mesh_merge(const strl_node_mesh *const *nodes, uint32_t co
     bool good = strl_mesh_create(&merged->mesh, points, wedges, triangles, arena) &&
                 table_create(&point_table, points, arena) && table_create(&wedge_table, wedges, arena);
     *owner = good ? strl_arena_alloc(arena, triangles, sizeof **owner) : NULL;
+    merged->mesh.start_error = nodes[0]->mesh.start_error;
     merged->mesh.point_count = merged->mesh.wedge_count = merged->mesh.triangle_count = 0;
     for (uint32_t i = 0; i < count && good && *owner; i++) {
         point_of[i] = strl_arena_alloc(arena, nodes[i]->mesh.point_count, sizeof **point_of);
@@ -187,6 +190,7 @@ strl_status strl_mesh_extract(const strl_mesh *mesh, const uint32_t *owner, uint
         triangles += owner[t] == which;
     if (!strl_mesh_create(part, points, wedges, triangles, arena))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a part of %u triangles", triangles);
+    part->start_error = mesh->start_error;
     for (uint32_t p = 0; p < mesh->point_count; p++)
         if (point_of[p] != NO_INDEX)
             memcpy(part->position[point_of[p]], mesh->position[p], sizeof *part->position);
@@ -201,7 +205,7 @@ strl_status strl_mesh_extract(const strl_mesh *mesh, const uint32_t *owner, uint
             continue;
         for (int c = 0; c < 3; c++)
             part->triangle[triangles][c] = wedge_of[mesh->triangle[t][c]];
-        part->error[triangles] = mesh->error[t];
+        part->drift[triangles] = mesh->drift[t];
         part->deviation[triangles] = mesh->deviation[t];
         part->shift[triangles++] = mesh->shift[t];
     }
