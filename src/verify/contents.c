@@ -50,11 +50,12 @@ static strl_status counts_agree(const strl__vnode *node, const strl__vmesh *mesh
     return STRL_OK;
 }
 
-static strl_status decode(const strl__vnode *node, const uint8_t *bytes, strl__worker *worker, strl__vmesh *mesh, strl_error *err)
+static strl_status decode(const strl__vnode *node, const uint8_t *bytes, bool with_looks, strl__worker *worker,
+                          strl__vmesh *mesh, strl_error *err)
 {
     rewind_arena(&worker->arena);
     rewind_arena(&worker->scratch);
-    strl_status status = strl__v_payload_decode(bytes, node->payload_bytes, &worker->arena, mesh, err);
+    strl_status status = strl__v_payload_decode(bytes, node->payload_bytes, &worker->arena, with_looks, mesh, err);
     if (status == STRL_OK)
         status = counts_agree(node, mesh, err);
     return status == STRL_OK ? strl__v_mesh_check_ranges(mesh, err) : status;
@@ -66,7 +67,7 @@ strl_status strl__v_load_mesh(strl__model *model, const strl__vtree *tree, uint3
     const strl__vnode *n = &tree->nodes[node];
     strl_status status = read_bytes(model, n->page.offset + n->payload_offset, n->payload_bytes, worker, err);
     if (status == STRL_OK)
-        status = decode(n, worker->bytes, worker, mesh, err);
+        status = decode(n, worker->bytes, false, worker, mesh, err);
     return status == STRL_OK ? STRL_OK : strl__fail_context(err, status, "tree %u node %u", tree->index, node);
 }
 
@@ -134,7 +135,7 @@ static strl_status check_node(contents *self, uint32_t id, const uint8_t *bytes,
 {
     strl__vmesh mesh;
     strl_error why = {0};
-    strl_status status = decode(&self->tree->nodes[id], bytes, worker, &mesh, &why);
+    strl_status status = decode(&self->tree->nodes[id], bytes, true, worker, &mesh, &why);
     if (status == STRL_OK)
         status = strl__v_mesh_check_states(&mesh, &worker->scratch, &why);
     strl__v_checked(self->model->checks, STRL_VERIFY_PAYLOADS, 1);

@@ -25,8 +25,10 @@ typedef struct strl__vmesh {
     uint32_t (*palette)[2];      /* [palette_count] part, material */
 } strl__vmesh;
 
-/* docs/format-payload.md. STRL_ERR_FORMAT with a sentence where the bytes are not a payload; the arrays live in arena. */
-strl_status strl__v_payload_decode(const uint8_t *data, size_t size, strl_arena *arena, strl__vmesh *mesh, strl_error *err);
+/* docs/format-payload.md. STRL_ERR_FORMAT with a sentence where the bytes are not a payload; the arrays live in arena. Without
+ * with_looks normals and colours are not decoded, and zero. */
+strl_status strl__v_payload_decode(const uint8_t *data, size_t size, strl_arena *arena, bool with_looks, strl__vmesh *mesh,
+                                   strl_error *err);
 
 /* Every rule of a progressive mesh; STRL_ERR_FORMAT with a sentence. What indexing relies on, then what states promise. */
 strl_status strl__v_mesh_check_ranges(const strl__vmesh *mesh, strl_error *err);
