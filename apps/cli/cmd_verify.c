@@ -25,8 +25,8 @@ static void print_checks(const strl_verify_report *report)
     for (unsigned kind = 0; kind < STRL_VERIFY_KINDS; kind++) {
         const strl_verify_check *check = &report->checks[kind];
         if (check->failures)
-            printf("%-16s %12" PRIu64 "  FAILED %" PRIu64 ": %s\n", strl_verify_name((strl_verify_kind)kind), check->count,
-                   check->failures, check->first);
+            printf("%-16s %12" PRIu64 "  FAILED %" PRIu64 ": %s\n", strl_verify_name((strl_verify_kind)kind),
+                   check->count, check->failures, check->first);
         else
             printf("%-16s %12" PRIu64 "  %s\n", strl_verify_name((strl_verify_kind)kind), check->count,
                    check->done ? "good" : "not looked at");
@@ -41,18 +41,21 @@ static double ratio_of(const strl_verify_cut *cut)
 
 static void print_cut(const char *name, uint32_t number, const strl_verify_cut *cut)
 {
-    printf("%s %2u: error %.6g, claimed %.6g, measured %.6g from the input and %.6g to it, rms %.6g, ratio %.3g, %" PRIu64
-           " triangles\n", name, number, cut->error, cut->claimed, cut->from_input, cut->to_input, cut->rms, ratio_of(cut),
-           cut->triangles);
+    printf(
+        "%s %2u: error %.6g, claimed %.6g, measured %.6g from the input and %.6g to it, rms %.6g, ratio %.3g, %" PRIu64
+        " triangles\n",
+        name, number, cut->error, cut->claimed, cut->from_input, cut->to_input, cut->rms, ratio_of(cut),
+        cut->triangles);
 }
 
 static void print_report(const char *model, const strl_verify_report *report)
 {
     print_checks(report);
     if (report->cuts) {
-        printf("%" PRIu64 " open edges in the leaves; %u view-dependent cuts of %" PRIu64 " triangles: %u cracked", report->open_edges,
-               report->cuts, report->cut_triangles, report->cracked_cuts);
-        printf("; %" PRIu64 " nodes by vertex clustering, %" PRIu64 " edges left out\n", report->clustered_nodes, report->excluded_edges);
+        printf("%" PRIu64 " open edges in the leaves; %u view-dependent cuts of %" PRIu64 " triangles: %u cracked",
+               report->open_edges, report->cuts, report->cut_triangles, report->cracked_cuts);
+        printf("; %" PRIu64 " nodes by vertex clustering, %" PRIu64 " edges left out\n", report->clustered_nodes,
+               report->excluded_edges);
     }
     for (uint32_t i = 0; i < report->uniform_count; i++)
         print_cut("cut", i, &report->uniform[i]);
@@ -71,8 +74,8 @@ static json_t *json_checks(const strl_verify_report *report)
     json_t *checks = json_object();
     for (unsigned kind = 0; kind < STRL_VERIFY_KINDS; kind++) {
         const strl_verify_check *check = &report->checks[kind];
-        json_t *entry = json_pack("{s:b, s:I, s:I}", "done", (int)check->done, "count", (json_int_t)check->count, "failures",
-                                  (json_int_t)check->failures);
+        json_t *entry = json_pack("{s:b, s:I, s:I}", "done", (int)check->done, "count", (json_int_t)check->count,
+                                  "failures", (json_int_t)check->failures);
         if (check->failures)
             json_object_set_new(entry, "first", json_string(check->first));
         json_object_set_new(checks, strl_verify_name((strl_verify_kind)kind), entry);
@@ -85,10 +88,11 @@ static json_t *json_cuts(const strl_verify_cut *cuts, uint32_t count)
     json_t *array = json_array();
     for (uint32_t i = 0; i < count; i++) {
         const strl_verify_cut *cut = &cuts[i];
-        json_array_append_new(array, json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:I, s:I, s:I}", "error", cut->error, "claimed", cut->claimed,
-                                               "measured_from_input", cut->from_input, "measured_to_input", cut->to_input, "rms",
-                                               cut->rms, "claimed_over_measured", ratio_of(cut), "nodes", (json_int_t)cut->nodes,
-                                               "triangles", (json_int_t)cut->triangles, "points", (json_int_t)cut->points));
+        json_array_append_new(
+            array, json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:I, s:I, s:I}", "error", cut->error, "claimed",
+                             cut->claimed, "measured_from_input", cut->from_input, "measured_to_input", cut->to_input,
+                             "rms", cut->rms, "claimed_over_measured", ratio_of(cut), "nodes", (json_int_t)cut->nodes,
+                             "triangles", (json_int_t)cut->triangles, "points", (json_int_t)cut->points));
     }
     return array;
 }
@@ -141,7 +145,8 @@ static strl_status make_scratch(const char *model, const char *wanted, char **fo
     return strl_path_make_directory(*folder, err);
 }
 
-static strl_status verify(strl_cli_args *args, strl_verify_desc *desc, const char *scratch, strl_verify_report *report, strl_error *err)
+static strl_status verify(strl_cli_args *args, strl_verify_desc *desc, const char *scratch, strl_verify_report *report,
+                          strl_error *err)
 {
     strl_cli_progress line;
     char *folder = NULL;
@@ -187,27 +192,51 @@ static int run(strl_cli_args *args)
     uint64_t memory = 1u << 30, jobs = 0, cuts = 200, seed = 0;
     strl_cli_list models, inputs = {0};
     const strl_cli_option options[] = {
-        {.name = "against", .kind = STRL_CLI_LIST, .value = &inputs, .argument = "INPUT...",
+        {.name = "against",
+         .kind = STRL_CLI_LIST,
+         .value = &inputs,
+         .argument = "INPUT...",
          .help = "measure against the files it was built from"},
-        {.name = "memory", .letter = 'm', .kind = STRL_CLI_BYTES, .value = &memory, .help = "peak memory (1G)",
-         .least = (double)STRL_VERIFY_LEAST_MEMORY, .most = 0x1p60},
-        {.name = "jobs", .letter = 'j', .kind = STRL_CLI_COUNT, .value = &jobs, .help = "threads (all processors)", .least = 1,
+        {.name = "memory",
+         .letter = 'm',
+         .kind = STRL_CLI_BYTES,
+         .value = &memory,
+         .help = "peak memory (1G)",
+         .least = (double)STRL_VERIFY_LEAST_MEMORY,
+         .most = 0x1p60},
+        {.name = "jobs",
+         .letter = 'j',
+         .kind = STRL_CLI_COUNT,
+         .value = &jobs,
+         .help = "threads (all processors)",
+         .least = 1,
          .most = 1024},
-        {.name = "cuts", .kind = STRL_CLI_COUNT, .value = &cuts, .help = "view-dependent cuts looked at for cracks (200)", .least = 1,
+        {.name = "cuts",
+         .kind = STRL_CLI_COUNT,
+         .value = &cuts,
+         .help = "view-dependent cuts looked at for cracks (200)",
+         .least = 1,
          .most = 100000},
         {.name = "seed", .kind = STRL_CLI_COUNT, .value = &seed, .help = "of random cuts and samples (0)"},
-        {.name = "scratch", .kind = STRL_CLI_STRING, .value = &scratch, .argument = "DIR",
+        {.name = "scratch",
+         .kind = STRL_CLI_STRING,
+         .value = &scratch,
+         .argument = "DIR",
          .help = "folder for --against (MODEL.verify.tmp)"},
         {.name = "json", .kind = STRL_CLI_FLAG, .value = &json, .help = "print one JSON object"},
     };
-    const strl_cli_usage usage = {.positional = "MODEL", .least = 1, .most = 1, .options = options,
-                                  .option_count = STRL_CLI_COUNT_OF(options)};
+    const strl_cli_usage usage = {
+        .positional = "MODEL", .least = 1, .most = 1, .options = options, .option_count = STRL_CLI_COUNT_OF(options)};
     int stop = strl_cli_parse(args, &usage, &models);
     if (stop >= 0)
         return stop;
-    strl_verify_desc desc = {.model = models.items[0], .inputs = (const char *const *)inputs.items,
-                             .input_count = (uint32_t)inputs.count, .memory_bytes = memory, .jobs = (unsigned)jobs,
-                             .cuts = (uint32_t)cuts, .seed = seed};
+    strl_verify_desc desc = {.model = models.items[0],
+                             .inputs = (const char *const *)inputs.items,
+                             .input_count = (uint32_t)inputs.count,
+                             .memory_bytes = memory,
+                             .jobs = (unsigned)jobs,
+                             .cuts = (uint32_t)cuts,
+                             .seed = seed};
     return verify_and_print(args, &desc, scratch, json);
 }
 

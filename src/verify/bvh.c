@@ -89,7 +89,8 @@ static void split(builder *self, uint32_t at, uint32_t first, uint32_t count)
         return;
     }
     uint32_t half = count / 2, children = self->node_count;
-    strl__v_bvh_select(self->boxes, self->order + first, count, half, strl__v_bvh_axis(self->boxes, self->order + first, count));
+    strl__v_bvh_select(self->boxes, self->order + first, count, half,
+                       strl__v_bvh_axis(self->boxes, self->order + first, count));
     self->node_count += 2;
     node->first = children;
     node->count = 0;

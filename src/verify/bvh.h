@@ -19,12 +19,12 @@ static inline uint64_t strl__bvh_nodes(uint64_t items)
     return items < STRL__BVH_LEAF ? 1 : items; /* leaves of a median split hold at least half of STRL__BVH_LEAF */
 }
 
-/* boxes: [count] min xyz, max xyz; order: [count] receives the items in the order of the leaves. count >= 1. Returns the number
- * of nodes; the root is nodes[0]. */
+/* boxes: [count] min xyz, max xyz; order: [count] receives the items in the order of the leaves. count >= 1.
+ * Returns the number of nodes; the root is nodes[0]. */
 uint32_t strl__v_bvh_build(const float (*boxes)[6], uint32_t count, uint32_t *order, strl__bvh_node *nodes);
 
-/* Rearranges order[0, count) so that no item before `middle` has a larger key on the axis than one from there on; the key of an item
- * is the sum of its box's sides there. */
+/* Rearranges order[0, count) so that no item before `middle` has a larger key on the axis than one from there
+ * on; the key of an item is the sum of its box's sides there. */
 void strl__v_bvh_select(const float (*boxes)[6], uint32_t *order, uint32_t count, uint32_t middle, unsigned axis);
 /* The axis along which the centres of order[0, count) spread the most. */
 unsigned strl__v_bvh_axis(const float (*boxes)[6], const uint32_t *order, uint32_t count);

@@ -1,5 +1,5 @@
-/* Where findings go: for each kind of check how many things were looked at, how many failed, and the sentence of the failure
- * with the lowest key, so that the report does not depend on the threads. */
+/* Where findings go: for each kind of check how many things were looked at, how many failed, and the sentence
+ * of the failure with the lowest key, so that the report does not depend on the threads. */
 #ifndef STRL_VERIFY_CHECKS_H
 #define STRL_VERIFY_CHECKS_H
 

@@ -5,8 +5,8 @@
 
 uint64_t strl__v_chunk_bytes(uint32_t vertex_count, uint32_t triangle_count, uint32_t node_count)
 {
-    return sizeof(strl__chunk) + (uint64_t)vertex_count * sizeof(double[3]) + (uint64_t)node_count * sizeof(strl__bvh_node) +
-           (uint64_t)triangle_count * sizeof(uint16_t[3]);
+    return sizeof(strl__chunk) + (uint64_t)vertex_count * sizeof(double[3]) +
+           (uint64_t)node_count * sizeof(strl__bvh_node) + (uint64_t)triangle_count * sizeof(uint16_t[3]);
 }
 
 void strl__v_chunk_point(strl__chunk *chunk)
@@ -32,7 +32,8 @@ static void enclose(const double (*vertex)[3], const uint32_t corners[3], float 
 }
 
 /* Triangles in the order of the tree's leaves, vertices in that of their use. */
-static void fill(strl__chunk *chunk, const double (*vertex)[3], const uint32_t (*triangle)[3], const uint32_t *order, uint32_t *number)
+static void fill(strl__chunk *chunk, const double (*vertex)[3], const uint32_t (*triangle)[3], const uint32_t *order,
+                 uint32_t *number)
 {
     uint32_t used = 0;
     for (uint32_t t = 0; t < chunk->triangle_count; t++)
@@ -57,8 +58,8 @@ static uint32_t count_used(const uint32_t (*triangle)[3], uint32_t triangle_coun
     return used;
 }
 
-strl__chunk *strl__v_chunk_build(const double base[3], const double (*vertex)[3], uint32_t vertex_count, const uint32_t (*triangle)[3],
-                               uint32_t triangle_count, strl_arena *scratch)
+strl__chunk *strl__v_chunk_build(const double base[3], const double (*vertex)[3], uint32_t vertex_count,
+                                 const uint32_t (*triangle)[3], uint32_t triangle_count, strl_arena *scratch)
 {
     float(*boxes)[6] = strl_arena_alloc(scratch, triangle_count, sizeof *boxes);
     uint32_t *order = strl_arena_alloc(scratch, triangle_count, sizeof *order);
@@ -75,7 +76,8 @@ strl__chunk *strl__v_chunk_build(const double base[3], const double (*vertex)[3]
     strl__chunk *chunk = strl__alloc((size_t)bytes, 1);
     if (!chunk)
         return NULL;
-    *chunk = (strl__chunk){.vertex_count = used, .triangle_count = triangle_count, .node_count = node_count, .bytes = bytes};
+    *chunk =
+        (strl__chunk){.vertex_count = used, .triangle_count = triangle_count, .node_count = node_count, .bytes = bytes};
     memcpy(chunk->base, base, sizeof chunk->base);
     strl__v_chunk_point(chunk);
     memcpy(chunk->nodes, nodes, node_count * sizeof *nodes);

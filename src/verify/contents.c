@@ -26,7 +26,8 @@ void strl__v_workers_destroy(const strl__model *model, strl__worker *workers)
     strl__free(workers);
 }
 
-static strl_status read_bytes(strl__model *model, uint64_t offset, uint32_t bytes, strl__worker *worker, strl_error *err)
+static strl_status read_bytes(strl__model *model, uint64_t offset, uint32_t bytes, strl__worker *worker,
+                              strl_error *err)
 {
     if (!strl__grow(&worker->bytes, &worker->capacity, bytes, 1))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a page of %u bytes", bytes);
@@ -43,10 +44,11 @@ static strl_status counts_agree(const strl__vnode *node, const strl__vmesh *mesh
     if (mesh->vertex_count != node->vertex_count || mesh->triangle_count != node->triangle_count ||
         mesh->step_count != node->step_count || mesh->vertex_end[0] != node->base_vertex_count ||
         mesh->triangle_end[0] != node->base_triangle_count)
-        return strl__fail(err, STRL_ERR_FORMAT, "%u vertices, %u triangles, %u steps, base %u and %u; its record says %u, %u, %u, %u and %u",
-                          mesh->vertex_count, mesh->triangle_count, mesh->step_count, mesh->vertex_end[0], mesh->triangle_end[0],
-                          node->vertex_count, node->triangle_count, node->step_count, node->base_vertex_count,
-                          node->base_triangle_count);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "%u vertices, %u triangles, %u steps, base %u and %u; its record says %u, %u, %u, %u and %u",
+                          mesh->vertex_count, mesh->triangle_count, mesh->step_count, mesh->vertex_end[0],
+                          mesh->triangle_end[0], node->vertex_count, node->triangle_count, node->step_count,
+                          node->base_vertex_count, node->base_triangle_count);
     return STRL_OK;
 }
 
@@ -61,8 +63,8 @@ static strl_status decode(const strl__vnode *node, const uint8_t *bytes, bool wi
     return status == STRL_OK ? strl__v_mesh_check_ranges(mesh, err) : status;
 }
 
-strl_status strl__v_load_mesh(strl__model *model, const strl__vtree *tree, uint32_t node, strl__worker *worker, strl__vmesh *mesh,
-                            strl_error *err)
+strl_status strl__v_load_mesh(strl__model *model, const strl__vtree *tree, uint32_t node, strl__worker *worker,
+                              strl__vmesh *mesh, strl_error *err)
 {
     const strl__vnode *n = &tree->nodes[node];
     strl_status status = read_bytes(model, n->page.offset + n->payload_offset, n->payload_bytes, worker, err);
@@ -89,8 +91,9 @@ static void check_box(contents *self, uint32_t id, const strl__vmesh *mesh)
             if (at >= n->box[0][k] && at <= n->box[1][k])
                 continue;
             strl__v_flaw(self->model->checks, STRL_VERIFY_BOXES, strl__key(self->tree, id),
-                       "tree %u node %u: vertex %u is at %" PRId64 " on axis %u, outside its box (%" PRId64 " to %" PRId64 ")",
-                       self->tree->index, id, v, at, k, n->box[0][k], n->box[1][k]);
+                         "tree %u node %u: vertex %u is at %" PRId64 " on axis %u, outside its box (%" PRId64
+                         " to %" PRId64 ")",
+                         self->tree->index, id, v, at, k, n->box[0][k], n->box[1][k]);
             return;
         }
 }
@@ -102,21 +105,23 @@ static void check_claims(contents *self, uint32_t id, const strl__vmesh *mesh)
     strl__v_checked(self->model->checks, STRL_VERIFY_ERRORS, 1);
     if (mesh->geometric_error[last] > n->geometric_min || mesh->geometric_error[0] > n->geometric_max ||
         mesh->appearance_error[last] > n->appearance_min || mesh->appearance_error[0] > n->appearance_max)
-        strl__v_flaw(self->model->checks, STRL_VERIFY_ERRORS, strl__key(self->tree, id),
-                   "tree %u node %u: its mesh errs by %g to %g and %g to %g, more than its record says (%g to %g, %g to %g)",
-                   self->tree->index, id, (double)mesh->geometric_error[last], (double)mesh->geometric_error[0],
-                   (double)mesh->appearance_error[last], (double)mesh->appearance_error[0], (double)n->geometric_min,
-                   (double)n->geometric_max, (double)n->appearance_min, (double)n->appearance_max);
+        strl__v_flaw(
+            self->model->checks, STRL_VERIFY_ERRORS, strl__key(self->tree, id),
+            "tree %u node %u: its mesh errs by %g to %g and %g to %g, more than its record says (%g to %g, %g to %g)",
+            self->tree->index, id, (double)mesh->geometric_error[last], (double)mesh->geometric_error[0],
+            (double)mesh->appearance_error[last], (double)mesh->appearance_error[0], (double)n->geometric_min,
+            (double)n->geometric_max, (double)n->appearance_min, (double)n->appearance_max);
     for (uint32_t i = 0; i < mesh->palette_count; i++)
         if (mesh->palette[i][0] >= self->part_count || mesh->palette[i][1] >= self->material_count) {
             strl__v_flaw(self->model->checks, STRL_VERIFY_PAYLOADS, strl__key(self->tree, id),
-                       "tree %u node %u: part %u of %u, material %u of %u", self->tree->index, id, mesh->palette[i][0],
-                       self->part_count, mesh->palette[i][1], self->material_count);
+                         "tree %u node %u: part %u of %u, material %u of %u", self->tree->index, id,
+                         mesh->palette[i][0], self->part_count, mesh->palette[i][1], self->material_count);
             break;
         }
 }
 
-static strl_status take_hashes(contents *self, uint32_t id, const strl__vmesh *mesh, strl__worker *worker, strl_error *err)
+static strl_status take_hashes(contents *self, uint32_t id, const strl__vmesh *mesh, strl__worker *worker,
+                               strl_error *err)
 {
     strl__vnode *n = &self->tree->nodes[id];
     uint16_t *map = strl_arena_alloc(&worker->arena, mesh->vertex_count, sizeof *map);
@@ -140,8 +145,8 @@ static strl_status check_node(contents *self, uint32_t id, const uint8_t *bytes,
         status = strl__v_mesh_check_states(&mesh, &worker->scratch, &why);
     strl__v_checked(self->model->checks, STRL_VERIFY_PAYLOADS, 1);
     if (status == STRL_ERR_FORMAT) {
-        strl__v_flaw(self->model->checks, STRL_VERIFY_PAYLOADS, strl__key(self->tree, id), "tree %u node %u: %s", self->tree->index,
-                   id, why.message);
+        strl__v_flaw(self->model->checks, STRL_VERIFY_PAYLOADS, strl__key(self->tree, id), "tree %u node %u: %s",
+                     self->tree->index, id, why.message);
         return STRL_OK;
     }
     if (status != STRL_OK) {
@@ -167,8 +172,9 @@ static strl_status check_page(void *context, uint64_t index, unsigned worker_ind
     strl__v_checked(self->model->checks, STRL_VERIFY_CHECKSUMS, 1);
     if (found != place->checksum) {
         strl__v_flaw(self->model->checks, STRL_VERIFY_CHECKSUMS, strl__key(self->tree, id),
-                   "payload page at byte %" PRIu64 " (tree %u, nodes from %u): its checksum is %016" PRIx64 ", expected %016" PRIx64,
-                   place->offset, self->tree->index, id, found, place->checksum);
+                     "payload page at byte %" PRIu64 " (tree %u, nodes from %u): its checksum is %016" PRIx64
+                     ", expected %016" PRIx64,
+                     place->offset, self->tree->index, id, found, place->checksum);
         return STRL_OK;
     }
     for (; status == STRL_OK && id < self->tree->page_first[page + 1]; id++)
@@ -178,7 +184,9 @@ static strl_status check_page(void *context, uint64_t index, unsigned worker_ind
 
 strl_status strl__v_check_contents(strl__model *model, strl__vtree *tree, strl_error *err)
 {
-    contents self = {.model = model, .tree = tree, .workers = strl__v_workers_create(model),
+    contents self = {.model = model,
+                     .tree = tree,
+                     .workers = strl__v_workers_create(model),
                      .part_count = (uint32_t)model->sections[STRL__PARTS].item_count,
                      .material_count = (uint32_t)model->sections[STRL__MATERIALS].item_count};
     strl_status status = self.workers ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for the workers");
@@ -211,8 +219,9 @@ void strl__v_check_unions(strl__model *model, const strl__vtree *tree, uint64_t 
         }
         strl__v_checked(model->checks, STRL_VERIFY_UNIONS, 1);
         if (!strl__hash_same(sum, n->finest))
-            strl__v_flaw(model->checks, STRL_VERIFY_UNIONS, strl__key(tree, id),
-                       "tree %u node %u: its finest state (%u triangles) is not the union of its children's base meshes (%u)",
-                       tree->index, id, n->triangle_count, triangles);
+            strl__v_flaw(
+                model->checks, STRL_VERIFY_UNIONS, strl__key(tree, id),
+                "tree %u node %u: its finest state (%u triangles) is not the union of its children's base meshes (%u)",
+                tree->index, id, n->triangle_count, triangles);
     }
 }

@@ -48,7 +48,8 @@ static uint64_t bloom_bits(const strl__model *model, const strl__vtree *tree)
     return bits;
 }
 
-strl_status strl__v_boundary_find(strl__model *model, const strl__vtree *tree, strl__boundary *boundary, strl_error *err)
+strl_status strl__v_boundary_find(strl__model *model, const strl__vtree *tree, strl__boundary *boundary,
+                                  strl_error *err)
 {
     uint64_t bits = bloom_bits(model, tree);
     *boundary = (strl__boundary){.bits = strl__alloc_zero(bits / 64, 8), .mask = bits - 1};
@@ -100,8 +101,8 @@ static bool boxes_touch(const int64_t a[2][3], const int64_t b[2][3])
     return true;
 }
 
-uint32_t strl__v_clustered_near(const strl__clustered *clustered, const strl__vtree *tree, const uint64_t *active, uint32_t id,
-                              uint32_t *near)
+uint32_t strl__v_clustered_near(const strl__clustered *clustered, const strl__vtree *tree, const uint64_t *active,
+                                uint32_t id, uint32_t *near)
 {
     uint32_t count = 0;
     for (uint32_t i = 0; i < clustered->count; i++) {
@@ -118,7 +119,8 @@ static bool box_holds(const int64_t box[2][3], const int64_t p[3])
            p[2] <= box[1][2];
 }
 
-bool strl__v_clustered_holds(const strl__vtree *tree, const uint32_t *near, uint32_t count, const int64_t a[3], const int64_t b[3])
+bool strl__v_clustered_holds(const strl__vtree *tree, const uint32_t *near, uint32_t count, const int64_t a[3],
+                             const int64_t b[3])
 {
     for (uint32_t i = 0; i < count; i++)
         if (box_holds(tree->nodes[near[i]].box, a) && box_holds(tree->nodes[near[i]].box, b))
@@ -139,10 +141,10 @@ typedef struct crack_test {
     const strl__boundary *boundary;
     strl__clustered clustered;
     uint32_t cut_count;
-    strl__vview *views;   /* [cut_count] */
-    uint64_t *active;     /* [cut_count][words] */
-    uint32_t *groups;     /* [workers][group_count] */
-    cut_sums *sums;       /* [workers][cut_count] */
+    strl__vview *views; /* [cut_count] */
+    uint64_t *active;   /* [cut_count][words] */
+    uint32_t *groups;   /* [workers][group_count] */
+    cut_sums *sums;     /* [workers][cut_count] */
     strl__worker *workers;
     uint32_t first_page;
 } crack_test;
@@ -158,7 +160,7 @@ static strl_status select_cut(void *context, uint64_t cut, unsigned worker, strl
     (void)err;
     strl__v_view_random(test->tree, test->model->desc->seed, (uint32_t)cut, &test->views[cut]);
     strl__v_cut_view(test->tree, &test->views[cut], test->groups + (size_t)worker * test->tree->group_count,
-                   active_of(test, (uint32_t)cut));
+                     active_of(test, (uint32_t)cut));
     return STRL_OK;
 }
 
@@ -184,7 +186,8 @@ static bool excluded(const crack_test *test, const node_edges *node, uint32_t ne
     return strl__v_clustered_holds(test->tree, node->near, near_count, p, q);
 }
 
-static void sum_state(const crack_test *test, const node_edges *node, uint32_t state, uint32_t near_count, cut_sums *sums)
+static void sum_state(const crack_test *test, const node_edges *node, uint32_t state, uint32_t near_count,
+                      cut_sums *sums)
 {
     const strl__vmesh *mesh = node->mesh;
     strl__v_mesh_resolve(mesh, state, node->map);
@@ -205,8 +208,8 @@ static void sum_state(const crack_test *test, const node_edges *node, uint32_t s
     sums->triangles += mesh->triangle_end[state];
 }
 
-static strl_status prepare_node(const crack_test *test, const strl__vnode *n, const strl__vmesh *mesh, strl__worker *worker,
-                                node_edges *node, strl_error *err)
+static strl_status prepare_node(const crack_test *test, const strl__vnode *n, const strl__vmesh *mesh,
+                                strl__worker *worker, node_edges *node, strl_error *err)
 {
     *node = (node_edges){.mesh = mesh, .anchor = n->anchor};
     node->map = strl_arena_alloc(&worker->scratch, mesh->vertex_count, sizeof *node->map);
@@ -291,8 +294,13 @@ static strl_status look_closely(crack_test *test, uint32_t cut, strl_verify_repo
     const strl__vview *view = &test->views[cut];
     strl__open_edge first = {0};
     uint64_t count = 0;
-    const strl__edge_query query = {.model = test->model, .tree = tree, .active = active_of(test, cut), .view = view,
-                                    .boundary = test->boundary, .clustered = &test->clustered, .visit = keep_first,
+    const strl__edge_query query = {.model = test->model,
+                                    .tree = tree,
+                                    .active = active_of(test, cut),
+                                    .view = view,
+                                    .boundary = test->boundary,
+                                    .clustered = &test->clustered,
+                                    .visit = keep_first,
                                     .context = &first};
     strl_status status = strl__v_open_edges(&query, &count, err);
     if (status != STRL_OK)
@@ -302,8 +310,9 @@ static strl_status look_closely(crack_test *test, uint32_t cut, strl_verify_repo
         p[i / 3][i % 3] = tree->origin[i % 3] + tree->step * (double)first.end[i / 3][i % 3];
     report->cracks += count;
     strl__v_flaw(test->model->checks, STRL_VERIFY_CRACKS, (uint64_t)tree->index << 32 | cut,
-               "tree %u, view-dependent cut %u: %" PRIu64 " edges are open where the input is closed, one from %g %g %g to %g %g %g",
-               tree->index, cut, count, p[0][0], p[0][1], p[0][2], p[1][0], p[1][1], p[1][2]);
+                 "tree %u, view-dependent cut %u: %" PRIu64
+                 " edges are open where the input is closed, one from %g %g %g to %g %g %g",
+                 tree->index, cut, count, p[0][0], p[0][1], p[0][2], p[1][0], p[1][1], p[1][2]);
     return STRL_OK;
 }
 
@@ -323,7 +332,8 @@ static strl_status judge_cuts(crack_test *test, strl_verify_report *report, strl
             status = look_closely(test, cut, report, err);
         else
             strl__v_flaw(test->model->checks, STRL_VERIFY_CRACKS, (uint64_t)test->tree->index << 32 | cut,
-                       "tree %u, view-dependent cut %u has edges that are open where the input is closed", test->tree->index, cut);
+                         "tree %u, view-dependent cut %u has edges that are open where the input is closed",
+                         test->tree->index, cut);
     }
     return status;
 }
@@ -343,7 +353,7 @@ static strl_status sum_cuts(crack_test *test, strl_error *err)
 }
 
 strl_status strl__v_check_cracks(strl__model *model, const strl__vtree *tree, const strl__boundary *boundary,
-                               strl_verify_report *report, strl_error *err)
+                                 strl_verify_report *report, strl_error *err)
 {
     uint32_t cuts = model->desc->cuts ? model->desc->cuts : 200;
     unsigned workers = strl_pool_workers(model->pool);

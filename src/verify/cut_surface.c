@@ -13,7 +13,8 @@ static strl_status load_node(void *context, uint32_t index, unsigned worker_inde
     strl_status status = strl__v_load_mesh(cut->model, cut->tree, cut->nodes[index], worker, &mesh, err);
     if (status != STRL_OK)
         return status;
-    uint32_t state = cut->base_states ? 0 : strl__v_mesh_state(&mesh, cut->limit, false), count = mesh.triangle_end[state];
+    uint32_t state = cut->base_states ? 0 : strl__v_mesh_state(&mesh, cut->limit, false),
+             count = mesh.triangle_end[state];
     uint16_t *map = strl_arena_alloc(&worker->scratch, mesh.vertex_count, sizeof *map);
     double(*vertex)[3] = strl_arena_alloc(&worker->scratch, mesh.vertex_end[state], sizeof *vertex);
     uint32_t(*triangle)[3] = strl_arena_alloc(&worker->scratch, count, sizeof *triangle);
@@ -27,8 +28,8 @@ static strl_status load_node(void *context, uint32_t index, unsigned worker_inde
         for (unsigned k = 0; k < 3; k++)
             triangle[t][k] = map[mesh.triangle[t][k]];
     double base[3] = {(double)node->anchor[0], (double)node->anchor[1], (double)node->anchor[2]};
-    *chunk = strl__v_chunk_build(base, (const double(*)[3])vertex, mesh.vertex_end[state], (const uint32_t(*)[3])triangle, count,
-                               &worker->scratch);
+    *chunk = strl__v_chunk_build(base, (const double(*)[3])vertex, mesh.vertex_end[state],
+                                 (const uint32_t(*)[3])triangle, count, &worker->scratch);
     if (!*chunk)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %u triangles of a cut", count);
     (*chunk)->claimed = mesh.geometric_error[state];
@@ -45,8 +46,8 @@ static double (*node_boxes(const strl__vtree *tree, const uint32_t *nodes, uint3
     return box;
 }
 
-strl_status strl__v_cut_surface_init(strl__cut_surface *cut, strl__model *model, const strl__vtree *tree, const uint64_t *active,
-                                   strl_error *err)
+strl_status strl__v_cut_surface_init(strl__cut_surface *cut, strl__model *model, const strl__vtree *tree,
+                                     const uint64_t *active, strl_error *err)
 {
     uint32_t count = 0;
     cut->model = model;

@@ -79,7 +79,8 @@ void strl__v_cut_view(const strl__vtree *tree, const strl__vview *view, uint32_t
         }
         for (uint32_t id = first; id < end; id++) {
             const strl__vnode *n = &tree->nodes[id];
-            if (strl__bit(active, id) && (groups[n->group] & MEMBERS) == n->group_size && wants_split(tree, view, n->group))
+            if (strl__bit(active, id) && (groups[n->group] & MEMBERS) == n->group_size &&
+                wants_split(tree, view, n->group))
                 groups[n->group] |= SPLITS;
         }
     }

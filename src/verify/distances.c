@@ -38,8 +38,8 @@ static void worst_of(const strl__measured *results, uint32_t count, strl__measur
     }
 }
 
-static void check_most(comparison *self, uint64_t key, const char *name, const char *direction, const strl__measured *measured,
-                       double claimed)
+static void check_most(comparison *self, uint64_t key, const char *name, const char *direction,
+                       const strl__measured *measured, double claimed)
 {
     const strl__vtree *tree = self->tree;
     strl__v_checked(self->model->checks, STRL_VERIFY_DISTANCES, measured->points);
@@ -48,8 +48,8 @@ static void check_most(comparison *self, uint64_t key, const char *name, const c
     double p[3];
     for (unsigned k = 0; k < 3; k++)
         p[k] = tree->origin[k] + tree->step * measured->worst[k];
-    strl__v_flaw(self->model->checks, STRL_VERIFY_DISTANCES, key, "%s: %s at %g %g %g is %g, above the claim of %g", name, direction, p[0],
-               p[1], p[2], measured->most * tree->step, claimed * tree->step);
+    strl__v_flaw(self->model->checks, STRL_VERIFY_DISTANCES, key, "%s: %s at %g %g %g is %g, above the claim of %g",
+                 name, direction, p[0], p[1], p[2], measured->most * tree->step, claimed * tree->step);
 }
 
 /* Each node's own claim, towards the input. */
@@ -64,8 +64,8 @@ static void check_nodes(comparison *self, uint64_t key, const char *name, const 
     }
 }
 
-static void fill_in(const comparison *self, const strl__cut_surface *cut, const strl__measured *from, const strl__measured *to,
-                    strl_verify_cut *out)
+static void fill_in(const comparison *self, const strl__cut_surface *cut, const strl__measured *from,
+                    const strl__measured *to, strl_verify_cut *out)
 {
     double step = self->tree->step;
     out->claimed = to->claimed * step;
@@ -85,12 +85,14 @@ static uint64_t surface_budget(const strl__model *model)
     return (model->memory_bytes - model->memory_bytes / 4 - model->record_bytes) / 2;
 }
 
-static strl_status compare(comparison *self, uint64_t key, const char *name, strl__cut_surface *cut, strl_verify_cut *out, strl_error *err)
+static strl_status compare(comparison *self, uint64_t key, const char *name, strl__cut_surface *cut,
+                           strl_verify_cut *out, strl_error *err)
 {
     strl__measured from, to;
     strl__surface *input = &self->input->surface;
     cut->surface.budget = input->budget = surface_budget(self->model);
-    strl_status status = strl__v_measure(self->model, input, &cut->surface, strl__mix64(self->seed++), self->of_input, err);
+    strl_status status =
+        strl__v_measure(self->model, input, &cut->surface, strl__mix64(self->seed++), self->of_input, err);
     if (status == STRL_OK)
         status = strl__v_measure(self->model, &cut->surface, input, strl__mix64(self->seed++), self->of_cut, err);
     if (status != STRL_OK)
@@ -119,7 +121,8 @@ static strl_status compare_uniform(comparison *self, uint32_t number, strl_verif
     double least, most, last = STRL_VERIFY_UNIFORM_CUTS - 1;
     char name[64];
     error_range(self->tree, &least, &most);
-    double limit = number == 0 || !(least > 0) ? least + (most - least) * number / last : least * pow(most / least, number / last);
+    double limit =
+        number == 0 || !(least > 0) ? least + (most - least) * number / last : least * pow(most / least, number / last);
     limit = fmin(fmax(limit, least), most);
     strl__cut_surface cut = {.limit = limit};
     *out = (strl_verify_cut){.error = limit * self->tree->step};
@@ -130,7 +133,8 @@ static strl_status compare_uniform(comparison *self, uint32_t number, strl_verif
         status = compare(self, number, name, &cut, out, err);
     strl__v_cut_surface_deinit(&cut);
     if (status == STRL_OK && out->claimed > out->error * (1 + 1e-9))
-        strl__v_flaw(self->model->checks, STRL_VERIFY_DISTANCES, number, "%s: a node of it claims %g", name, out->claimed);
+        strl__v_flaw(self->model->checks, STRL_VERIFY_DISTANCES, number, "%s: a node of it claims %g", name,
+                     out->claimed);
     return status;
 }
 
@@ -173,8 +177,8 @@ static void summarise(strl_verify_report *report)
     report->worst_claimed_over_measured = ratio[0];
 }
 
-strl_status strl__v_check_distances(strl__model *model, const strl__vtree *tree, strl__vinput *input, strl_verify_report *report,
-                                  strl_error *err)
+strl_status strl__v_check_distances(strl__model *model, const strl__vtree *tree, strl__vinput *input,
+                                    strl_verify_report *report, strl_error *err)
 {
     comparison self = {.model = model, .tree = tree, .input = input, .seed = model->desc->seed + 1};
     self.active = strl__alloc(strl__bit_words(tree), sizeof *self.active);

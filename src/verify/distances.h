@@ -6,8 +6,8 @@
 #include "verify/input.h"
 
 /* Measures the uniform cuts and the levels of the only tree against the input. */
-strl_status strl__v_check_distances(strl__model *model, const strl__vtree *tree, strl__vinput *input, strl_verify_report *report,
-                                  strl_error *err);
+strl_status strl__v_check_distances(strl__model *model, const strl__vtree *tree, strl__vinput *input,
+                                    strl_verify_report *report, strl_error *err);
 
 /* A cut as a surface: one chunk for each active node. */
 typedef struct strl__cut_surface {
@@ -22,8 +22,8 @@ typedef struct strl__cut_surface {
 } strl__cut_surface;
 
 /* active as in verify/cuts.h. */
-strl_status strl__v_cut_surface_init(strl__cut_surface *cut, strl__model *model, const strl__vtree *tree, const uint64_t *active,
-                                   strl_error *err);
+strl_status strl__v_cut_surface_init(strl__cut_surface *cut, strl__model *model, const strl__vtree *tree,
+                                     const uint64_t *active, strl_error *err);
 void strl__v_cut_surface_deinit(strl__cut_surface *cut);
 
 /* What was measured from one chunk. */
@@ -34,8 +34,9 @@ typedef struct strl__measured {
     uint64_t points;
 } strl__measured;
 
-/* From all vertices of `from`, and from one random point for two of its triangles, by area, to `to`. results: [from->count]. */
-strl_status strl__v_measure(strl__model *model, strl__surface *from, strl__surface *to, uint64_t seed, strl__measured *results,
-                          strl_error *err);
+/* From all vertices of `from`, and from one random point for two of its triangles, by area, to `to`. results:
+ * [from->count]. */
+strl_status strl__v_measure(strl__model *model, strl__surface *from, strl__surface *to, uint64_t seed,
+                            strl__measured *results, strl_error *err);
 
 #endif

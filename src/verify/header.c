@@ -20,13 +20,14 @@ bool strl__v_place_good(strl__model *model, const strl__place *place, const char
         place->offset <= model->file_bytes && place->bytes <= model->file_bytes - place->offset)
         return true;
     strl__v_flaw(model->checks, STRL_VERIFY_REFERENCES, key,
-               "%s: bytes %" PRIu64 " to %" PRIu64 " are not a multiple of 64 from byte 4096 on inside the file of %" PRIu64
-               " bytes", what, place->offset, place->offset + place->bytes, model->file_bytes);
+                 "%s: bytes %" PRIu64 " to %" PRIu64
+                 " are not a multiple of 64 from byte 4096 on inside the file of %" PRIu64 " bytes",
+                 what, place->offset, place->offset + place->bytes, model->file_bytes);
     return false;
 }
 
-strl_status strl__v_fetch(strl__model *model, const strl__place *place, const char *what, uint64_t key, uint8_t *data, bool *good,
-                        strl_error *err)
+strl_status strl__v_fetch(strl__model *model, const strl__place *place, const char *what, uint64_t key, uint8_t *data,
+                          bool *good, strl_error *err)
 {
     *good = false;
     if (!strl__v_place_good(model, place, what, key))
@@ -39,17 +40,17 @@ strl_status strl__v_fetch(strl__model *model, const strl__place *place, const ch
     *good = found == place->checksum;
     if (!*good)
         strl__v_flaw(model->checks, STRL_VERIFY_CHECKSUMS, key,
-                   "%s at byte %" PRIu64 ": its checksum is %016" PRIx64 ", expected %016" PRIx64, what, place->offset, found,
-                   place->checksum);
+                     "%s at byte %" PRIu64 ": its checksum is %016" PRIx64 ", expected %016" PRIx64, what,
+                     place->offset, found, place->checksum);
     return STRL_OK;
 }
 
 /* A header fault: all of them share one kind and one key, the first is told. */
-#define HEADER_RULE(model, condition, ...)                                        \
-    do {                                                                          \
-        strl__v_checked((model)->checks, STRL_VERIFY_HEADER, 1);                    \
-        if (!(condition))                                                         \
-            strl__v_flaw((model)->checks, STRL_VERIFY_HEADER, 0, __VA_ARGS__);      \
+#define HEADER_RULE(model, condition, ...)                                                                             \
+    do {                                                                                                               \
+        strl__v_checked((model)->checks, STRL_VERIFY_HEADER, 1);                                                       \
+        if (!(condition))                                                                                              \
+            strl__v_flaw((model)->checks, STRL_VERIFY_HEADER, 0, __VA_ARGS__);                                         \
     } while (0)
 
 static void check_identity(strl__model *model, const uint8_t bytes[HEADER_BYTES])
@@ -62,7 +63,7 @@ static void check_identity(strl__model *model, const uint8_t bytes[HEADER_BYTES]
     strl__v_checked(model->checks, STRL_VERIFY_CHECKSUMS, 1);
     if (found != expected)
         strl__v_flaw(model->checks, STRL_VERIFY_CHECKSUMS, 0,
-                   "header: its checksum is %016" PRIx64 ", expected %016" PRIx64, found, expected);
+                     "header: its checksum is %016" PRIx64 ", expected %016" PRIx64, found, expected);
     memset(copy + 16, 0, 16);
     XXH128_canonicalFromHash(&id, XXH3_128bits(copy, HEADER_BYTES));
     HEADER_RULE(model, memcmp(id.digest, bytes + 16, 16) == 0, "header: the model id is not that of the content");
@@ -76,11 +77,11 @@ static void read_section(strl__model *model, strl_cursor *cursor, uint32_t numbe
     section.place.bytes = strl_cursor_u32(cursor);
     uint32_t reserved = strl_cursor_u32(cursor);
     section.place.checksum = strl_cursor_u64(cursor);
-    HEADER_RULE(model, kind > *kind_before, "header: section %u is of kind %u, not above that before it (%u)", number, kind,
-                *kind_before);
+    HEADER_RULE(model, kind > *kind_before, "header: section %u is of kind %u, not above that before it (%u)", number,
+                kind, *kind_before);
     *kind_before = kind;
-    HEADER_RULE(model, (kind > 0 && kind < STRL__SECTIONS) || kind >= 0x80000000u, "header: section %u is of unknown kind %u",
-                number, kind);
+    HEADER_RULE(model, (kind > 0 && kind < STRL__SECTIONS) || kind >= 0x80000000u,
+                "header: section %u is of unknown kind %u", number, kind);
     HEADER_RULE(model, depth <= 3 && reserved == 0 && (depth == 0 || (kind != STRL__TREES && kind < STRL__SECTIONS)),
                 "header: section %u of kind %u has depth %u and reserved word %u", number, kind, depth, reserved);
     if (kind > 0 && kind < STRL__SECTIONS)
@@ -118,7 +119,8 @@ static void read_fields(strl__model *model, const uint8_t bytes[HEADER_BYTES])
     cursor.at = 40;
     model->file_bytes = strl_cursor_u64(&cursor);
     HEADER_RULE(model, model->file_bytes == strl_file_bytes(model->file),
-                "header: the file has %" PRIu64 " bytes, expected %" PRIu64, strl_file_bytes(model->file), model->file_bytes);
+                "header: the file has %" PRIu64 " bytes, expected %" PRIu64, strl_file_bytes(model->file),
+                model->file_bytes);
     if (model->file_bytes > strl_file_bytes(model->file))
         model->file_bytes = strl_file_bytes(model->file);
     check_unit(model, bytes + 48);
@@ -135,11 +137,13 @@ static void read_fields(strl__model *model, const uint8_t bytes[HEADER_BYTES])
     for (unsigned i = 0; i < 6; i++)
         model->bounds[i] = strl_cursor_f64(&cursor);
     for (unsigned k = 0; k < 3; k++)
-        HEADER_RULE(model, isfinite(model->bounds[k]) && isfinite(model->bounds[3 + k]) && model->bounds[k] <= model->bounds[3 + k],
+        HEADER_RULE(model,
+                    isfinite(model->bounds[k]) && isfinite(model->bounds[3 + k]) &&
+                        model->bounds[k] <= model->bounds[3 + k],
                     "header: the bounds of axis %u are %g to %g", k, model->bounds[k], model->bounds[3 + k]);
     uint32_t sections = strl_cursor_u32(&cursor), reserved = strl_cursor_u32(&cursor), kind = 0;
-    HEADER_RULE(model, sections >= 4 && sections <= 64 && reserved == 0, "header: %u sections and reserved word %u", sections,
-                reserved);
+    HEADER_RULE(model, sections >= 4 && sections <= 64 && reserved == 0, "header: %u sections and reserved word %u",
+                sections, reserved);
     for (uint32_t i = 0; i < sections && i < 64; i++)
         read_section(model, &cursor, i, &kind);
     check_sections(model);
@@ -163,12 +167,14 @@ strl_status strl__v_read_header(strl__model *model, bool *sound, strl_error *err
     if (!named)
         return STRL_OK;
     uint32_t version = (uint32_t)strl__load_le(bytes + 8, 4), size = (uint32_t)strl__load_le(bytes + 12, 4);
-    HEADER_RULE(model, version == 1 && size == HEADER_BYTES, "header: version %u of %u bytes, expected 1 of 4096", version, size);
+    HEADER_RULE(model, version == 1 && size == HEADER_BYTES, "header: version %u of %u bytes, expected 1 of 4096",
+                version, size);
     if (version != 1 || size != HEADER_BYTES)
         return STRL_OK;
     check_identity(model, bytes);
     read_fields(model, bytes);
-    *sound = !strl__v_flawed(model->checks, STRL_VERIFY_HEADER) && !strl__v_flawed(model->checks, STRL_VERIFY_CHECKSUMS) &&
+    *sound = !strl__v_flawed(model->checks, STRL_VERIFY_HEADER) &&
+             !strl__v_flawed(model->checks, STRL_VERIFY_CHECKSUMS) &&
              !strl__v_flawed(model->checks, STRL_VERIFY_REFERENCES);
     return STRL_OK;
 }
@@ -212,16 +218,19 @@ static void decode_tree(const uint8_t bytes[TREE_BYTES], strl__vtree *tree, bool
 static void check_tree(strl__model *model, strl__vtree *tree, bool reserved_zero)
 {
     uint32_t t = tree->index;
-    HEADER_RULE(model, tree->structure >= 1 && tree->structure <= 3, "tree %u: structure %u, expected 1 to 3", t, tree->structure);
-    HEADER_RULE(model, tree->node_count >= 1 && tree->node_count < UINT32_MAX && tree->node_count <= model->file_bytes / 240,
-                "tree %u: %u nodes cannot stand in a file of %" PRIu64 " bytes", t, tree->node_count, model->file_bytes);
+    HEADER_RULE(model, tree->structure >= 1 && tree->structure <= 3, "tree %u: structure %u, expected 1 to 3", t,
+                tree->structure);
+    HEADER_RULE(
+        model, tree->node_count >= 1 && tree->node_count < UINT32_MAX && tree->node_count <= model->file_bytes / 240,
+        "tree %u: %u nodes cannot stand in a file of %" PRIu64 " bytes", t, tree->node_count, model->file_bytes);
     HEADER_RULE(model, tree->level_count >= 1 && tree->level_count <= 65535 && tree->level_count <= tree->node_count,
                 "tree %u: %u levels of %u nodes", t, tree->level_count, tree->node_count);
-    HEADER_RULE(model, tree->group_count >= 1 && tree->group_count <= tree->node_count, "tree %u: %u groups of %u nodes", t,
-                tree->group_count, tree->node_count);
+    HEADER_RULE(model, tree->group_count >= 1 && tree->group_count <= tree->node_count,
+                "tree %u: %u groups of %u nodes", t, tree->group_count, tree->node_count);
     HEADER_RULE(model, isfinite(tree->origin[0]) && isfinite(tree->origin[1]) && isfinite(tree->origin[2]),
                 "tree %u: the origin is not finite", t);
-    HEADER_RULE(model, step_good(tree->step), "tree %u: step %g is not a power of two from 2^-512 to 2^512", t, tree->step);
+    HEADER_RULE(model, step_good(tree->step), "tree %u: step %g is not a power of two from 2^-512 to 2^512", t,
+                tree->step);
     HEADER_RULE(model, box_good(tree->box), "tree %u: its box is upside down or outside 2^62", t);
     HEADER_RULE(model, tree->leaf_geometric >= 0 && isfinite(tree->leaf_geometric), "tree %u: leaf error %g", t,
                 (double)tree->leaf_geometric);

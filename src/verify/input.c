@@ -25,7 +25,8 @@ typedef struct reading {
 } reading;
 
 /* docs/format.md: the cell nearest to the point, ties to the even one. False where two corners share a cell. */
-static bool quantise(const strl__vtree *tree, const strl_triangle *triangle, double corners[9], strl__hash128 points[3], bool *inside)
+static bool quantise(const strl__vtree *tree, const strl_triangle *triangle, double corners[9], strl__hash128 points[3],
+                     bool *inside)
 {
     int64_t cell[3][3];
     *inside = true;
@@ -53,8 +54,9 @@ static strl_status take(reading *self, const strl_triangle *triangle, strl_error
         return STRL_OK;
     }
     if (!inside)
-        strl__v_flaw(self->model->checks, STRL_VERIFY_LEAVES, 0, "input triangle %" PRIu64 " is not on the lattice of tree %u",
-                   self->input->triangles - 1, self->tree->index);
+        strl__v_flaw(self->model->checks, STRL_VERIFY_LEAVES, 0,
+                     "input triangle %" PRIu64 " is not on the lattice of tree %u", self->input->triangles - 1,
+                     self->tree->index);
     strl__hash_add(&self->input->sum, strl__hash_triangle(points[0], points[1], points[2]));
     self->input->kept++;
     return strl__v_regions_add(self->regions, corners, err);
@@ -79,7 +81,8 @@ static strl_status read_all(reading *self, strl_reader *reader, strl_error *err)
 static strl_status read_input(reading *self, const char *path, strl_error *err)
 {
     strl__model *model = self->model;
-    const strl_reader_desc desc = {.path = path, .scratch_dir = model->desc->scratch_dir, .memory_bytes = model->memory_bytes / 4};
+    const strl_reader_desc desc = {
+        .path = path, .scratch_dir = model->desc->scratch_dir, .memory_bytes = model->memory_bytes / 4};
     strl_reader *reader = NULL;
     strl_status status = strl_reader_open(&desc, &reader, err);
     if (status == STRL_OK)
@@ -97,9 +100,13 @@ static strl_status read_input(reading *self, const char *path, strl_error *err)
     return status;
 }
 
-static strl_status read_inputs(strl__model *model, const strl__vtree *tree, strl__vinput *input, strl__regions *regions, strl_error *err)
+static strl_status read_inputs(strl__model *model, const strl__vtree *tree, strl__vinput *input, strl__regions *regions,
+                               strl_error *err)
 {
-    reading self = {.model = model, .tree = tree, .input = input, .regions = regions,
+    reading self = {.model = model,
+                    .tree = tree,
+                    .input = input,
+                    .regions = regions,
                     .batch = strl__alloc(READ_BATCH, sizeof *self.batch)};
     strl_status status = self.batch ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory to read the input");
     for (uint32_t i = 0; status == STRL_OK && i < model->desc->input_count; i++)
@@ -132,7 +139,7 @@ typedef struct chunking {
     input_slice *slices;
     size_t slice_count, slice_capacity;
     strl__worker *workers;
-    strl_mutex mutex;   /* guards the end of the file */
+    strl_mutex mutex; /* guards the end of the file */
     uint64_t end;
 } chunking;
 
@@ -179,7 +186,8 @@ static uint32_t find_vertex(double (*vertex)[3], uint32_t *count, uint32_t *tabl
     return *count - 1;
 }
 
-static strl__chunk *make_chunk(const triangle_pile *pile, const uint32_t *order, uint32_t count, strl_arena *scratch, double box[2][3])
+static strl__chunk *make_chunk(const triangle_pile *pile, const uint32_t *order, uint32_t count, strl_arena *scratch,
+                               double box[2][3])
 {
     uint32_t vertex_count = 0, slots = 4 * CHUNK_TRIANGLES * 2;
     double(*vertex)[3] = strl_arena_alloc(scratch, 3 * (size_t)count, sizeof *vertex);
@@ -202,11 +210,12 @@ static strl__chunk *make_chunk(const triangle_pile *pile, const uint32_t *order,
             }
             triangle[t][c] = find_vertex(vertex, &vertex_count, table, slots - 1, p);
         }
-    return strl__v_chunk_build(base, (const double(*)[3])vertex, vertex_count, (const uint32_t(*)[3])triangle, count, scratch);
+    return strl__v_chunk_build(base, (const double(*)[3])vertex, vertex_count, (const uint32_t(*)[3])triangle, count,
+                               scratch);
 }
 
-static strl_status write_chunk(chunking *self, input_slice *slice, const triangle_pile *pile, const uint32_t *order, uint32_t count,
-                               strl_arena *scratch, strl_error *err)
+static strl_status write_chunk(chunking *self, input_slice *slice, const triangle_pile *pile, const uint32_t *order,
+                               uint32_t count, strl_arena *scratch, strl_error *err)
 {
     strl_arena_mark mark = strl_arena_get_mark(scratch);
     chunk_entry entry;
@@ -229,8 +238,8 @@ static strl_status write_chunk(chunking *self, input_slice *slice, const triangl
 }
 
 /* Halves until a piece is small enough. */
-static strl_status divide(chunking *self, input_slice *slice, const triangle_pile *pile, uint32_t *order, uint32_t count, strl_arena *scratch,
-                          strl_error *err)
+static strl_status divide(chunking *self, input_slice *slice, const triangle_pile *pile, uint32_t *order,
+                          uint32_t count, strl_arena *scratch, strl_error *err)
 {
     if (count <= CHUNK_TRIANGLES)
         return write_chunk(self, slice, pile, order, count, scratch, err);
@@ -255,8 +264,9 @@ static strl_status chunk_slice(void *context, uint64_t index, unsigned worker_in
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a slice of the input");
     for (size_t i = slice->first_block; i < slice->first_block + slice->block_count; i++) {
         uint32_t triangles = i + 1 == region->block_count ? region->last : per_block;
-        strl_status status = strl_file_read(self->regions->file, (uint64_t)region->blocks[i] * per_block * STRL__SOUP_BYTES,
-                                            corner[count], triangles * STRL__SOUP_BYTES, err);
+        strl_status status =
+            strl_file_read(self->regions->file, (uint64_t)region->blocks[i] * per_block * STRL__SOUP_BYTES,
+                           corner[count], triangles * STRL__SOUP_BYTES, err);
         if (status != STRL_OK)
             return status;
         count += triangles;
@@ -319,8 +329,8 @@ static strl_status list_chunks(chunking *self, strl_error *err)
     return strl__v_surface_init(&input->surface, (uint32_t)count, box, err);
 }
 
-static strl_status make_chunks(strl__model *model, strl__vinput *input, strl__regions *regions, uint64_t slice_triangles,
-                               strl_error *err)
+static strl_status make_chunks(strl__model *model, strl__vinput *input, strl__regions *regions,
+                               uint64_t slice_triangles, strl_error *err)
 {
     chunking self = {.model = model, .input = input, .regions = regions, .workers = strl__v_workers_create(model)};
     strl_mutex_init(&self.mutex);
@@ -343,7 +353,8 @@ static double rounding_of(const strl__vtree *tree)
 {
     double largest = 0;
     for (unsigned k = 0; k < 3; k++)
-        largest = fmax(largest, fabs(tree->origin[k]) / tree->step + fmax(fabs((double)tree->box[0][k]), fabs((double)tree->box[1][k])));
+        largest = fmax(largest, fabs(tree->origin[k]) / tree->step +
+                                    fmax(fabs((double)tree->box[0][k]), fabs((double)tree->box[1][k])));
     return 16 * DBL_EPSILON * largest;
 }
 
@@ -352,7 +363,8 @@ strl_status strl__v_input_read(strl__model *model, const strl__vtree *tree, strl
     uint64_t slice_triangles = model->memory_bytes / 8 / strl_pool_workers(model->pool) / SLICE_TRIANGLE_BYTES;
     uint64_t wanted = tree->triangle_count / (slice_triangles / 2) + 1;
     strl__regions regions = {0};
-    *input = (strl__vinput){.rounding = rounding_of(tree), .path = strl_path_join(model->desc->scratch_dir, "verify-chunks")};
+    *input = (strl__vinput){.rounding = rounding_of(tree),
+                            .path = strl_path_join(model->desc->scratch_dir, "verify-chunks")};
     strl_status status = input->path ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
     if (status == STRL_OK)
         status = strl_file_create(input->path, &input->file, err);
@@ -386,16 +398,20 @@ void strl__v_check_leaves(strl__model *model, const strl__vtree *tree, const str
             strl__hash_add(&sum, tree->nodes[id].finest);
     strl__v_checked(model->checks, STRL_VERIFY_LEAVES, input->kept);
     if (input->triangles != model->triangles_in || input->nonfinite != model->dropped_nonfinite ||
-        input->degenerate != model->dropped_degenerate || input->lines != model->dropped_lines || input->points != model->dropped_points)
+        input->degenerate != model->dropped_degenerate || input->lines != model->dropped_lines ||
+        input->points != model->dropped_points)
         strl__v_flaw(model->checks, STRL_VERIFY_LEAVES, 1,
-                   "the input has %" PRIu64 " triangles, of which %" PRIu64 " are not finite and %" PRIu64 " degenerate, %" PRIu64
-                   " lines and %" PRIu64 " points; the header says %" PRIu64 ", %" PRIu64 ", %" PRIu64 ", %" PRIu64 " and %" PRIu64,
-                   input->triangles, input->nonfinite, input->degenerate, input->lines, input->points, model->triangles_in,
-                   model->dropped_nonfinite, model->dropped_degenerate, model->dropped_lines, model->dropped_points);
+                     "the input has %" PRIu64 " triangles, of which %" PRIu64 " are not finite and %" PRIu64
+                     " degenerate, %" PRIu64 " lines and %" PRIu64 " points; the header says %" PRIu64 ", %" PRIu64
+                     ", %" PRIu64 ", %" PRIu64 " and %" PRIu64,
+                     input->triangles, input->nonfinite, input->degenerate, input->lines, input->points,
+                     model->triangles_in, model->dropped_nonfinite, model->dropped_degenerate, model->dropped_lines,
+                     model->dropped_points);
     if (input->kept != tree->triangle_count)
-        strl__v_flaw(model->checks, STRL_VERIFY_LEAVES, 2, "the input has %" PRIu64 " triangles on the lattice, the leaves %" PRIu64,
-                   input->kept, tree->triangle_count);
+        strl__v_flaw(model->checks, STRL_VERIFY_LEAVES, 2,
+                     "the input has %" PRIu64 " triangles on the lattice, the leaves %" PRIu64, input->kept,
+                     tree->triangle_count);
     else if (!strl__hash_same(sum, input->sum))
         strl__v_flaw(model->checks, STRL_VERIFY_LEAVES, 3,
-                   "the %" PRIu64 " triangles of the leaves are not those of the input on the lattice", input->kept);
+                     "the %" PRIu64 " triangles of the leaves are not those of the input on the lattice", input->kept);
 }

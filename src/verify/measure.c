@@ -46,9 +46,10 @@ static void random_point(const strl__chunk *chunk, uint32_t t, double r, double 
         out[k] = u * chunk->vertex[corner[0]][k] + v * chunk->vertex[corner[1]][k] + w * chunk->vertex[corner[2]][k];
 }
 
-/* One point for two triangles: each in a stratum of its own of the chunk's area, so that neighbours in the chunk are neighbours in
- * space for the seeker too. */
-static void take_samples(const measuring *self, uint32_t index, const strl__chunk *chunk, strl__seeker *seeker, strl__measured *result)
+/* One point for two triangles: each in a stratum of its own of the chunk's area, so that neighbours in the
+ * chunk are neighbours in space for the seeker too. */
+static void take_samples(const measuring *self, uint32_t index, const strl__chunk *chunk, strl__seeker *seeker,
+                         strl__measured *result)
 {
     uint32_t count = (chunk->triangle_count + 1) / 2, t = 0;
     double total = 0, passed = 0;
@@ -91,8 +92,8 @@ static strl_status measure_chunk(void *context, uint64_t slot, unsigned worker, 
     return status;
 }
 
-strl_status strl__v_measure(strl__model *model, strl__surface *from, strl__surface *to, uint64_t seed, strl__measured *results,
-                          strl_error *err)
+strl_status strl__v_measure(strl__model *model, strl__surface *from, strl__surface *to, uint64_t seed,
+                            strl__measured *results, strl_error *err)
 {
     measuring self = {.model = model, .from = from, .to = to, .seed = seed, .results = results};
     strl_status status = STRL_OK;

@@ -38,7 +38,8 @@ void strl__v_mesh_hash_points(const strl__vmesh *mesh, const int64_t anchor[3], 
     }
 }
 
-strl__hash128 strl__v_mesh_hash(const strl__vmesh *mesh, uint32_t state, const uint16_t *map, const strl__hash128 *points)
+strl__hash128 strl__v_mesh_hash(const strl__vmesh *mesh, uint32_t state, const uint16_t *map,
+                                const strl__hash128 *points)
 {
     strl__hash128 sum = {0, 0};
     for (uint32_t t = 0; t < mesh->triangle_end[state]; t++) {
@@ -58,17 +59,21 @@ static bool same_position(const strl__vmesh *mesh, uint32_t a, uint32_t b)
 static strl_status check_ends(const strl__vmesh *mesh, strl_error *err)
 {
     for (uint32_t s = 0; s <= mesh->step_count; s++) {
-        bool grows = s == 0 || (mesh->vertex_end[s] > mesh->vertex_end[s - 1] && mesh->triangle_end[s] >= mesh->triangle_end[s - 1]);
+        bool grows = s == 0 || (mesh->vertex_end[s] > mesh->vertex_end[s - 1] &&
+                                mesh->triangle_end[s] >= mesh->triangle_end[s - 1]);
         if (!grows || mesh->vertex_end[s] > mesh->vertex_count || mesh->triangle_end[s] > mesh->triangle_count)
-            return strl__fail(err, STRL_ERR_FORMAT, "state %" PRIu32 " has %" PRIu32 " vertices and %" PRIu32 " triangles", s,
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "state %" PRIu32 " has %" PRIu32 " vertices and %" PRIu32 " triangles", s,
                               mesh->vertex_end[s], mesh->triangle_end[s]);
         float g = mesh->geometric_error[s], a = mesh->appearance_error[s];
         bool falls = s == 0 || (g <= mesh->geometric_error[s - 1] && a <= mesh->appearance_error[s - 1]);
         if (!(g >= 0 && a >= 0 && g <= 0x1p64f && a <= 0x1p64f) || !falls)
-            return strl__fail(err, STRL_ERR_FORMAT, "state %" PRIu32 " errs by %g and %g, more than the state before it", s, (double)g,
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "state %" PRIu32 " errs by %g and %g, more than the state before it", s, (double)g,
                               (double)a);
     }
-    if (mesh->vertex_end[mesh->step_count] != mesh->vertex_count || mesh->triangle_end[mesh->step_count] != mesh->triangle_count)
+    if (mesh->vertex_end[mesh->step_count] != mesh->vertex_count ||
+        mesh->triangle_end[mesh->step_count] != mesh->triangle_count)
         return strl__fail(err, STRL_ERR_FORMAT, "the last state has not all vertices and triangles");
     return STRL_OK;
 }
@@ -80,21 +85,24 @@ static strl_status check_vertices(const strl__vmesh *mesh, strl_error *err)
         for (uint32_t v = first; v < mesh->vertex_end[s]; v++)
             if (mesh->parent[v] >= first || !same_position(mesh, v, first) ||
                 !same_position(mesh, mesh->parent[v], mesh->parent[first]))
-                return strl__fail(err, STRL_ERR_FORMAT, "step %" PRIu32 ": vertex %" PRIu32 " has the parent %u, or other positions "
-                                  "than vertex %" PRIu32 " and its parent", s, v, mesh->parent[v], first);
+                return strl__fail(err, STRL_ERR_FORMAT,
+                                  "step %" PRIu32 ": vertex %" PRIu32 " has the parent %u, or other positions "
+                                  "than vertex %" PRIu32 " and its parent",
+                                  s, v, mesh->parent[v], first);
     }
     for (uint32_t v = 0; v < mesh->vertex_count; v++)
         if (mesh->normal[v][0] > 1023 || mesh->normal[v][1] > 1023 ||
             (mesh->palette_index && mesh->palette_index[v] >= mesh->palette_count))
-            return strl__fail(err, STRL_ERR_FORMAT, "vertex %" PRIu32 " has a normal or a palette index out of range", v);
+            return strl__fail(err, STRL_ERR_FORMAT, "vertex %" PRIu32 " has a normal or a palette index out of range",
+                              v);
     return STRL_OK;
 }
 
 /* Takes all steps back, from the finest state on, with the corners at each vertex in a list. */
 typedef struct unwinding {
     const strl__vmesh *mesh;
-    uint16_t *corner;  /* [3 * triangle_count] now */
-    uint32_t *next;    /* [3 * triangle_count] */
+    uint16_t *corner;       /* [3 * triangle_count] now */
+    uint32_t *next;         /* [3 * triangle_count] */
     uint32_t *first, *last; /* [vertex_count] corners, UINT32_MAX = none */
     uint64_t moves;
 } unwinding;
@@ -102,7 +110,8 @@ typedef struct unwinding {
 static bool degenerate(const unwinding *u, uint32_t t)
 {
     const uint16_t *c = &u->corner[3 * t];
-    return same_position(u->mesh, c[0], c[1]) || same_position(u->mesh, c[1], c[2]) || same_position(u->mesh, c[2], c[0]);
+    return same_position(u->mesh, c[0], c[1]) || same_position(u->mesh, c[1], c[2]) ||
+           same_position(u->mesh, c[2], c[0]);
 }
 
 static void append_corner(unwinding *u, uint32_t v, uint32_t first, uint32_t last)
@@ -133,7 +142,8 @@ static bool unwinding_init(unwinding *u, const strl__vmesh *mesh, strl_arena *sc
     return true;
 }
 
-/* Moves the corners of v to its parent. Triangles of the step itself, from `stays` on, may degenerate, others must not. */
+/* Moves the corners of v to its parent. Triangles of the step itself, from `stays` on, may degenerate, others
+ * must not. */
 static strl_status collapse_vertex(unwinding *u, uint32_t v, uint32_t stays, strl_error *err)
 {
     uint32_t parent = u->mesh->parent[v];
@@ -145,8 +155,9 @@ static strl_status collapse_vertex(unwinding *u, uint32_t v, uint32_t stays, str
         return strl__fail(err, STRL_ERR_FORMAT, "its steps move more than %" PRIu64 " corners", MOST_MOVES);
     for (uint32_t c = u->first[v]; c != UINT32_MAX; c = u->next[c])
         if (c / 3 < stays && degenerate(u, c / 3))
-            return strl__fail(err, STRL_ERR_FORMAT, "triangle %" PRIu32 " degenerates when vertex %" PRIu32 " collapses onto %" PRIu32,
-                              c / 3, v, parent);
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "triangle %" PRIu32 " degenerates when vertex %" PRIu32 " collapses onto %" PRIu32, c / 3,
+                              v, parent);
     append_corner(u, parent, u->first[v], u->last[v]);
     return STRL_OK;
 }
@@ -160,7 +171,8 @@ static strl_status take_back(unwinding *u, uint32_t step, strl_error *err)
         for (unsigned k = 0; k < 3; k++)
             own = own || (u->corner[3 * t + k] >= first && u->corner[3 * t + k] < end);
         if (!own)
-            return strl__fail(err, STRL_ERR_FORMAT, "step %" PRIu32 ": triangle %" PRIu32 " has no vertex of the step", step, t);
+            return strl__fail(err, STRL_ERR_FORMAT, "step %" PRIu32 ": triangle %" PRIu32 " has no vertex of the step",
+                              step, t);
     }
     for (uint32_t v = first; v < end; v++) {
         strl_status status = collapse_vertex(u, v, stays, err);
@@ -169,7 +181,8 @@ static strl_status take_back(unwinding *u, uint32_t step, strl_error *err)
     }
     for (uint32_t t = stays; t < mesh->triangle_end[step]; t++)
         if (!degenerate(u, t))
-            return strl__fail(err, STRL_ERR_FORMAT, "step %" PRIu32 ": triangle %" PRIu32 " would not be degenerate without it", step, t);
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "step %" PRIu32 ": triangle %" PRIu32 " would not be degenerate without it", step, t);
     return STRL_OK;
 }
 
@@ -178,7 +191,8 @@ strl_status strl__v_mesh_check_ranges(const strl__vmesh *mesh, strl_error *err)
     for (uint32_t t = 0; t < mesh->triangle_count; t++)
         for (unsigned k = 0; k < 3; k++)
             if (mesh->triangle[t][k] >= mesh->vertex_count)
-                return strl__fail(err, STRL_ERR_FORMAT, "triangle %" PRIu32 " has the corner %u of %" PRIu32 " vertices", t,
+                return strl__fail(err, STRL_ERR_FORMAT,
+                                  "triangle %" PRIu32 " has the corner %u of %" PRIu32 " vertices", t,
                                   mesh->triangle[t][k], mesh->vertex_count);
     strl_status status = check_ends(mesh, err);
     return status == STRL_OK ? check_vertices(mesh, err) : status;
@@ -188,7 +202,8 @@ strl_status strl__v_mesh_check_states(const strl__vmesh *mesh, strl_arena *scrat
 {
     unwinding u;
     if (!unwinding_init(&u, mesh, scratch))
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory to check a mesh of %" PRIu32 " triangles", mesh->triangle_count);
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory to check a mesh of %" PRIu32 " triangles",
+                          mesh->triangle_count);
     for (uint32_t t = 0; t < mesh->triangle_count; t++)
         if (degenerate(&u, t))
             return strl__fail(err, STRL_ERR_FORMAT, "triangle %" PRIu32 " is degenerate in the finest state", t);

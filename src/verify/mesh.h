@@ -1,8 +1,9 @@
-/* A decoded payload, the rules that it must keep, its states, and hashes of vertices, edges and triangles by absolute lattice
- * position, so that meshes of different nodes can be compared without being in memory together.
+/* A decoded payload, the rules that it must keep, its states, and hashes of vertices, edges and triangles by
+ * absolute lattice position, so that meshes of different nodes can be compared without being in memory
+ * together.
  *
- * Vertices are in the order of refinement; state s has vertices [0, vertex_end[s]) and triangles [0, triangle_end[s]); a corner c
- * stands for c where c < vertex_end[s], else for what parent[c] stands for. */
+ * Vertices are in the order of refinement; state s has vertices [0, vertex_end[s]) and triangles [0,
+ * triangle_end[s]); a corner c stands for c where c < vertex_end[s], else for what parent[c] stands for. */
 #ifndef STRL_VERIFY_MESH_H
 #define STRL_VERIFY_MESH_H
 
@@ -12,36 +13,39 @@
 
 typedef struct strl__vmesh {
     uint32_t vertex_count, triangle_count, step_count, palette_count;
-    int32_t (*position)[3];      /* [vertex_count] from the node's anchor */
-    uint16_t (*normal)[2];       /* [vertex_count] */
-    uint32_t *colour;            /* [vertex_count]; NULL = white */
-    uint16_t *palette_index;     /* [vertex_count]; NULL = 0 */
-    uint16_t *parent;            /* [vertex_count] */
-    uint16_t (*triangle)[3];     /* [triangle_count] corners in the finest state */
-    uint32_t *vertex_end;        /* [step_count + 1] */
-    uint32_t *triangle_end;      /* [step_count + 1] */
-    float *geometric_error;      /* [step_count + 1] */
-    float *appearance_error;     /* [step_count + 1] */
-    uint32_t (*palette)[2];      /* [palette_count] part, material */
+    int32_t (*position)[3];  /* [vertex_count] from the node's anchor */
+    uint16_t (*normal)[2];   /* [vertex_count] */
+    uint32_t *colour;        /* [vertex_count]; NULL = white */
+    uint16_t *palette_index; /* [vertex_count]; NULL = 0 */
+    uint16_t *parent;        /* [vertex_count] */
+    uint16_t (*triangle)[3]; /* [triangle_count] corners in the finest state */
+    uint32_t *vertex_end;    /* [step_count + 1] */
+    uint32_t *triangle_end;  /* [step_count + 1] */
+    float *geometric_error;  /* [step_count + 1] */
+    float *appearance_error; /* [step_count + 1] */
+    uint32_t (*palette)[2];  /* [palette_count] part, material */
 } strl__vmesh;
 
-/* docs/format-payload.md. STRL_ERR_FORMAT with a sentence where the bytes are not a payload; the arrays live in arena. Without
- * with_looks normals and colours are not decoded, and zero. */
-strl_status strl__v_payload_decode(const uint8_t *data, size_t size, strl_arena *arena, bool with_looks, strl__vmesh *mesh,
-                                   strl_error *err);
+/* docs/format-payload.md. STRL_ERR_FORMAT with a sentence where the bytes are not a payload; the arrays live in
+ * arena. Without with_looks normals and colours are not decoded, and zero. */
+strl_status strl__v_payload_decode(const uint8_t *data, size_t size, strl_arena *arena, bool with_looks,
+                                   strl__vmesh *mesh, strl_error *err);
 
-/* Every rule of a progressive mesh; STRL_ERR_FORMAT with a sentence. What indexing relies on, then what states promise. */
+/* Every rule of a progressive mesh; STRL_ERR_FORMAT with a sentence. What indexing relies on, then what states
+ * promise. */
 strl_status strl__v_mesh_check_ranges(const strl__vmesh *mesh, strl_error *err);
 strl_status strl__v_mesh_check_states(const strl__vmesh *mesh, strl_arena *scratch, strl_error *err);
 
 /* map[v] is the vertex that stands for v in state; [vertex_count]. */
 void strl__v_mesh_resolve(const strl__vmesh *mesh, uint32_t state, uint16_t *map);
-/* The coarsest state with an error of at most limit (lattice units), else the finest. with_appearance: the larger of both. */
+/* The coarsest state with an error of at most limit (lattice units), else the finest. with_appearance: the
+ * larger of both. */
 uint32_t strl__v_mesh_state(const strl__vmesh *mesh, double limit, bool with_appearance);
 
 static inline strl__hash128 strl__hash_point(int64_t x, int64_t y, int64_t z)
 {
-    uint64_t a = (uint64_t)x * 0x9e3779b97f4a7c15u, b = (uint64_t)y * 0xc2b2ae3d27d4eb4fu, c = (uint64_t)z * 0x165667b19e3779f9u;
+    uint64_t a = (uint64_t)x * 0x9e3779b97f4a7c15u, b = (uint64_t)y * 0xc2b2ae3d27d4eb4fu,
+             c = (uint64_t)z * 0x165667b19e3779f9u;
     strl__hash128 hash = {strl__mix64(strl__mix64(strl__mix64(a + 0x1b873593u) + b) + c),
                           strl__mix64(strl__mix64(strl__mix64(c ^ 0x85ebca6bc2b2ae35u) ^ b) ^ a)};
     return hash;
@@ -71,8 +75,9 @@ static inline strl__hash128 strl__hash_triangle(strl__hash128 a, strl__hash128 b
         first = b, second = c, third = a;
     else if (strl__hash_less(c, a) && strl__hash_less(c, b))
         first = c, second = a, third = b;
-    return (strl__hash128){strl__mix64(strl__mix64(first.low + 0x2545f4914f6cdd1du) + 3 * second.low + 5 * third.low),
-                           strl__mix64(strl__mix64(first.high ^ 0x9fb21c651e98df25u) + 7 * second.high + 11 * third.high)};
+    return (strl__hash128){
+        strl__mix64(strl__mix64(first.low + 0x2545f4914f6cdd1du) + 3 * second.low + 5 * third.low),
+        strl__mix64(strl__mix64(first.high ^ 0x9fb21c651e98df25u) + 7 * second.high + 11 * third.high)};
 }
 
 static inline void strl__hash_add(strl__hash128 *sum, strl__hash128 hash)
@@ -84,7 +89,8 @@ static inline void strl__hash_add(strl__hash128 *sum, strl__hash128 hash)
 /* points: [vertex_count] receives the hashes of the vertices of all states. */
 void strl__v_mesh_hash_points(const strl__vmesh *mesh, const int64_t anchor[3], strl__hash128 *points);
 /* The sum over the triangles of a state, whose map is given. */
-strl__hash128 strl__v_mesh_hash(const strl__vmesh *mesh, uint32_t state, const uint16_t *map, const strl__hash128 *points);
+strl__hash128 strl__v_mesh_hash(const strl__vmesh *mesh, uint32_t state, const uint16_t *map,
+                                const strl__hash128 *points);
 
 /* Per worker: bytes of a payload page, and arenas for what is decoded from it. */
 typedef struct strl__worker {
@@ -96,12 +102,13 @@ typedef struct strl__worker {
 strl__worker *strl__v_workers_create(const strl__model *model); /* NULL without memory */
 void strl__v_workers_destroy(const strl__model *model, strl__worker *workers);
 
-/* Reads and decodes one node's payload again, after the main pass has found it sound; what could not be indexed fails. The mesh lives
- * in worker->arena until the next call, which rewinds worker->scratch too. */
-strl_status strl__v_load_mesh(strl__model *model, const strl__vtree *tree, uint32_t node, strl__worker *worker, strl__vmesh *mesh,
-                            strl_error *err);
+/* Reads and decodes one node's payload again, after the main pass has found it sound; what could not be indexed
+ * fails. The mesh lives in worker->arena until the next call, which rewinds worker->scratch too. */
+strl_status strl__v_load_mesh(strl__model *model, const strl__vtree *tree, uint32_t node, strl__worker *worker,
+                              strl__vmesh *mesh, strl_error *err);
 
-/* The main pass over all payloads: checksums, decoding, mesh rules, counts, boxes, errors; fills in the nodes' hashes. */
+/* The main pass over all payloads: checksums, decoding, mesh rules, counts, boxes, errors; fills in the nodes'
+ * hashes. */
 strl_status strl__v_check_contents(strl__model *model, strl__vtree *tree, strl_error *err);
 /* Unions, from these hashes. */
 void strl__v_check_unions(strl__model *model, const strl__vtree *tree, uint64_t *exempt);

@@ -1,5 +1,6 @@
-/* What the checker knows of a container: header, trees and all node records, decoded by code of its own. Everything in a record
- * is checked for its range before it comes here; where records contradict each other, checking stops after the records. */
+/* What the checker knows of a container: header, trees and all node records, decoded by code of its own.
+ * Everything in a record is checked for its range before it comes here; where records contradict each other,
+ * checking stops after the records. */
 #ifndef STRL_VERIFY_MODEL_H
 #define STRL_VERIFY_MODEL_H
 
@@ -39,10 +40,10 @@ typedef struct strl__vtree {
     uint64_t triangle_count, vertex_count;
     float leaf_geometric;
     strl__place root;
-    strl__vnode *nodes;        /* [node_count], owned */
-    uint32_t *page_first;      /* [page_count + 1] first node of each run of nodes on one page, owned */
+    strl__vnode *nodes;   /* [node_count], owned */
+    uint32_t *page_first; /* [page_count + 1] first node of each run of nodes on one page, owned */
     uint32_t page_count;
-    uint32_t *group_first;     /* [group_count] its first member, owned */
+    uint32_t *group_first; /* [group_count] its first member, owned */
 } strl__vtree;
 
 typedef struct strl__section {
@@ -64,9 +65,9 @@ typedef struct strl__model {
     uint64_t triangles_in, dropped_nonfinite, dropped_degenerate, dropped_lines, dropped_points;
     double bounds[6];
     strl__section sections[STRL__SECTIONS];
-    strl__vtree *trees;  /* [tree_count], owned */
+    strl__vtree *trees; /* [tree_count], owned */
     uint32_t tree_count;
-    bool placed_plainly; /* one tree, placed once, as it is */
+    bool placed_plainly;   /* one tree, placed once, as it is */
     uint64_t record_bytes; /* held by all trees' arrays */
 } strl__model;
 
@@ -82,8 +83,8 @@ strl_status strl__v_check_structure(strl__model *model, strl__vtree *tree, strl_
 
 /* Reads the bytes at place into data (place->bytes long) and checks range and checksum; key and what describe it.
  * *good false: a flaw was noted. */
-strl_status strl__v_fetch(strl__model *model, const strl__place *place, const char *what, uint64_t key, uint8_t *data, bool *good,
-                        strl_error *err);
+strl_status strl__v_fetch(strl__model *model, const strl__place *place, const char *what, uint64_t key, uint8_t *data,
+                          bool *good, strl_error *err);
 bool strl__v_place_good(strl__model *model, const strl__place *place, const char *what, uint64_t key);
 
 /* Progress; STRL_ERR_CANCELLED where the callback says so. From the caller's thread only. */

@@ -1,5 +1,6 @@
-/* Open edges of a set of nodes, one by one, within the memory budget: edges that a node's own triangles leave open are collected and
- * sorted; where they are too many, only those of one residue of their hash in each of several passes. */
+/* Open edges of a set of nodes, one by one, within the memory budget: edges that a node's own triangles leave
+ * open are collected and sorted; where they are too many, only those of one residue of their hash in each of
+ * several passes. */
 #include <stdlib.h>
 
 #include "base/fail.h"
@@ -16,8 +17,8 @@ typedef struct collector {
     const strl__edge_query *query;
     strl__worker *workers;
     uint64_t pass, passes;
-    uint64_t limit;     /* edges that fit */
-    strl_mutex mutex;   /* guards what follows */
+    uint64_t limit;   /* edges that fit */
+    strl_mutex mutex; /* guards what follows */
     strl__open_edge *edges;
     size_t count, capacity;
     bool overflow;
@@ -40,7 +41,8 @@ static void absolute(const strl__vmesh *mesh, const int64_t anchor[3], uint32_t 
         out[k] = anchor[k] + mesh->position[v][k];
 }
 
-static strl_status emit(collector *self, const strl__vmesh *mesh, const int64_t anchor[3], const slot *edge, strl_error *err)
+static strl_status emit(collector *self, const strl__vmesh *mesh, const int64_t anchor[3], const slot *edge,
+                        strl_error *err)
 {
     if (self->count >= self->limit) {
         self->overflow = true;
@@ -71,7 +73,8 @@ static bool counts(const collector *self, const strl__vmesh *mesh, const int64_t
     return !strl__v_clustered_holds(query->tree, near, near_count, a, b);
 }
 
-static strl_status collect_mesh(collector *self, uint32_t id, const strl__vmesh *mesh, strl__worker *worker, strl_error *err)
+static strl_status collect_mesh(collector *self, uint32_t id, const strl__vmesh *mesh, strl__worker *worker,
+                                strl_error *err)
 {
     const strl__edge_query *query = self->query;
     const strl__vnode *node = &query->tree->nodes[id];
@@ -150,7 +153,9 @@ static void visit_odd(collector *self, uint64_t *count)
 
 strl_status strl__v_open_edges(const strl__edge_query *query, uint64_t *count, strl_error *err)
 {
-    collector self = {.query = query, .workers = strl__v_workers_create(query->model), .passes = 1,
+    collector self = {.query = query,
+                      .workers = strl__v_workers_create(query->model),
+                      .passes = 1,
                       .limit = query->model->memory_bytes / 5 / sizeof(strl__open_edge)};
     strl_status status = self.workers ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for the workers");
     strl_mutex_init(&self.mutex);

@@ -11,8 +11,8 @@
 
 bool strl__v_add_triangle(strl__v_payload *self, uint32_t a, uint32_t b, uint32_t c)
 {
-    if (self->triangle_count == self->triangles || strl__v_same_position(self, a, b) || strl__v_same_position(self, b, c) ||
-        strl__v_same_position(self, c, a))
+    if (self->triangle_count == self->triangles || strl__v_same_position(self, a, b) ||
+        strl__v_same_position(self, b, c) || strl__v_same_position(self, c, a))
         return false;
     uint32_t corner = 3 * self->triangle_count++;
     strl__v_list_corner(self, corner, a);
@@ -43,12 +43,15 @@ static strl_status read_head(strl__v_payload *self, strl_cursor *cursor)
     if (cursor->failed)
         return strl__fail(self->err, STRL_ERR_FORMAT, "the payload ends within its first %u bytes", HEAD_BYTES);
     if (version != 1 || self->flags > 3)
-        return strl__fail(self->err, STRL_ERR_FORMAT, "payload of version %" PRIu32 " with flags %" PRIu32, version, self->flags);
-    if (self->base_vertices > self->vertices || self->steps > self->vertices - self->base_vertices || self->entries == 0 ||
-        self->triangles > MOST_TRIANGLES || self->base_triangles > self->triangles)
-        return strl__fail(self->err, STRL_ERR_FORMAT, "payload of %" PRIu32 " of %" PRIu32 " vertices, %" PRIu32 " steps, %" PRIu32
-                          " of %" PRIu32 " triangles, %" PRIu32 " palette entries", self->base_vertices, self->vertices, self->steps,
-                          self->base_triangles, self->triangles, self->entries);
+        return strl__fail(self->err, STRL_ERR_FORMAT, "payload of version %" PRIu32 " with flags %" PRIu32, version,
+                          self->flags);
+    if (self->base_vertices > self->vertices || self->steps > self->vertices - self->base_vertices ||
+        self->entries == 0 || self->triangles > MOST_TRIANGLES || self->base_triangles > self->triangles)
+        return strl__fail(self->err, STRL_ERR_FORMAT,
+                          "payload of %" PRIu32 " of %" PRIu32 " vertices, %" PRIu32 " steps, %" PRIu32 " of %" PRIu32
+                          " triangles, %" PRIu32 " palette entries",
+                          self->base_vertices, self->vertices, self->steps, self->base_triangles, self->triangles,
+                          self->entries);
     return STRL_OK;
 }
 
@@ -57,7 +60,10 @@ static strl_status reserve(strl__v_payload *self)
     strl_arena *arena = self->arena;
     strl__vmesh *mesh = self->mesh;
     uint32_t v = self->vertices, states = self->steps + 1;
-    *mesh = (strl__vmesh){.vertex_count = v, .triangle_count = self->triangles, .step_count = self->steps, .palette_count = self->entries};
+    *mesh = (strl__vmesh){.vertex_count = v,
+                          .triangle_count = self->triangles,
+                          .step_count = self->steps,
+                          .palette_count = self->entries};
     mesh->position = strl_arena_alloc(arena, v, sizeof *mesh->position);
     mesh->normal = strl_arena_alloc_zero(arena, v, sizeof *mesh->normal);
     mesh->colour = self->flags & 1 ? strl_arena_alloc_zero(arena, v, sizeof *mesh->colour) : NULL;
@@ -73,9 +79,10 @@ static strl_status reserve(strl__v_payload *self)
     self->next = strl_arena_alloc(arena, 3 * (size_t)self->triangles, sizeof *self->next);
     self->ring = strl_arena_alloc(arena, v, sizeof *self->ring);
     self->from = strl_arena_alloc_zero(arena, self->base_vertices, sizeof *self->from);
-    bool good = mesh->position && mesh->normal && (mesh->colour || !(self->flags & 1)) && (mesh->palette_index || !(self->flags & 2)) &&
-                mesh->parent && mesh->triangle && mesh->vertex_end && mesh->triangle_end && mesh->geometric_error &&
-                mesh->appearance_error && mesh->palette && self->first && self->next && self->ring && self->from;
+    bool good = mesh->position && mesh->normal && (mesh->colour || !(self->flags & 1)) &&
+                (mesh->palette_index || !(self->flags & 2)) && mesh->parent && mesh->triangle && mesh->vertex_end &&
+                mesh->triangle_end && mesh->geometric_error && mesh->appearance_error && mesh->palette && self->first &&
+                self->next && self->ring && self->from;
     if (!good)
         return strl__fail(self->err, STRL_ERR_MEMORY, "no memory for a mesh of %" PRIu32 " vertices", v);
     memset(self->first, 0xff, (size_t)v * sizeof *self->first);
@@ -90,13 +97,14 @@ static strl_status check_ends(const strl__v_payload *self)
         return strl__fail(self->err, STRL_ERR_FORMAT, "the payload has too few values in a stream");
     for (unsigned i = 0; i < STRL__V_STREAMS; i++)
         if (self->stream[i].at != self->stream[i].count)
-            return strl__fail(self->err, STRL_ERR_FORMAT, "stream %u of the payload has %" PRIu32 " values, %" PRIu32 " were asked for", i,
+            return strl__fail(self->err, STRL_ERR_FORMAT,
+                              "stream %u of the payload has %" PRIu32 " values, %" PRIu32 " were asked for", i,
                               self->stream[i].count, self->stream[i].at);
     return STRL_OK;
 }
 
-strl_status strl__v_payload_decode(const uint8_t *data, size_t size, strl_arena *arena, bool with_looks, strl__vmesh *mesh,
-                                   strl_error *err)
+strl_status strl__v_payload_decode(const uint8_t *data, size_t size, strl_arena *arena, bool with_looks,
+                                   strl__vmesh *mesh, strl_error *err)
 {
     strl__v_payload self = {.mesh = mesh, .arena = arena, .err = err};
     strl_cursor cursor = strl_cursor_make(data, size);

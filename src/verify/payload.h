@@ -36,18 +36,18 @@ typedef struct strl__v_stream {
 
 typedef struct strl__v_payload {
     strl__vmesh *mesh;
-    strl_arena *arena;    /* for what stays and what does not */
+    strl_arena *arena; /* for what stays and what does not */
     strl_error *err;
     uint32_t flags, words, coder[4];
     uint32_t base_vertices, base_triangles, vertices, triangles, steps, entries; /* Vb, Tb, V, T, S, P */
     strl__v_stream stream[STRL__V_STREAMS];
-    bool starved;         /* a value was asked for that is not there */
+    bool starved; /* a value was asked for that is not there */
     /* The mesh while it grows. */
     uint32_t vertex_count, triangle_count;
-    uint32_t *first;      /* [V] newest corner at a vertex, UINT32_MAX = none; corner k of triangle t is 3 t + k */
-    uint32_t *next;       /* [3 T] */
-    uint16_t *ring;       /* [V] the vertex behind in the ring of a position */
-    uint16_t *from;       /* [Vb] */
+    uint32_t *first; /* [V] newest corner at a vertex, UINT32_MAX = none; corner k of triangle t is 3 t + k */
+    uint32_t *next;  /* [3 T] */
+    uint16_t *ring;  /* [V] the vertex behind in the ring of a position */
+    uint16_t *from;  /* [Vb] */
 } strl__v_payload;
 
 /* All three fail with STRL_ERR_FORMAT and a sentence, or STRL_ERR_MEMORY. bytes: what follows the head. */

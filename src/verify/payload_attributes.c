@@ -78,8 +78,8 @@ static void read_colours(strl__v_payload *self)
         uint32_t before = v ? colour[predecessor(self, v)] : 0xffffffffu, d[4];
         for (unsigned i = 0; i < 4; i++)
             d[i] = strl__v_residual(self, STRL__V_COLOUR + i); /* green, red, blue, alpha */
-        uint32_t red = (before + d[0] + d[1]) & 0xff, green = ((before >> 8) + d[0]) & 0xff, blue = ((before >> 16) + d[0] + d[2]) & 0xff,
-                 alpha = ((before >> 24) + d[3]) & 0xff;
+        uint32_t red = (before + d[0] + d[1]) & 0xff, green = ((before >> 8) + d[0]) & 0xff,
+                 blue = ((before >> 16) + d[0] + d[2]) & 0xff, alpha = ((before >> 24) + d[3]) & 0xff;
         colour[v] = red | green << 8 | blue << 16 | alpha << 24;
     }
 }
@@ -90,7 +90,8 @@ static strl_status read_palette(strl__v_payload *self)
     for (uint32_t v = 0; mesh->palette_index && v < mesh->vertex_count; v++) {
         uint32_t index = (v ? mesh->palette_index[predecessor(self, v)] : 0) + strl__v_residual(self, STRL__V_INDEX);
         if (index >= mesh->palette_count)
-            return strl__fail(self->err, STRL_ERR_FORMAT, "vertex %u has entry %u of a palette of %u", v, index, mesh->palette_count);
+            return strl__fail(self->err, STRL_ERR_FORMAT, "vertex %u has entry %u of a palette of %u", v, index,
+                              mesh->palette_count);
         mesh->palette_index[v] = (uint16_t)index;
     }
     uint32_t entry[3] = {0, 0, 0};
@@ -130,7 +131,8 @@ static strl_status read_errors(strl__v_payload *self, unsigned number, float *er
             break;
         code -= fall;
     }
-    return strl__fail(self->err, STRL_ERR_FORMAT, "the errors of stream %u are not those of %u states", number, self->steps + 1);
+    return strl__fail(self->err, STRL_ERR_FORMAT, "the errors of stream %u are not those of %u states", number,
+                      self->steps + 1);
 }
 
 static void skip_stream(strl__v_payload *self, unsigned number, uint32_t count)

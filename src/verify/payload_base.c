@@ -19,13 +19,14 @@ typedef struct front {
     strl__v_payload *payload;
     front_gate *gates;
     uint32_t gate_count, current, oldest;
-    uint32_t *at;      /* [Vb] */
-    uint8_t *degree;   /* [Vb] */
+    uint32_t *at;    /* [Vb] */
+    uint8_t *degree; /* [Vb] */
 } front;
 
 static strl_status refuse(const front *self, const char *what)
 {
-    return strl__fail(self->payload->err, STRL_ERR_FORMAT, "base mesh, triangle %u: %s", self->payload->triangle_count, what);
+    return strl__fail(self->payload->err, STRL_ERR_FORMAT, "base mesh, triangle %u: %s", self->payload->triangle_count,
+                      what);
 }
 
 static void set_gate(front *self, uint32_t g, uint32_t start, uint32_t end, uint32_t behind)
@@ -47,7 +48,8 @@ static void link_gates(front *self, uint32_t g, uint32_t h)
 static bool closes(const front *self, uint32_t x)
 {
     uint32_t n = self->gates[x].next;
-    return n != x && self->gates[x].state == LIVE && self->gates[n].state == LIVE && self->gates[n].end == self->gates[x].start;
+    return n != x && self->gates[x].state == LIVE && self->gates[n].state == LIVE &&
+           self->gates[n].end == self->gates[x].start;
 }
 
 static uint32_t zip(front *self, uint32_t g)

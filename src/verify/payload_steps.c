@@ -14,10 +14,10 @@ enum { GENERAL = 4 };
 typedef struct vertex_star {
     uint32_t count;
     uint32_t *corner;
-    uint16_t (*wing)[2];  /* x, y */
+    uint16_t (*wing)[2]; /* x, y */
     bool *moves;
-    uint32_t *starting;   /* [V] the last place with this x; stale ones are recognised */
-    uint32_t *order;      /* places that move, in order */
+    uint32_t *starting; /* [V] the last place with this x; stale ones are recognised */
+    uint32_t *order;    /* places that move, in order */
     uint32_t moving;
 } vertex_star;
 

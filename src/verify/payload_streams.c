@@ -42,7 +42,9 @@ static bool read_table(rans_coder *self)
         uint32_t frequency = PROBABILITY - start;
         if (s + 1 < symbols) {
             uint32_t length = read_bits(self, 4);
-            uint32_t coded = length == 0 ? 0 : length > 12 ? PROBABILITY + 1 : (1u << (length - 1)) + read_bits(self, length - 1);
+            uint32_t coded = length == 0   ? 0
+                             : length > 12 ? PROBABILITY + 1
+                                           : (1u << (length - 1)) + read_bits(self, length - 1);
             if (coded > frequency)
                 return false;
             frequency = coded;
@@ -89,8 +91,9 @@ static strl_status read_stream(strl__v_payload *self, rans_coder *coder, unsigne
     unsigned length = read_bits(coder, 5);
     uint32_t count = length ? (1u << (length - 1)) + read_bits(coder, length - 1) : 0;
     if (count > most)
-        return strl__fail(self->err, STRL_ERR_FORMAT, "stream %u of the payload has %" PRIu32 " values, its size allows %" PRIu64, number,
-                          count, most);
+        return strl__fail(self->err, STRL_ERR_FORMAT,
+                          "stream %u of the payload has %" PRIu32 " values, its size allows %" PRIu64, number, count,
+                          most);
     unsigned mode = count ? read_bits(coder, 6) : 0;
     uint32_t *values = strl_arena_alloc_zero(self->arena, count, sizeof *values);
     if (!values)
@@ -101,9 +104,10 @@ static strl_status read_stream(strl__v_payload *self, rans_coder *coder, unsigne
     for (uint32_t i = 0; good && mode > 0 && mode < 33 && i < count && !coder->failed; i++)
         values[i] = read_bits(coder, mode);
     self->stream[number] = (strl__v_stream){values, count, 0};
-    return good && !coder->failed ? STRL_OK
-                                  : strl__fail(self->err, STRL_ERR_FORMAT, "stream %u of the payload has a bad mode or table, or ends early",
-                                               number);
+    return good && !coder->failed
+               ? STRL_OK
+               : strl__fail(self->err, STRL_ERR_FORMAT,
+                            "stream %u of the payload has a bad mode or table, or ends early", number);
 }
 
 /* All is used: words, coders, bits; zero bytes behind only where the limit on items asked for each of them. */
@@ -122,9 +126,11 @@ static bool ended(const rans_coder *coder, size_t payload_bytes, uint64_t items)
 
 static strl_status read_streams(strl__v_payload *self, rans_coder *coder, size_t payload_bytes)
 {
-    uint64_t items = (uint64_t)self->vertices + self->triangles + self->entries, most = ITEMS_A_BYTE * (uint64_t)payload_bytes;
+    uint64_t items = (uint64_t)self->vertices + self->triangles + self->entries,
+             most = ITEMS_A_BYTE * (uint64_t)payload_bytes;
     if (items > most)
-        return strl__fail(self->err, STRL_ERR_FORMAT, "%" PRIu64 " items cannot stand in a payload of %zu bytes", items, payload_bytes);
+        return strl__fail(self->err, STRL_ERR_FORMAT, "%" PRIu64 " items cannot stand in a payload of %zu bytes", items,
+                          payload_bytes);
     for (unsigned number = 0; number < STRL__V_STREAMS; number++) {
         strl_status status = read_stream(self, coder, number, most - items);
         if (status != STRL_OK)
@@ -139,8 +145,8 @@ static strl_status read_streams(strl__v_payload *self, rans_coder *coder, size_t
 strl_status strl__v_payload_streams(strl__v_payload *self, strl_cursor *cursor, size_t payload_bytes)
 {
     if (self->words > strl_cursor_left(cursor) / 2)
-        return strl__fail(self->err, STRL_ERR_FORMAT, "%" PRIu32 " words do not stand in the payload's last %zu bytes", self->words,
-                          strl_cursor_left(cursor));
+        return strl__fail(self->err, STRL_ERR_FORMAT, "%" PRIu32 " words do not stand in the payload's last %zu bytes",
+                          self->words, strl_cursor_left(cursor));
     rans_coder *coder = strl_arena_alloc_zero(self->arena, 1, sizeof *coder);
     const uint8_t *words = strl_cursor_take(cursor, 2 * (size_t)self->words);
     size_t bit_bytes = strl_cursor_left(cursor);

@@ -1,5 +1,6 @@
-/* Treelets and node records: docs/format.md, "Treelets". Every range that one record, and its place among the others, allows to
- * check is checked here; later stages index with what is in the records without looking again. */
+/* Treelets and node records: docs/format.md, "Treelets". Every range that one record, and its place among the
+ * others, allows to check is checked here; later stages index with what is in the records without looking
+ * again. */
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>
@@ -28,10 +29,10 @@ typedef struct treelets {
     uint8_t bytes[MOST_TREELET_BYTES];
 } treelets;
 
-#define RECORD_RULE(self, condition, node, ...)                                                              \
-    do {                                                                                                     \
-        if (!(condition))                                                                                    \
-            strl__v_flaw((self)->model->checks, STRL_VERIFY_RECORDS, strl__key((self)->tree, (node)), __VA_ARGS__); \
+#define RECORD_RULE(self, condition, node, ...)                                                                        \
+    do {                                                                                                               \
+        if (!(condition))                                                                                              \
+            strl__v_flaw((self)->model->checks, STRL_VERIFY_RECORDS, strl__key((self)->tree, (node)), __VA_ARGS__);    \
     } while (0)
 
 static void read_vector(strl_cursor *cursor, int64_t out[3])
@@ -95,52 +96,60 @@ static bool lattice_range(int64_t box[2][3], const int64_t anchor[3])
 static void check_ranges(treelets *self, uint32_t id, strl__vnode *n)
 {
     const strl__vtree *tree = self->tree;
-    RECORD_RULE(self, n->rung <= 3 && n->level < tree->level_count && n->group < tree->group_count && n->group_size >= 1 &&
-                n->group_size <= tree->node_count, id, "tree %u node %u: rung %u, level %u of %u, group %u of %u with %u members",
-                tree->index, id, n->rung, n->level, tree->level_count, n->group, tree->group_count, n->group_size);
+    RECORD_RULE(self,
+                n->rung <= 3 && n->level < tree->level_count && n->group < tree->group_count && n->group_size >= 1 &&
+                    n->group_size <= tree->node_count,
+                id, "tree %u node %u: rung %u, level %u of %u, group %u of %u with %u members", tree->index, id,
+                n->rung, n->level, tree->level_count, n->group, tree->group_count, n->group_size);
     RECORD_RULE(self, lattice_range(n->box, n->anchor) && lattice_range(n->group_box, n->anchor), id,
                 "tree %u node %u: a box is upside down or outside 2^62", tree->index, id);
-    RECORD_RULE(self, error_range(n->geometric_min, n->geometric_max) && error_range(n->appearance_min, n->appearance_max) &&
-                error_range(0, n->group_geometric) && error_range(0, n->group_appearance), id,
-                "tree %u node %u: errors %g to %g, %g to %g, of the group %g and %g", tree->index, id, (double)n->geometric_min,
-                (double)n->geometric_max, (double)n->appearance_min, (double)n->appearance_max, (double)n->group_geometric,
-                (double)n->group_appearance);
-    RECORD_RULE(self, n->vertex_count <= 65535 && n->base_vertex_count <= n->vertex_count && n->triangle_count <= 131072 &&
-                n->base_triangle_count <= n->triangle_count && n->step_count <= n->vertex_count - n->base_vertex_count &&
-                n->shared_vertices <= n->base_vertex_count, id,
-                "tree %u node %u: %u of %u vertices, %u of %u triangles, %u steps, %u shared vertices", tree->index, id,
-                n->base_vertex_count, n->vertex_count, n->base_triangle_count, n->triangle_count, n->step_count, n->shared_vertices);
-    RECORD_RULE(self, n->page.bytes <= MOST_PAGE_BYTES && n->payload_bytes >= 1 && n->payload_offset <= n->page.bytes &&
-                n->payload_bytes <= n->page.bytes - n->payload_offset, id,
-                "tree %u node %u: bytes %u to %u of a page of %u", tree->index, id, n->payload_offset,
+    RECORD_RULE(self,
+                error_range(n->geometric_min, n->geometric_max) && error_range(n->appearance_min, n->appearance_max) &&
+                    error_range(0, n->group_geometric) && error_range(0, n->group_appearance),
+                id, "tree %u node %u: errors %g to %g, %g to %g, of the group %g and %g", tree->index, id,
+                (double)n->geometric_min, (double)n->geometric_max, (double)n->appearance_min,
+                (double)n->appearance_max, (double)n->group_geometric, (double)n->group_appearance);
+    RECORD_RULE(self,
+                n->vertex_count <= 65535 && n->base_vertex_count <= n->vertex_count && n->triangle_count <= 131072 &&
+                    n->base_triangle_count <= n->triangle_count &&
+                    n->step_count <= n->vertex_count - n->base_vertex_count &&
+                    n->shared_vertices <= n->base_vertex_count,
+                id, "tree %u node %u: %u of %u vertices, %u of %u triangles, %u steps, %u shared vertices", tree->index,
+                id, n->base_vertex_count, n->vertex_count, n->base_triangle_count, n->triangle_count, n->step_count,
+                n->shared_vertices);
+    RECORD_RULE(self,
+                n->page.bytes <= MOST_PAGE_BYTES && n->payload_bytes >= 1 && n->payload_offset <= n->page.bytes &&
+                    n->payload_bytes <= n->page.bytes - n->payload_offset,
+                id, "tree %u node %u: bytes %u to %u of a page of %u", tree->index, id, n->payload_offset,
                 n->payload_offset + n->payload_bytes, n->page.bytes);
     if (n->page.bytes && (id == 0 || tree->nodes[id - 1].page.offset != n->page.offset))
         strl__v_place_good(self->model, &n->page, "payload page", strl__key(tree, id));
 }
 
-/* The node's place among those before it: the parents of a breadth-first order never decrease, and children follow each other. */
+/* The node's place among those before it: the parents of a breadth-first order never decrease, and children
+ * follow each other. */
 static void check_place(treelets *self, uint32_t id, const strl__vnode *n)
 {
     const strl__vtree *tree = self->tree;
     uint32_t before = id > 1 ? tree->nodes[id - 1].parent : 0;
     bool rooted = id == 0 ? n->parent == STRL__NO_NODE && n->level == tree->level_count - 1
                           : n->parent < id && n->parent >= before;
-    RECORD_RULE(self, rooted, id, "tree %u node %u: parent %u after %u, level %u of %u", tree->index, id, n->parent, before,
-                n->level, tree->level_count);
+    RECORD_RULE(self, rooted, id, "tree %u node %u: parent %u after %u, level %u of %u", tree->index, id, n->parent,
+                before, n->level, tree->level_count);
     if (id > 0 && rooted) {
         const strl__vnode *p = &tree->nodes[n->parent];
         RECORD_RULE(self, p->child_count && id >= p->first_child && id - p->first_child < p->child_count, id,
-                    "tree %u node %u: its parent %u has the children %u and %u more", tree->index, id, n->parent, p->first_child,
-                    p->child_count);
-        RECORD_RULE(self, p->level == n->level + 1, id, "tree %u node %u: level %u under a parent of level %u", tree->index, id,
-                    n->level, p->level);
+                    "tree %u node %u: its parent %u has the children %u and %u more", tree->index, id, n->parent,
+                    p->first_child, p->child_count);
+        RECORD_RULE(self, p->level == n->level + 1, id, "tree %u node %u: level %u under a parent of level %u",
+                    tree->index, id, n->level, p->level);
     }
     bool children = n->child_count == 0
                         ? n->first_child == STRL__NO_NODE
                         : n->child_count <= 8 && n->first_child == self->next_child && n->first_child > id &&
                               n->child_count <= tree->node_count - n->first_child && n->level >= 1;
-    RECORD_RULE(self, children, id, "tree %u node %u: %u children from %u of %u nodes, expected from %u", tree->index, id,
-                n->child_count, n->first_child, tree->node_count, self->next_child);
+    RECORD_RULE(self, children, id, "tree %u node %u: %u children from %u of %u nodes, expected from %u", tree->index,
+                id, n->child_count, n->first_child, tree->node_count, self->next_child);
     if (n->child_count && children)
         self->next_child += n->child_count;
 }
@@ -148,9 +157,11 @@ static void check_place(treelets *self, uint32_t id, const strl__vnode *n)
 static void name_treelet(treelets *self, uint32_t by, uint32_t index, const strl__place *place)
 {
     strl__place *known = &self->places[index];
-    RECORD_RULE(self, known->bytes == 0 || (known->offset == place->offset && known->bytes == place->bytes &&
-                                            known->checksum == place->checksum), by * TREELET_NODES,
-                "tree %u treelet %u: treelet %u has another place than an earlier one said", self->tree->index, by, index);
+    RECORD_RULE(self,
+                known->bytes == 0 || (known->offset == place->offset && known->bytes == place->bytes &&
+                                      known->checksum == place->checksum),
+                by * TREELET_NODES, "tree %u treelet %u: treelet %u has another place than an earlier one said",
+                self->tree->index, by, index);
     *known = *place;
 }
 
@@ -171,8 +182,8 @@ static void read_references(treelets *self, uint32_t index, uint32_t children_fr
         place.bytes = strl_cursor_u32(cursor);
         uint32_t reserved = strl_cursor_u32(cursor);
         place.checksum = strl_cursor_u64(cursor);
-        RECORD_RULE(self, reserved == 0, index * TREELET_NODES, "tree %u treelet %u: a reserved word is %u", self->tree->index,
-                    index, reserved);
+        RECORD_RULE(self, reserved == 0, index * TREELET_NODES, "tree %u treelet %u: a reserved word is %u",
+                    self->tree->index, index, reserved);
         if (first + i < self->count)
             name_treelet(self, index, first + i, &place);
     }
@@ -187,7 +198,8 @@ static void read_nodes(treelets *self, uint32_t index, size_t size)
     uint32_t wanted = tree->node_count - base < TREELET_NODES ? tree->node_count - base : TREELET_NODES;
     bool good = first == base && count == wanted && refs <= MOST_REFS &&
                 size == HEAD_BYTES + (size_t)wanted * RECORD_BYTES + (size_t)refs * REF_BYTES;
-    RECORD_RULE(self, good, base, "tree %u treelet %u: %zu bytes for %u nodes from %u and %u references, expected %u from %u",
+    RECORD_RULE(self, good, base,
+                "tree %u treelet %u: %zu bytes for %u nodes from %u and %u references, expected %u from %u",
                 tree->index, index, size, count, first, refs, wanted, base);
     if (!good)
         return;
@@ -225,13 +237,15 @@ static strl_status reserve(treelets *self, strl_error *err)
     uint64_t bytes = (uint64_t)tree->node_count * (sizeof *tree->nodes + 2 * sizeof *tree->page_first) +
                      (uint64_t)self->count * sizeof *self->places;
     if (bytes > self->model->memory_bytes / 2 - self->model->record_bytes)
-        return strl__fail(err, STRL_ERR_MEMORY, "the records of %u nodes take %" PRIu64 " bytes, more than half of --memory %" PRIu64,
+        return strl__fail(err, STRL_ERR_MEMORY,
+                          "the records of %u nodes take %" PRIu64 " bytes, more than half of --memory %" PRIu64,
                           tree->node_count, bytes, self->model->memory_bytes);
     self->model->record_bytes += bytes;
     tree->nodes = strl__alloc(tree->node_count, sizeof *tree->nodes);
     self->places = strl__alloc_zero(self->count, sizeof *self->places);
-    return tree->nodes && self->places ? STRL_OK
-                                       : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u node records", tree->node_count);
+    return tree->nodes && self->places
+               ? STRL_OK
+               : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u node records", tree->node_count);
 }
 
 strl_status strl__v_read_records(strl__model *model, strl__vtree *tree, bool *sound, strl_error *err)
@@ -248,8 +262,8 @@ strl_status strl__v_read_records(strl__model *model, strl__vtree *tree, bool *so
     for (uint32_t i = 0; status == STRL_OK && *sound && i < self->count; i++)
         status = read_treelet(self, i, sound, err);
     if (status == STRL_OK && *sound && self->next_child != tree->node_count) {
-        strl__v_flaw(model->checks, STRL_VERIFY_RECORDS, strl__key(tree, 0), "tree %u: %u of %u nodes have a parent", tree->index,
-                   self->next_child - 1, tree->node_count - 1);
+        strl__v_flaw(model->checks, STRL_VERIFY_RECORDS, strl__key(tree, 0), "tree %u: %u of %u nodes have a parent",
+                     tree->index, self->next_child - 1, tree->node_count - 1);
         *sound = false;
     }
     strl__free(self->places);

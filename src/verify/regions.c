@@ -99,13 +99,16 @@ static uint32_t region_of(const strl__regions *regions, const double corners[9])
 
 /* ---- blocks on disk ---- */
 
-strl_status strl__v_regions_create(const strl__model *model, const strl__vtree *tree, uint32_t count, strl__regions *regions,
-                                 strl_error *err)
+strl_status strl__v_regions_create(const strl__model *model, const strl__vtree *tree, uint32_t count,
+                                   strl__regions *regions, strl_error *err)
 {
     size_t leaf_count = 0;
     weighted *items = leaf_centres(tree, &leaf_count);
     uint64_t block = model->memory_bytes / 16 / count / STRL__SOUP_BYTES;
-    *regions = (strl__regions){.count = count, .block_triangles = block < 56 ? 56 : block > 900 ? 900 : (uint32_t)block};
+    *regions = (strl__regions){.count = count,
+                               .block_triangles = block < 56    ? 56
+                                                  : block > 900 ? 900
+                                                                : (uint32_t)block};
     regions->splits = strl__alloc(count, sizeof *regions->splits);
     regions->items = strl__alloc_zero(count, sizeof *regions->items);
     regions->path = strl_path_join(model->desc->scratch_dir, "verify-soup");
@@ -128,7 +131,8 @@ static strl_status write_block(strl__regions *regions, strl__region *region, str
     if (!strl__grow(&region->blocks, &region->block_capacity, region->block_count + 1, sizeof *region->blocks))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %u blocks of triangles", regions->blocks);
     uint64_t bytes = (uint64_t)regions->block_triangles * STRL__SOUP_BYTES;
-    strl_status status = strl_file_write(regions->file, regions->blocks * bytes, region->buffer, region->fill * STRL__SOUP_BYTES, err);
+    strl_status status =
+        strl_file_write(regions->file, regions->blocks * bytes, region->buffer, region->fill * STRL__SOUP_BYTES, err);
     region->blocks[region->block_count++] = regions->blocks++;
     region->last = region->fill;
     region->fill = 0;

@@ -1,4 +1,5 @@
-/* What needs more than one record: boxes nest, errors grow to the root, groups are what their members say, sums, pages. */
+/* What needs more than one record: boxes nest, errors grow to the root, groups are what their members say,
+ * sums, pages. */
 #include <inttypes.h>
 
 #include "base/fail.h"
@@ -8,11 +9,11 @@
 #define MOST_PAGE_NODES 1024u
 
 /* Counts one look and, where condition is false, one flaw. */
-#define RULE(kind, condition, node, ...)                                                         \
-    do {                                                                                         \
-        strl__v_checked(model->checks, STRL_VERIFY_##kind, 1);                                     \
-        if (!(condition))                                                                        \
-            strl__v_flaw(model->checks, STRL_VERIFY_##kind, strl__key(tree, (node)), __VA_ARGS__); \
+#define RULE(kind, condition, node, ...)                                                                               \
+    do {                                                                                                               \
+        strl__v_checked(model->checks, STRL_VERIFY_##kind, 1);                                                         \
+        if (!(condition))                                                                                              \
+            strl__v_flaw(model->checks, STRL_VERIFY_##kind, strl__key(tree, (node)), __VA_ARGS__);                     \
     } while (0)
 
 static bool inside(const int64_t inner[2][3], const int64_t outer[2][3])
@@ -26,15 +27,16 @@ static bool inside(const int64_t inner[2][3], const int64_t outer[2][3])
 static void check_boxes(strl__model *model, const strl__vtree *tree, uint32_t id)
 {
     const strl__vnode *n = &tree->nodes[id];
-    RULE(BOXES, inside(n->box, n->group_box), id, "tree %u node %u: its box is not inside the box of its group %u", tree->index, id,
-         n->group);
+    RULE(BOXES, inside(n->box, n->group_box), id, "tree %u node %u: its box is not inside the box of its group %u",
+         tree->index, id, n->group);
     if (id == 0)
         return;
     const strl__vnode *p = &tree->nodes[n->parent];
-    RULE(BOXES, inside(n->box, p->box), id, "tree %u node %u: its box is not inside the box of its parent %u", tree->index, id,
-         n->parent);
+    RULE(BOXES, inside(n->box, p->box), id, "tree %u node %u: its box is not inside the box of its parent %u",
+         tree->index, id, n->parent);
     RULE(BOXES, inside(n->group_box, p->group_box), id,
-         "tree %u node %u: the box of its group %u is not inside that of its parent's group %u", tree->index, id, n->group, p->group);
+         "tree %u node %u: the box of its group %u is not inside that of its parent's group %u", tree->index, id,
+         n->group, p->group);
 }
 
 static void check_errors(strl__model *model, const strl__vtree *tree, uint32_t id)
@@ -42,19 +44,23 @@ static void check_errors(strl__model *model, const strl__vtree *tree, uint32_t i
     const strl__vnode *n = &tree->nodes[id];
     RULE(ERRORS, n->group_geometric >= n->geometric_min && n->group_appearance >= n->appearance_min, id,
          "tree %u node %u: errors %g and %g are above those of its group %u (%g and %g)", tree->index, id,
-         (double)n->geometric_min, (double)n->appearance_min, n->group, (double)n->group_geometric, (double)n->group_appearance);
+         (double)n->geometric_min, (double)n->appearance_min, n->group, (double)n->group_geometric,
+         (double)n->group_appearance);
     if (n->child_count == 0)
-        RULE(ERRORS, n->geometric_min >= tree->leaf_geometric, id, "tree %u node %u: a leaf claims %g, less than quantisation (%g)",
-             tree->index, id, (double)n->geometric_min, (double)tree->leaf_geometric);
+        RULE(ERRORS, n->geometric_min >= tree->leaf_geometric, id,
+             "tree %u node %u: a leaf claims %g, less than quantisation (%g)", tree->index, id,
+             (double)n->geometric_min, (double)tree->leaf_geometric);
     if (id == 0)
         return;
     const strl__vnode *p = &tree->nodes[n->parent];
     RULE(ERRORS, n->geometric_max <= p->geometric_min && n->appearance_max <= p->appearance_min, id,
-         "tree %u node %u: its base errs by %g and %g, more than the finest state of its parent %u (%g and %g)", tree->index, id,
-         (double)n->geometric_max, (double)n->appearance_max, n->parent, (double)p->geometric_min, (double)p->appearance_min);
+         "tree %u node %u: its base errs by %g and %g, more than the finest state of its parent %u (%g and %g)",
+         tree->index, id, (double)n->geometric_max, (double)n->appearance_max, n->parent, (double)p->geometric_min,
+         (double)p->appearance_min);
     RULE(ERRORS, n->group_geometric <= p->group_geometric && n->group_appearance <= p->group_appearance, id,
-         "tree %u node %u: its group %u errs by %g and %g, more than group %u of its parent (%g and %g)", tree->index, id, n->group,
-         (double)n->group_geometric, (double)n->group_appearance, p->group, (double)p->group_geometric, (double)p->group_appearance);
+         "tree %u node %u: its group %u errs by %g and %g, more than group %u of its parent (%g and %g)", tree->index,
+         id, n->group, (double)n->group_geometric, (double)n->group_appearance, p->group, (double)p->group_geometric,
+         (double)p->group_appearance);
 }
 
 static bool same_group_facts(const strl__vnode *a, const strl__vnode *b)
@@ -82,8 +88,8 @@ static strl_status check_groups(strl__model *model, strl__vtree *tree, strl_erro
             tree->group_first[n->group] = id;
         uint32_t first = tree->group_first[n->group];
         RULE(GROUPS, same_group_facts(n, &tree->nodes[first]), id,
-             "tree %u node %u: says of its group %u (level, size, box or errors) what node %u does not", tree->index, id, n->group,
-             first);
+             "tree %u node %u: says of its group %u (level, size, box or errors) what node %u does not", tree->index,
+             id, n->group, first);
     }
     for (uint32_t g = 0; g < tree->group_count; g++) {
         uint32_t first = tree->group_first[g];
@@ -113,13 +119,14 @@ static void check_counts(strl__model *model, const strl__vtree *tree)
         first = false;
     }
     RULE(COUNTS, triangles == tree->triangle_count && vertices == tree->vertex_count, 0,
-         "tree %u: its leaves have %" PRIu64 " triangles and %" PRIu64 " vertices, the trees section says %" PRIu64 " and %" PRIu64,
+         "tree %u: its leaves have %" PRIu64 " triangles and %" PRIu64 " vertices, the trees section says %" PRIu64
+         " and %" PRIu64,
          tree->index, triangles, vertices, tree->triangle_count, tree->vertex_count);
     RULE(COUNTS, tree->root_triangles == tree->nodes[0].base_triangle_count, 0,
-         "tree %u: the root has %u triangles, the trees section says %u", tree->index, tree->nodes[0].base_triangle_count,
-         tree->root_triangles);
-    RULE(BOXES, !first && inside(box, tree->box) && inside(tree->box, box), 0, "tree %u: its box is not that of its leaves",
-         tree->index);
+         "tree %u: the root has %u triangles, the trees section says %u", tree->index,
+         tree->nodes[0].base_triangle_count, tree->root_triangles);
+    RULE(BOXES, !first && inside(box, tree->box) && inside(tree->box, box), 0,
+         "tree %u: its box is not that of its leaves", tree->index);
     RULE(ROOT, tree->nodes[0].base_triangle_count <= STRL_VERIFY_ROOT_TRIANGLES, 0,
          "tree %u: the root has %u triangles, expected at most %u", tree->index, tree->nodes[0].base_triangle_count,
          STRL_VERIFY_ROOT_TRIANGLES);
@@ -145,15 +152,17 @@ static uint32_t check_page(strl__model *model, const strl__vtree *tree, uint32_t
     uint64_t decoded = 0;
     for (; id < tree->node_count && tree->nodes[id].page.offset == head->page.offset; id++) {
         const strl__vnode *n = &tree->nodes[id];
-        RULE(PAGES, same_page(n, head) && n->payload_offset == at, id,
-             "tree %u node %u: its payload is at byte %u of its page, expected %u, or it says otherwise of the page than node %u",
-             tree->index, id, n->payload_offset, at, first);
+        RULE(
+            PAGES, same_page(n, head) && n->payload_offset == at, id,
+            "tree %u node %u: its payload is at byte %u of its page, expected %u, or it "
+             "says otherwise of the page than node %u",
+            tree->index, id, n->payload_offset, at, first);
         at = n->payload_offset + n->payload_bytes;
         decoded += decoded_bytes(n);
     }
     RULE(PAGES, at == head->page.bytes && decoded == head->page_decoded && id - first <= MOST_PAGE_NODES, first,
-         "tree %u: the page of nodes %u to %u has %u bytes and %" PRIu64 " decoded, its records say %u and %u", tree->index, first,
-         id - 1, at, decoded, head->page.bytes, head->page_decoded);
+         "tree %u: the page of nodes %u to %u has %u bytes and %" PRIu64 " decoded, its records say %u and %u",
+         tree->index, first, id - 1, at, decoded, head->page.bytes, head->page_decoded);
     return id;
 }
 

@@ -114,7 +114,8 @@ static strl_status load_slot(strl__surface *surface, uint32_t index, unsigned wo
     return STRL_OK;
 }
 
-strl_status strl__v_surface_pin(strl__surface *surface, uint32_t index, unsigned worker, const strl__chunk **chunk, strl_error *err)
+strl_status strl__v_surface_pin(strl__surface *surface, uint32_t index, unsigned worker, const strl__chunk **chunk,
+                                strl_error *err)
 {
     strl_status status = STRL_OK;
     strl__surface_slot *slot = &surface->slots[index];
@@ -276,7 +277,9 @@ double strl__v_seeker_distance2(strl__seeker *seeker, const double p[3])
             continue;
         }
         uint32_t near = strl__bvh_distance2(&surface->nodes[node->first], q) <=
-                                strl__bvh_distance2(&surface->nodes[node->first + 1], q) ? 0 : 1;
+                                strl__bvh_distance2(&surface->nodes[node->first + 1], q)
+                            ? 0
+                            : 1;
         stack[top++] = node->first + 1 - near;
         stack[top++] = node->first + near;
     }

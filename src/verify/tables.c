@@ -21,14 +21,16 @@ typedef struct table {
     double bounds[6]; /* of the placements so far */
 } table;
 
-#define TABLE_RULE(table, condition, key, ...)                                            \
-    do {                                                                                  \
-        strl__v_checked((table)->model->checks, STRL_VERIFY_TABLES, 1);                     \
-        if (!(condition))                                                                 \
-            strl__v_flaw((table)->model->checks, STRL_VERIFY_TABLES, (uint64_t)(table)->kind << 56 | (key), __VA_ARGS__); \
+#define TABLE_RULE(table, condition, key, ...)                                                                         \
+    do {                                                                                                               \
+        strl__v_checked((table)->model->checks, STRL_VERIFY_TABLES, 1);                                                \
+        if (!(condition))                                                                                              \
+            strl__v_flaw((table)->model->checks, STRL_VERIFY_TABLES, (uint64_t)(table)->kind << 56 | (key),            \
+                         __VA_ARGS__);                                                                                 \
     } while (0)
 
-/* Bytes of one UTF-8 sequence at text, 0 where it is none (RFC 3629: shortest form, no surrogates, up to U+10FFFF). */
+/* Bytes of one UTF-8 sequence at text, 0 where it is none (RFC 3629: shortest form, no surrogates, up to
+ * U+10FFFF). */
 static size_t utf8_sequence(const uint8_t *text, size_t left)
 {
     uint8_t lead = text[0];
@@ -50,7 +52,8 @@ static void check_name(table *self, uint64_t item, const uint8_t *text, size_t b
     while (at < bytes && (step = utf8_sequence(text + at, bytes - at)) != 0)
         at += step;
     TABLE_RULE(self, at == bytes && bytes <= MOST_NAME_BYTES, item,
-               "%s %" PRIu64 ": its name of %zu bytes is not UTF-8 of at most 32000 bytes (byte %zu)", self->name, item, bytes, at);
+               "%s %" PRIu64 ": its name of %zu bytes is not UTF-8 of at most 32000 bytes (byte %zu)", self->name, item,
+               bytes, at);
 }
 
 static void widen_bounds(table *self, const strl__vtree *tree, const double m[12])
@@ -80,9 +83,10 @@ static void check_placement(table *self, uint64_t item, const uint8_t *bytes, si
         plain = plain && m[i] == (i % 5 == 0 ? 1 : 0);
     }
     bool good = size == PLACEMENT_BYTES && tree < self->model->tree_count && reserved == 0 && finite;
-    TABLE_RULE(self, good, item, "placement %" PRIu64 ": %zu bytes, tree %u of %u, reserved word %u, %s", item, size, tree,
-               self->model->tree_count, reserved, finite ? "finite" : "not finite");
-    self->model->placed_plainly = self->model->placed_plainly && good && plain && item == 0 && self->model->tree_count == 1;
+    TABLE_RULE(self, good, item, "placement %" PRIu64 ": %zu bytes, tree %u of %u, reserved word %u, %s", item, size,
+               tree, self->model->tree_count, reserved, finite ? "finite" : "not finite");
+    self->model->placed_plainly =
+        self->model->placed_plainly && good && plain && item == 0 && self->model->tree_count == 1;
     if (good)
         widen_bounds(self, &self->model->trees[tree], m);
 }
@@ -104,15 +108,16 @@ static void check_leaf(table *self, const uint8_t *bytes, size_t size, uint64_t 
     strl_cursor cursor = strl_cursor_make(bytes, size);
     uint32_t items = strl_cursor_u32(&cursor);
     bool good = items == count && items <= (size - 4) / 4;
-    TABLE_RULE(self, good, first, "%s page from item %" PRIu64 ": %u items, expected %" PRIu64, self->name, first, items, count);
+    TABLE_RULE(self, good, first, "%s page from item %" PRIu64 ": %u items, expected %" PRIu64, self->name, first,
+               items, count);
     if (!good)
         return;
     size_t head = 4 + (size_t)items * 4, before = 0;
     for (uint32_t i = 0; i < items; i++) {
         size_t end = strl_cursor_u32(&cursor);
         good = end >= before && end <= size - head && (i + 1 < items || end == size - head);
-        TABLE_RULE(self, good, first + i, "%s %" PRIu64 ": ends at %zu of %zu, after %zu", self->name, first + i, end, size - head,
-                   before);
+        TABLE_RULE(self, good, first + i, "%s %" PRIu64 ": ends at %zu of %zu, after %zu", self->name, first + i, end,
+                   size - head, before);
         if (!good)
             return;
         check_item(self, first + i, bytes + head + before, end - before);
@@ -123,13 +128,14 @@ static void check_leaf(table *self, const uint8_t *bytes, size_t size, uint64_t 
 static strl_status check_page(table *self, const strl__place *place, uint32_t depth, uint64_t first, uint64_t count,
                               strl_error *err);
 
-static strl_status check_index(table *self, const uint8_t *bytes, size_t size, uint32_t depth, uint64_t first, uint64_t count,
-                               strl_error *err)
+static strl_status check_index(table *self, const uint8_t *bytes, size_t size, uint32_t depth, uint64_t first,
+                               uint64_t count, strl_error *err)
 {
     strl_cursor cursor = strl_cursor_make(bytes, size);
     uint32_t refs = strl_cursor_u32(&cursor), reserved = strl_cursor_u32(&cursor);
     bool good = refs >= 1 && refs <= MOST_REFS && reserved == 0 && size == 8 + (size_t)refs * REF_BYTES;
-    TABLE_RULE(self, good, first, "%s index page from item %" PRIu64 ": %u references in %zu bytes", self->name, first, refs, size);
+    TABLE_RULE(self, good, first, "%s index page from item %" PRIu64 ": %u references in %zu bytes", self->name, first,
+               refs, size);
     strl_status status = STRL_OK;
     for (uint32_t i = 0; good && status == STRL_OK && i < refs; i++) {
         strl__place place = {.offset = strl_cursor_u64(&cursor)};
@@ -140,8 +146,9 @@ static strl_status check_index(table *self, const uint8_t *bytes, size_t size, u
         if (i + 1 < refs)
             end = strl__load_le(bytes + cursor.at + 8, 8);
         good = zero == 0 && place.bytes <= PAGE_BYTES && from < end && end <= first + count && (i > 0 || from == first);
-        TABLE_RULE(self, good, from, "%s index page from item %" PRIu64 ": reference %u is for items %" PRIu64 " to %" PRIu64,
-                   self->name, first, i, from, end);
+        TABLE_RULE(self, good, from,
+                   "%s index page from item %" PRIu64 ": reference %u is for items %" PRIu64 " to %" PRIu64, self->name,
+                   first, i, from, end);
         if (good)
             status = check_page(self, &place, depth - 1, from, end - from, err);
     }
@@ -152,7 +159,8 @@ static strl_status check_page(table *self, const strl__place *place, uint32_t de
                               strl_error *err)
 {
     bool good = place->bytes >= 8 && place->bytes <= PAGE_BYTES;
-    TABLE_RULE(self, good, first, "%s page from item %" PRIu64 ": %u bytes, expected 8 to 65536", self->name, first, place->bytes);
+    TABLE_RULE(self, good, first, "%s page from item %" PRIu64 ": %u bytes, expected 8 to 65536", self->name, first,
+               place->bytes);
     if (!good)
         return STRL_OK;
     uint8_t *bytes = strl__alloc(place->bytes, 1);
@@ -186,7 +194,9 @@ strl_status strl__v_read_tables(strl__model *model, strl_error *err)
     model->placed_plainly = model->sections[STRL__PLACEMENTS].item_count == 1;
     for (unsigned kind = STRL__PLACEMENTS; status == STRL_OK && kind < STRL__SECTIONS; kind++) {
         const strl__section *section = &model->sections[kind];
-        table self = {.model = model, .kind = kind, .name = names[kind],
+        table self = {.model = model,
+                      .kind = kind,
+                      .name = names[kind],
                       .bounds = {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY}};
         status = check_page(&self, &section->place, section->depth, 0, section->item_count, err);
         if (status == STRL_OK && kind == STRL__PLACEMENTS)

@@ -33,10 +33,12 @@ static void check_totals(strl__model *model, strl_verify_report *report)
     strl__v_checked(model->checks, STRL_VERIFY_COUNTS, 1);
     uint64_t accounted = report->triangles_leaf + model->dropped_nonfinite + model->dropped_degenerate;
     if (model->triangles_in != accounted)
-        strl__v_flaw(model->checks, STRL_VERIFY_COUNTS, 0,
-                   "header: %llu triangles came in, the leaves have %llu, %llu not finite and %llu degenerate ones were dropped",
-                   (unsigned long long)model->triangles_in, (unsigned long long)report->triangles_leaf,
-                   (unsigned long long)model->dropped_nonfinite, (unsigned long long)model->dropped_degenerate);
+        strl__v_flaw(
+            model->checks, STRL_VERIFY_COUNTS, 0,
+            "header: %llu triangles came in, the leaves have %llu, %llu not finite and %llu degenerate ones were "
+                     "dropped",
+            (unsigned long long)model->triangles_in, (unsigned long long)report->triangles_leaf,
+            (unsigned long long)model->dropped_nonfinite, (unsigned long long)model->dropped_degenerate);
 }
 
 /* Header to records. *sound: all records can be relied on as far as indexing goes. */
@@ -54,12 +56,14 @@ static strl_status read_structure(strl__model *model, strl_verify_report *report
     }
     if (status == STRL_OK && *sound)
         check_totals(model, report);
-    *sound = *sound && !strl__v_flawed(model->checks, STRL_VERIFY_PAGES) && !strl__v_flawed(model->checks, STRL_VERIFY_GROUPS);
+    *sound = *sound && !strl__v_flawed(model->checks, STRL_VERIFY_PAGES) &&
+             !strl__v_flawed(model->checks, STRL_VERIFY_GROUPS);
     return status;
 }
 
 /* Every payload, and what compares them. Cracks need sound payloads. */
-static strl_status check_tree(strl__model *model, strl__vtree *tree, strl_verify_report *report, bool *sound, strl_error *err)
+static strl_status check_tree(strl__model *model, strl__vtree *tree, strl_verify_report *report, bool *sound,
+                              strl_error *err)
 {
     strl__boundary boundary = {0};
     strl_status status = strl__v_check_contents(model, tree, err);
@@ -81,8 +85,9 @@ static void check_closed(strl__model *model, strl_verify_report *report)
     report->closed = report->open_edges == 0;
     strl__v_checked(model->checks, STRL_VERIFY_CLOSED, 1);
     if (model->closed && !report->closed)
-        strl__v_flaw(model->checks, STRL_VERIFY_CLOSED, 0, "header: the input is said to be closed, its leaves have %llu open edges",
-                   (unsigned long long)report->open_edges);
+        strl__v_flaw(model->checks, STRL_VERIFY_CLOSED, 0,
+                     "header: the input is said to be closed, its leaves have %llu open edges",
+                     (unsigned long long)report->open_edges);
 }
 
 static strl_status compare_input(strl__model *model, strl_verify_report *report, strl_error *err)
@@ -90,7 +95,8 @@ static strl_status compare_input(strl__model *model, strl_verify_report *report,
     strl__vinput input;
     strl__vtree *tree = &model->trees[0];
     if (!model->placed_plainly || !strl__replaces(tree))
-        return strl__fail(err, STRL_ERR_UNSUPPORTED, "%s has more than one tree or placement: it cannot be compared with an input",
+        return strl__fail(err, STRL_ERR_UNSUPPORTED,
+                          "%s has more than one tree or placement: it cannot be compared with an input",
                           model->desc->model);
     strl_status status = strl__v_input_read(model, tree, &input, err);
     if (status == STRL_OK)
@@ -116,8 +122,8 @@ static strl_status check_all(strl__model *model, strl_verify_report *report, str
 static strl_status check_desc(const strl_verify_desc *desc, strl_error *err)
 {
     if (desc->memory_bytes && desc->memory_bytes < STRL_VERIFY_LEAST_MEMORY)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "--memory is %llu bytes, the least is %llu", (unsigned long long)desc->memory_bytes,
-                          (unsigned long long)STRL_VERIFY_LEAST_MEMORY);
+        return strl__fail(err, STRL_ERR_ARGUMENT, "--memory is %llu bytes, the least is %llu",
+                          (unsigned long long)desc->memory_bytes, (unsigned long long)STRL_VERIFY_LEAST_MEMORY);
     if (desc->input_count && !desc->scratch_dir)
         return strl__fail(err, STRL_ERR_ARGUMENT, "comparing with an input needs a scratch folder");
     return STRL_OK;
@@ -126,7 +132,8 @@ static strl_status check_desc(const strl_verify_desc *desc, strl_error *err)
 strl_status strl_verify_run(const strl_verify_desc *desc, strl_verify_report *report, strl_error *err)
 {
     strl__checks checks;
-    strl__model model = {.desc = desc, .checks = &checks, .memory_bytes = desc->memory_bytes ? desc->memory_bytes : 1u << 30};
+    strl__model model = {
+        .desc = desc, .checks = &checks, .memory_bytes = desc->memory_bytes ? desc->memory_bytes : 1u << 30};
     unsigned jobs = desc->jobs ? desc->jobs : strl_cpu_count();
     *report = (strl_verify_report){0};
     strl__v_checks_init(&checks);

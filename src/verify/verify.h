@@ -1,5 +1,6 @@
-/* The independent proof that a container is what it claims to be. Written from docs/format.md and docs/format-payload.md
- * alone: it shares no code with the writer, the reader or the builder. docs/algorithms/verify.md says what is proved and how.
+/* The independent proof that a container is what it claims to be. Written from docs/format.md and docs/format-
+ * payload.md alone: it shares no code with the writer, the reader or the builder. docs/algorithms/verify.md
+ * says what is proved and how.
  *
  * A container that breaks its promises is a result (report->ok is false), not a failure of the call. */
 #ifndef STRL_VERIFY_VERIFY_H
@@ -18,39 +19,39 @@ typedef enum strl_verify_kind {
     STRL_VERIFY_HEADER,     /* fields, ranges, reserved bytes, model id */
     STRL_VERIFY_REFERENCES, /* alignment and range of everything that is referred to */
     STRL_VERIFY_CHECKSUMS,
-    STRL_VERIFY_TABLES,     /* placements, parts, materials */
-    STRL_VERIFY_RECORDS,    /* ranges of node records, parents and children, treelets */
-    STRL_VERIFY_PAGES,      /* payloads without gaps in id order, decoded sizes */
-    STRL_VERIFY_PAYLOADS,   /* each decodes to a progressive mesh as its record says */
-    STRL_VERIFY_COUNTS,     /* triangles, vertices, groups, levels, drops */
-    STRL_VERIFY_BOXES,      /* geometry in box, boxes nest */
-    STRL_VERIFY_ERRORS,     /* monotone from the leaves to the root */
-    STRL_VERIFY_GROUPS,     /* membership and sizes */
-    STRL_VERIFY_ROOT,       /* the root's base mesh is small enough */
-    STRL_VERIFY_UNIONS,     /* children's base meshes are the parent's finest state */
-    STRL_VERIFY_CLOSED,     /* the header's word on whether the input is closed */
-    STRL_VERIFY_CRACKS,     /* view-dependent cuts have no open edge where the input has none */
-    STRL_VERIFY_LEAVES,     /* leaf triangles are the input's, on the lattice */
-    STRL_VERIFY_DISTANCES,  /* no measured distance is above the claim */
+    STRL_VERIFY_TABLES,    /* placements, parts, materials */
+    STRL_VERIFY_RECORDS,   /* ranges of node records, parents and children, treelets */
+    STRL_VERIFY_PAGES,     /* payloads without gaps in id order, decoded sizes */
+    STRL_VERIFY_PAYLOADS,  /* each decodes to a progressive mesh as its record says */
+    STRL_VERIFY_COUNTS,    /* triangles, vertices, groups, levels, drops */
+    STRL_VERIFY_BOXES,     /* geometry in box, boxes nest */
+    STRL_VERIFY_ERRORS,    /* monotone from the leaves to the root */
+    STRL_VERIFY_GROUPS,    /* membership and sizes */
+    STRL_VERIFY_ROOT,      /* the root's base mesh is small enough */
+    STRL_VERIFY_UNIONS,    /* children's base meshes are the parent's finest state */
+    STRL_VERIFY_CLOSED,    /* the header's word on whether the input is closed */
+    STRL_VERIFY_CRACKS,    /* view-dependent cuts have no open edge where the input has none */
+    STRL_VERIFY_LEAVES,    /* leaf triangles are the input's, on the lattice */
+    STRL_VERIFY_DISTANCES, /* no measured distance is above the claim */
     STRL_VERIFY_KINDS
 } strl_verify_kind;
 
 typedef struct strl_verify_check {
-    bool done;          /* it was part of this run */
-    uint64_t count;     /* things looked at */
+    bool done;      /* it was part of this run */
+    uint64_t count; /* things looked at */
     uint64_t failures;
-    char first[480];    /* the sentence of the first failure */
+    char first[480]; /* the sentence of the first failure */
 } strl_verify_check;
 
 /* A measured cut. Lengths in model units. */
 typedef struct strl_verify_cut {
-    double error;         /* allowed: every claim in the cut is at most this; of a level: the largest claim */
-    double claimed;       /* the largest claimed error in the cut */
-    double from_input;    /* largest distance of an input point from the cut */
-    double to_input;      /* largest distance of a point of the cut from the input */
-    double rms;           /* over all points of both directions */
+    double error;      /* allowed: every claim in the cut is at most this; of a level: the largest claim */
+    double claimed;    /* the largest claimed error in the cut */
+    double from_input; /* largest distance of an input point from the cut */
+    double to_input;   /* largest distance of a point of the cut from the input */
+    double rms;        /* over all points of both directions */
     uint64_t nodes, triangles;
-    uint64_t points;      /* measured, both directions */
+    uint64_t points; /* measured, both directions */
 } strl_verify_cut;
 
 /* Zero-initialise the desc: every 0 takes its default. */
@@ -72,18 +73,18 @@ typedef struct strl_verify_report {
     bool ok;
     strl_verify_check checks[STRL_VERIFY_KINDS];
     uint64_t trees, nodes, groups, triangles_in, triangles_leaf;
-    bool closed;                   /* the leaf mesh is watertight */
-    uint64_t open_edges;           /* of the leaf mesh */
-    uint32_t cuts;                 /* view-dependent cuts that were tried */
-    uint32_t cracked_cuts;         /* of them with an open edge that the input has not */
-    uint64_t cracks;               /* such edges, over the cracked cuts that were looked at closely */
-    uint64_t cut_triangles;        /* of all these cuts */
-    uint64_t clustered_nodes;      /* nodes made by the ladder's last rung */
-    uint64_t excluded_edges;       /* edges of the cuts left out because they touch one */
-    uint64_t unions_exempt;        /* parents whose group simplified shared vertices first */
+    bool closed;              /* the leaf mesh is watertight */
+    uint64_t open_edges;      /* of the leaf mesh */
+    uint32_t cuts;            /* view-dependent cuts that were tried */
+    uint32_t cracked_cuts;    /* of them with an open edge that the input has not */
+    uint64_t cracks;          /* such edges, over the cracked cuts that were looked at closely */
+    uint64_t cut_triangles;   /* of all these cuts */
+    uint64_t clustered_nodes; /* nodes made by the ladder's last rung */
+    uint64_t excluded_edges;  /* edges of the cuts left out because they touch one */
+    uint64_t unions_exempt;   /* parents whose group simplified shared vertices first */
     strl_verify_cut uniform[STRL_VERIFY_UNIFORM_CUTS];
-    uint32_t uniform_count;        /* 0 without inputs */
-    strl_verify_cut *levels;       /* owned; [level_count] all nodes of a level in their base state */
+    uint32_t uniform_count;  /* 0 without inputs */
+    strl_verify_cut *levels; /* owned; [level_count] all nodes of a level in their base state */
     uint32_t level_count;
     double claimed_over_measured_median; /* of the uniform cuts; 0 without inputs */
     double worst_claimed_over_measured;  /* the least of the uniform cuts: below 1 is a broken claim */

@@ -1,5 +1,6 @@
-/* Models for the checker's tests: a bumpy torus (closed) or sheet (open) as PLY, built into a container, and copies of such a
- * container with a fault planted. A copy is written anew by the container's writer, so all checksums are right. */
+/* Models for the checker's tests: a bumpy torus (closed) or sheet (open) as PLY, built into a container, and
+ * copies of such a container with a fault planted. A copy is written anew by the container's writer, so all
+ * checksums are right. */
 #ifndef STRL_TESTS_VERIFY_PLANTED_H
 #define STRL_TESTS_VERIFY_PLANTED_H
 
@@ -32,8 +33,10 @@ static inline void model_write_ply(const char *path, unsigned rows, unsigned col
     FILE *file = fopen(path, "w");
     assert_non_null(file);
     unsigned cells = closed ? rows * columns : (rows - 1) * (columns - 1);
-    fprintf(file, "ply\nformat ascii 1.0\nelement vertex %u\nproperty double x\nproperty double y\nproperty double z\n"
-                  "element face %u\nproperty list uchar int vertex_indices\nend_header\n", rows * columns, 2 * cells);
+    fprintf(file,
+            "ply\nformat ascii 1.0\nelement vertex %u\nproperty double x\nproperty double y\nproperty double z\n"
+            "element face %u\nproperty list uchar int vertex_indices\nend_header\n",
+            rows * columns, 2 * cells);
     for (unsigned i = 0; i < rows; i++)
         for (unsigned j = 0; j < columns; j++) {
             double u = 6.283185307179586 * i / rows, v = 6.283185307179586 * j / columns;
@@ -46,8 +49,8 @@ static inline void model_write_ply(const char *path, unsigned rows, unsigned col
     for (unsigned i = 0; i + !closed < rows; i++)
         for (unsigned j = 0; j + !closed < columns; j++) {
             unsigned k = (i + 1) % rows, l = (j + 1) % columns;
-            fprintf(file, "3 %u %u %u\n3 %u %u %u\n", i * columns + j, k * columns + j, k * columns + l, i * columns + j,
-                    k * columns + l, i * columns + l);
+            fprintf(file, "3 %u %u %u\n3 %u %u %u\n", i * columns + j, k * columns + j, k * columns + l,
+                    i * columns + j, k * columns + l, i * columns + l);
         }
     assert_int_equal(fclose(file), 0);
 }
@@ -82,7 +85,8 @@ static inline void model__check(strl_status status, const strl_error *err)
         fail_msg("%s", err->message);
 }
 
-static inline void model__copy_node(strl_container *from, strl_container_writer *to, uint32_t id, model_fault fault, void *context)
+static inline void model__copy_node(strl_container *from, strl_container_writer *to, uint32_t id, model_fault fault,
+                                    void *context)
 {
     strl_error err = {0};
     strl_arena arena;
@@ -113,7 +117,8 @@ static inline void model_plant(const model *self, model_fault fault, void *conte
     strl_container_writer *to;
     uint64_t bytes;
     model__check(strl_container_open_path(self->good, &from, &err), &err);
-    const strl_container_writer_desc desc = {.path = self->bad, .scratch_dir = self->folder, .info = *strl_container_get_info(from)};
+    const strl_container_writer_desc desc = {
+        .path = self->bad, .scratch_dir = self->folder, .info = *strl_container_get_info(from)};
     model__check(strl_container_writer_create(&desc, &to, &err), &err);
     const strl_tree *tree = strl_container_tree(from, 0);
     model__check(strl_container_writer_begin_tree(to, tree, &err), &err);

@@ -1,4 +1,5 @@
-/* Two decoders, one written from the format's text alone, agree on every bit of every mesh, and on what they refuse. */
+/* Two decoders, one written from the format's text alone, agree on every bit of every mesh, and on what they
+ * refuse. */
 #include "verify/planted.h"
 
 #include "verify/mesh.h"
@@ -50,7 +51,8 @@ static void paint(strl_pm *mesh, strl_arena *arena, uint32_t seed)
     for (uint32_t i = 0; i < 3; i++)
         mesh->palette[i] = (strl_palette_entry){seed * 7 + i * i, 40000 - i, 0xff00ff00u + i};
     for (uint32_t v = 0; v < mesh->vertex_count; v++) {
-        mesh->colour[v] = (uint32_t)(mesh->position[v][0] >> 4) * 0x010203u ^ (v % 97 ? 0xff000000u : (uint32_t)strl__mix64(v + seed));
+        mesh->colour[v] = (uint32_t)(mesh->position[v][0] >> 4) * 0x010203u ^
+                          (v % 97 ? 0xff000000u : (uint32_t)strl__mix64(v + seed));
         mesh->palette_index[v] = (uint16_t)(v % 50 ? 1 : v % 3);
     }
 }
