@@ -225,10 +225,8 @@ static void map_wedges(simplifier *s, const strl_star *star, uint32_t to, strl_s
 void strl__apply_collapse(simplifier *s, const strl_star *star, const collapse_plan *plan, strl_simplified *result)
 {
     uint32_t u = star->point, v = plan->to;
-    strl_drift drift[STAR_MAX];
-    uint32_t image;
-    double weights[3];
-    strl__collapse_drift(s, star, v, drift, &image, weights);
+    collapse_drift drift;
+    strl__collapse_drift(s, star, v, &drift);
     map_wedges(s, star, v, result);
     for (uint32_t i = 0; i < star->count; i++) {
         uint32_t t = star->triangle[i];
@@ -239,10 +237,11 @@ void strl__apply_collapse(simplifier *s, const strl_star *star, const collapse_p
             continue;
         }
         s->corner[t][star->corner[i]] = result->wedge_parent[s->corner[t][star->corner[i]]];
-        s->drift[t] = drift[i];
+        s->drift[t] = drift.of[i];
         s->deviation[t] = plan->deviation;
         s->shift[t] = plan->shift;
     }
+    strl__receive_orphans(s, &drift);
     if (s->head[u] != NO_INDEX) {
         if (s->head[v] == NO_INDEX)
             s->head[v] = s->head[u];
@@ -255,7 +254,7 @@ void strl__apply_collapse(simplifier *s, const strl_star *star, const collapse_p
     s->own_cost[v] = strl__quadric_at(&s->quadrics[v], s->position[v]);
     if (s->holders)
         s->holders[v] |= s->holders[u];
-    result->geometric = strl__larger(result->geometric, plan->geometric);
+    result->geometric = strl__larger(result->geometric, strl__larger(plan->geometric, drift.longest + s->mesh->start_error));
     result->appearance = strl__larger(result->appearance, plan->shift);
     result->collapses[result->collapse_count++] =
         (strl_collapse){u, v, s->triangles_left, result->geometric, result->appearance};

@@ -205,30 +205,51 @@ static void note_gaps_at_crossings(const polygon *patch, gap_range *gaps)
     }
 }
 
-/* A vanishing triangle (u, v, x) falls onto the edge v-x. Where no other triangle keeps that edge, its points are
- * still within |v - x| of what stays. */
-static double lost_edge_length(const simplifier *s, const strl_star *star, uint32_t to)
+/* A triangle at v that is not in the star, with the edge to x if there is one. */
+static uint32_t triangle_beside(const simplifier *s, const strl_star *star, uint32_t to, uint32_t x, bool *has_edge)
+{
+    uint32_t any = NO_INDEX;
+    *has_edge = false;
+    for (uint32_t corner = s->head[to]; corner != NO_INDEX; corner = s->corner_next[corner]) {
+        uint32_t triangle = corner / 3;
+        if (s->dead[triangle])
+            continue;
+        bool has_u = false, has_x = false;
+        for (unsigned c = 0; c < 3; c++) {
+            has_u |= strl__corner_point(s, triangle, c) == star->point;
+            has_x |= strl__corner_point(s, triangle, c) == x;
+        }
+        if (has_u)
+            continue;
+        any = triangle;
+        if (has_x) {
+            *has_edge = true;
+            return triangle;
+        }
+    }
+    return any;
+}
+
+/* A vanishing triangle (u, v, x) falls onto the edge v-x. Where no triangle of the star keeps that edge, another one at v takes
+ * its drift over; where none keeps the edge at all, its points are still within |v - x| of v, which the caller knows to stay.
+ * Returns the longest such edge. */
+static double find_receivers(const simplifier *s, const strl_star *star, uint32_t to, collapse_drift *result)
 {
     double most = 0;
+    result->receivers = 0;
     for (uint32_t i = 0; i < star->count; i++) {
         if (star->next[i] != to && star->previous[i] != to)
             continue;
         uint32_t x = star->next[i] == to ? star->previous[i] : star->next[i];
-        bool kept = false;
+        bool kept = false, has_edge;
         for (uint32_t k = 0; k < star->count && !kept; k++)
             kept = star->next[k] != to && star->previous[k] != to && (star->next[k] == x || star->previous[k] == x);
-        for (uint32_t corner = s->head[to]; corner != NO_INDEX && !kept; corner = s->corner_next[corner]) {
-            uint32_t triangle = corner / 3;
-            if (s->dead[triangle])
-                continue;
-            bool has_u = false, has_x = false;
-            for (unsigned c = 0; c < 3; c++) {
-                has_u |= strl__corner_point(s, triangle, c) == star->point;
-                has_x |= strl__corner_point(s, triangle, c) == x;
-            }
-            kept = has_x && !has_u;
-        }
-        if (!kept)
+        if (kept)
+            continue;
+        uint32_t receiver = triangle_beside(s, star, to, x, &has_edge);
+        if (receiver != NO_INDEX)
+            result->receiver[result->receivers++] = receiver;
+        if (!has_edge)
             most = fmax(most, distance(s->position[to], s->position[x]));
     }
     return most;
@@ -252,7 +273,7 @@ static void add_way(strl_drift *drift, const double way[3], double more)
 }
 
 /* Every point of the star goes towards v by a share of the way from u. */
-static void drift_straight(const simplifier *s, const strl_star *star, uint32_t to, double lost, strl_drift *drift)
+static strl_drift drift_straight(const simplifier *s, const strl_star *star, uint32_t to, double lost)
 {
     strl_drift all = {0};
     double way[3];
@@ -261,14 +282,13 @@ static void drift_straight(const simplifier *s, const strl_star *star, uint32_t 
     for (uint32_t i = 0; i < star->count; i++)
         unite(&all, &s->drift[star->triangle[i]]);
     add_way(&all, way, lost);
-    for (uint32_t i = 0; i < star->count; i++)
-        drift[i] = all;
+    return all;
 }
 
 /* A new triangle overlaps the old triangles between v and itself on its side of u; the one that holds u may overlap all.
  * (An old triangle whose base lies beyond a new spoke has its apex, u, on this side of it, or both on the other.) */
 static void drift_by_height(const simplifier *s, const strl_star *star, const polygon *patch, const gap_range *gaps,
-                            uint32_t fan_image, double lost, strl_drift *drift)
+                            uint32_t fan_image, strl_drift *drift)
 {
     uint32_t n = star->count, first = star->closed ? patch->v_at : 0;
     uint32_t at_image = (fan_image + n - first) % n;
@@ -292,43 +312,63 @@ static void drift_by_height(const simplifier *s, const strl_star *star, const po
             high[k] = gaps->most[i] * patch->normal[k];
         }
         strl_drift *own = &drift[star->order[i]];
-        add_way(own, patch->moved, lost);
+        add_way(own, patch->moved, 0);
         add_way(own, low, 0);
         add_way(own, high, 0);
     }
 }
 
-float strl__collapse_drift(const simplifier *s, const strl_star *star, uint32_t to, strl_drift drift[STAR_MAX],
-                           uint32_t *image, double weights[3])
+/* The patch as a height field; false where it is none. */
+static bool drift_over_plane(const simplifier *s, const strl_star *star, uint32_t to, collapse_drift *result)
 {
     polygon patch;
     gap_range gaps;
-    uint32_t fan_image = NO_INDEX;
-    *image = NO_INDEX;
-    weights[0] = 1, weights[1] = weights[2] = 0;
-    bool flat_enough = star->manifold && build_patch(s, star, to, &patch) && is_height_field(&patch, star->closed);
-    if (flat_enough) {
-        uint32_t last = star->closed ? patch.count : patch.count - 1;
-        for (uint32_t i = 0; i < last; i++)
-            gaps.least[i] = gaps.most[i] = 0;
-        fan_image = note_gap_at_u(&patch, last, &gaps, weights);
-        if (fan_image != NO_INDEX)
-            note_gaps_at_crossings(&patch, &gaps);
+    if (!star->manifold || !build_patch(s, star, to, &patch) || !is_height_field(&patch, star->closed))
+        return false;
+    uint32_t last = star->closed ? patch.count : patch.count - 1;
+    for (uint32_t i = 0; i < last; i++)
+        gaps.least[i] = gaps.most[i] = 0;
+    uint32_t fan_image = note_gap_at_u(&patch, last, &gaps, result->weights);
+    if (fan_image == NO_INDEX)
+        return false;
+    note_gaps_at_crossings(&patch, &gaps);
+    drift_by_height(s, star, &patch, &gaps, fan_image, result->of);
+    result->image = star->order[fan_image];
+    return true;
+}
+
+static void note_length(collapse_drift *result, const strl_drift *drift)
+{
+    float length = strl_drift_length(drift);
+    result->longest = length > result->longest ? length : result->longest;
+}
+
+void strl__collapse_drift(const simplifier *s, const strl_star *star, uint32_t to, collapse_drift *result)
+{
+    result->image = NO_INDEX;
+    result->weights[0] = 1, result->weights[1] = result->weights[2] = 0;
+    result->longest = 0;
+    result->receivers = 0;
+    bool over_plane = drift_over_plane(s, star, to, result);
+    if (!over_plane) {
+        double lost = find_receivers(s, star, to, result);
+        strl_drift all = drift_straight(s, star, to, lost);
+        for (uint32_t i = 0; i < star->count; i++)
+            result->of[i] = all;
+        result->orphan = all;
     }
-    /* a manifold fan of more than two or three triangles keeps the edges of those that vanish */
-    bool keeps_edges = star->manifold && star->count > (star->closed ? 2u : 3u);
-    double lost = keeps_edges ? 0 : lost_edge_length(s, star, to);
-    if (fan_image == NO_INDEX) {
-        drift_straight(s, star, to, lost, drift);
-    } else {
-        *image = star->order[fan_image];
-        drift_by_height(s, star, &patch, &gaps, fan_image, lost, drift);
-    }
-    float longest = 0;
     for (uint32_t i = 0; i < star->count; i++)
-        if (star->next[i] != to && star->previous[i] != to) {
-            float length = strl_drift_length(&drift[i]);
-            longest = length > longest ? length : longest;
-        }
-    return longest;
+        if (star->next[i] != to && star->previous[i] != to)
+            note_length(result, &result->of[i]);
+    for (uint32_t i = 0; i < result->receivers; i++) {
+        strl_drift both = result->orphan;
+        unite(&both, &s->drift[result->receiver[i]]);
+        note_length(result, &both);
+    }
+}
+
+void strl__receive_orphans(simplifier *s, const collapse_drift *drift)
+{
+    for (uint32_t i = 0; i < drift->receivers; i++)
+        unite(&s->drift[drift->receiver[i]], &drift->orphan);
 }

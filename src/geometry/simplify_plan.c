@@ -187,10 +187,8 @@ static float attribute_change(const simplifier *s, const strl_star *star, uint32
 
 void strl__plan_collapse(simplifier *s, const strl_star *star, uint32_t to, collapse_plan *plan)
 {
-    uint32_t image;
-    double weights[3];
-    strl_drift drift[STAR_MAX];
-    float moved = strl__collapse_drift(s, star, to, drift, &image, weights);
+    collapse_drift drift;
+    strl__collapse_drift(s, star, to, &drift);
     float deviation = 0, shift = 0;
     double longest = 0;
     for (uint32_t i = 0; i < star->count; i++) {
@@ -201,9 +199,9 @@ void strl__plan_collapse(simplifier *s, const strl_star *star, uint32_t to, coll
     const double *u = s->position[star->point], *v = s->position[to];
     for (int i = 0; i < 3; i++)
         longest += (u[i] - v[i]) * (u[i] - v[i]);
-    float change = attribute_change(s, star, to, image, weights);
+    float change = attribute_change(s, star, to, drift.image, drift.weights);
     plan->to = to;
-    plan->geometric = nextafterf(moved + s->mesh->start_error, INFINITY);
+    plan->geometric = nextafterf(drift.longest + s->mesh->start_error, INFINITY);
     plan->deviation = sqrtf(deviation * deviation + change * change);
     plan->shift = strl__larger(shift, (float)sqrt(longest) * fminf(1, plan->deviation));
     plan->key = strl__larger(plan->geometric, plan->shift);

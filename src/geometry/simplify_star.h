@@ -82,10 +82,18 @@ unsigned strl__star_uses(const strl_star *star, uint32_t point);
 /* The wedge of v that a wedge of u falls onto. *exact: a triangle of the edge says so; else it is the one of v's that looks most
  * like it, of the same palette where the rung does not allow others. NO_INDEX = none. */
 uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32_t to, uint32_t wedge, bool *exact);
-/* What u -> v does to the triangles that stay: drift[i] for triangle i of the star, untouched for those that vanish. *image:
- * index in the star of the triangle whose image holds u's, weights of (v, next, previous) there; NO_INDEX = v itself. Returns the
- * largest length, 0 where no triangle stays. */
-float strl__collapse_drift(const simplifier *s, const strl_star *star, uint32_t to, strl_drift drift[STAR_MAX],
-                           uint32_t *image, double weights[3]);
+/* What u -> v does to the surface round u. */
+typedef struct collapse_drift {
+    strl_drift of[STAR_MAX];  /* by index in the star; meaningless for triangles that vanish */
+    strl_drift orphan;        /* of vanishing triangles that no triangle of the star takes over */
+    uint32_t receiver[STAR_MAX], receivers; /* triangles at v that the orphans fall onto: their drifts must hold `orphan` too */
+    uint32_t image;           /* index in the star of the triangle whose image holds u's; NO_INDEX = v itself */
+    double weights[3];        /* of (v, next, previous) there */
+    float longest;            /* the largest length */
+} collapse_drift;
+
+void strl__collapse_drift(const simplifier *s, const strl_star *star, uint32_t to, collapse_drift *result);
+/* Gives the receivers what they take over, once the collapse is carried out. */
+void strl__receive_orphans(simplifier *s, const collapse_drift *drift);
 
 #endif
