@@ -78,7 +78,7 @@ static int run(strl_cli_args *args)
         {.name = "jobs", .letter = 'j', .kind = STRL_CLI_COUNT, .value = &jobs, .help = "threads (one per processor)",
          .least = 1, .most = 256},
         {.name = "scratch", .kind = STRL_CLI_STRING, .value = &desc.scratch, .argument = "DIR",
-         .help = "folder for temporary files (OUT.stroll.tmp); it is emptied"},
+         .help = "folder in which OUT.stroll.tmp is made for the time of the build (beside the output)"},
         {.name = "grid", .kind = STRL_CLI_REAL, .value = &desc.grid, .argument = "STEP",
          .help = "largest lattice step, model units (chosen from the model)", .least = 1e-300, .most = 1e300},
         {.name = "up", .kind = STRL_CLI_ENUM, .value = &desc.up_axis, .argument = "auto|x|y|z",

@@ -23,7 +23,7 @@ typedef struct strl_build_desc {
     const char *const *inputs;
     uint32_t input_count;
     const char *output;
-    const char *scratch;    /* NULL = OUTPUT.tmp beside the output */
+    const char *scratch;    /* folder in which OUTPUT.tmp is made; NULL = beside the output */
     uint64_t memory_bytes;  /* 0 = 1 GiB; least STRL_BUILD_LEAST_MEMORY */
     unsigned jobs;          /* threads that work; 0 = one per processor */
     double grid;            /* lattice step wanted, model units; 0 = chosen; rounded down to a power of two */

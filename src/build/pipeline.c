@@ -55,13 +55,19 @@ static strl_status check_request(const strl_build_desc *desc, strl_error *err)
 /* The folder is locked by a file in it, so that two builds of one output do not meet. */
 static strl_status open_scratch(const strl_build_desc *desc, char **directory, strl_lock **lock, strl_error *err)
 {
-    size_t size = strlen(desc->scratch ? desc->scratch : desc->output) + sizeof ".tmp";
+    const char *slash = strrchr(desc->output, '/'), *name = slash ? slash + 1 : desc->output;
+    size_t size = strlen(desc->scratch ? desc->scratch : "") + strlen(desc->output) + sizeof "/.tmp";
     char *lock_path;
     *directory = strl__alloc(size, 1);
     if (!*directory)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
-    snprintf(*directory, size, "%s%s", desc->scratch ? desc->scratch : desc->output, desc->scratch ? "" : ".tmp");
-    strl_status status = strl_path_make_directory(*directory, err);
+    if (desc->scratch) /* a folder of our own in the user's, because ours is cleared */
+        snprintf(*directory, size, "%s/%s.tmp", desc->scratch, name);
+    else
+        snprintf(*directory, size, "%s.tmp", desc->output);
+    strl_status status = desc->scratch ? strl_path_make_directory(desc->scratch, err) : STRL_OK;
+    if (!status)
+        status = strl_path_make_directory(*directory, err);
     if (status)
         return status;
     lock_path = strl_path_join(*directory, "lock");
@@ -69,8 +75,6 @@ static strl_status open_scratch(const strl_build_desc *desc, char **directory, s
     strl__free(lock_path);
     return status;
 }
-
-
 
 strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err)
 {

@@ -71,6 +71,7 @@ strl_status strl__draw_list(strl_walk *walk, const strl_view *view, strl_draw_li
         least = fmin(least, near_depth);
         largest = fmax(largest, far_depth);
     }
+    list->frame = walk->frame;
     list->items = walk->items;
     list->count = (uint32_t)walk->front.count;
     list->far_distance = largest > 0 ? largest : 1;

@@ -24,6 +24,9 @@ typedef struct leaf_stage {
     strl_arena *arenas;    /* per worker */
 } leaf_stage;
 
+/* A position in more cells than this has no sensible normal anyway. */
+#define HALO_CELLS 64u
+
 static int compare_refs(const void *a, const void *b)
 {
     const shared_ref *x = a, *y = b;
@@ -55,34 +58,45 @@ static const shared_ref *refs_of(const leaf_stage *stage, uint32_t cluster, size
     return stage->refs + low;
 }
 
-/* Cells of other clusters that have one of the cluster's positions, ascending, each once. */
-static uint32_t *halo_cells(const leaf_stage *stage, const shared_ref *refs, size_t ref_count, strl_arena *arena,
-                            uint32_t *count)
+/* The cells that a position of the cluster has outside of it. */
+static const uint32_t *cells_of_ref(const leaf_stage *stage, const shared_ref *ref, uint32_t *count)
 {
-    size_t total = 0, unique = 0;
-    for (int pass = 0; pass < 2; pass++) {
-        uint32_t *cells = pass ? strl_arena_alloc(arena, total, sizeof *cells) : NULL;
-        if (pass && !cells)
-            return NULL;
-        size_t at = 0;
-        for (size_t i = 0; i < ref_count; i++) {
-            const uint32_t *words = stage->words + refs[i].at + 3;
-            const uint32_t *list = words + 1 + words[0];
-            if (pass)
-                memcpy(cells + at, list + 1, list[0] * sizeof *cells);
-            at += list[0];
-        }
-        total = at;
-        if (pass) {
-            qsort(cells, total, sizeof *cells, compare_words);
-            for (size_t i = 0; i < total; i++)
-                if (i == 0 || cells[i] != cells[unique - 1])
-                    cells[unique++] = cells[i];
-            *count = (uint32_t)unique;
-            return cells;
-        }
+    const uint32_t *words = stage->words + ref->at + 3;
+    const uint32_t *list = words + 1 + words[0];
+    *count = list[0];
+    return list + 1;
+}
+
+/* The cluster's own cells and those of others that have one of its positions, ascending, each once: faces round a position then
+ * come in one order wherever the position is looked at. Positions in very many cells bring none in: their normals are
+ * then of the cluster's own faces. */
+static uint32_t *cells_with_halo(const leaf_stage *stage, const uint32_t *own, uint32_t own_count, const shared_ref *refs,
+                                 size_t ref_count, strl_arena *arena, uint32_t *count)
+{
+    size_t total = own_count, unique = 0;
+    uint32_t some;
+    for (size_t i = 0; i < ref_count; i++) {
+        cells_of_ref(stage, &refs[i], &some);
+        total += some <= HALO_CELLS ? some : 0;
     }
-    return NULL;
+    uint32_t *cells = strl_arena_alloc(arena, total, sizeof *cells);
+    if (!cells)
+        return NULL;
+    memcpy(cells, own, own_count * sizeof *cells);
+    size_t at = own_count;
+    for (size_t i = 0; i < ref_count; i++) {
+        const uint32_t *list = cells_of_ref(stage, &refs[i], &some);
+        if (some > HALO_CELLS)
+            continue;
+        memcpy(cells + at, list, some * sizeof *cells);
+        at += some;
+    }
+    qsort(cells, total, sizeof *cells, compare_words);
+    for (size_t i = 0; i < total; i++)
+        if (i == 0 || cells[i] != cells[unique - 1])
+            cells[unique++] = cells[i];
+    *count = (uint32_t)unique;
+    return cells;
 }
 
 static uint64_t triangles_in(const strl_ingest *ingest, const uint32_t *cells, uint32_t count)
@@ -108,31 +122,51 @@ static strl_status read_cells(const strl_ingest *ingest, const uint32_t *cells, 
     return status;
 }
 
-/* Faces round a position must come in one order everywhere: cells ascend, so own and halo cells are merged for that. */
+static bool lacks_normals(const strl_soup_triangle *triangles, uint32_t count)
+{
+    for (uint32_t t = 0; t < count; t++)
+        for (int c = 0; c < 3; c++)
+            if (triangles[t].corner[c].normal[0] == STRL_NORMAL_MISSING)
+                return true;
+    return false;
+}
+
+/* Which triangles of the cells are the cluster's. */
+static bool *mark_own(const leaf_stage *stage, uint32_t cluster, const uint32_t *cells, uint32_t cell_count, uint64_t all,
+                      strl_arena *arena)
+{
+    bool *is_own = strl_arena_alloc(arena, all, sizeof *is_own);
+    uint64_t at = 0;
+    for (uint32_t i = 0; i < cell_count && is_own; i++)
+        for (uint32_t k = 0; k < stage->hierarchy->ingest->cells[cells[i]].count; k++)
+            is_own[at++] = stage->hierarchy->partition->cluster[cells[i]] == cluster;
+    return is_own;
+}
+
 static strl_status read_cluster(const leaf_stage *stage, uint32_t cluster, const shared_ref *refs, size_t ref_count,
                                 strl_arena *arena, strl_soup_triangle **triangles, uint32_t *own, strl_error *err)
 {
     const strl_ingest *ingest = stage->hierarchy->ingest;
     const strl_partition *partition = stage->hierarchy->partition;
-    const uint32_t *cells = partition->cell + partition->cluster_first[cluster];
-    uint32_t cell_count = partition->cluster_first[cluster + 1] - partition->cluster_first[cluster], halo_count = 0;
-    *own = (uint32_t)triangles_in(ingest, cells, cell_count);
-    uint32_t *halo = halo_cells(stage, refs, ref_count, arena, &halo_count);
-    uint64_t all = *own + triangles_in(ingest, halo, halo_count);
+    const uint32_t *own_cells = partition->cell + partition->cluster_first[cluster];
+    uint32_t own_count = partition->cluster_first[cluster + 1] - partition->cluster_first[cluster], count = 0;
+    uint32_t *cells = cells_with_halo(stage, own_cells, own_count, refs, ref_count, arena, &count);
+    *own = (uint32_t)triangles_in(ingest, own_cells, own_count);
+    uint64_t all = cells ? triangles_in(ingest, cells, count) : 0;
     void *scratch = strl_arena_alloc(arena, all, strl_soup_bytes(ingest));
     *triangles = strl_arena_alloc(arena, all, sizeof **triangles);
-    if (!halo || !scratch || !*triangles)
+    if (!cells || !scratch || !*triangles)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a cluster of %u triangles", *own);
-    strl_status status = read_cells(ingest, cells, cell_count, scratch, *triangles, err);
-    bool missing = false;
-    for (uint32_t t = 0; t < *own && !status; t++)
-        for (int c = 0; c < 3; c++)
-            missing |= (*triangles)[t].corner[c].normal[0] == STRL_NORMAL_MISSING;
-    if (status || !missing)
+    strl_status status = read_cells(ingest, own_cells, own_count, scratch, *triangles, err);
+    if (status || !lacks_normals(*triangles, *own))
         return status;
-    status = read_cells(ingest, halo, halo_count, scratch, *triangles + *own, err);
-    if (!status && !strl__fill_normals(*triangles, *own, (uint32_t)all, arena))
+    bool *is_own = mark_own(stage, cluster, cells, count, all, arena);
+    status = read_cells(ingest, cells, count, scratch, *triangles, err);
+    if (!status && (!is_own || !strl__fill_normals(*triangles, is_own, (uint32_t)all, arena)))
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the normals of %u triangles", *own);
+    for (uint64_t t = 0, to = 0; t < all && !status; t++)
+        if (is_own[t])
+            (*triangles)[to++] = (*triangles)[t];
     return status;
 }
 
@@ -289,6 +323,7 @@ strl_status strl_make_leaves(strl_hierarchy *hierarchy, strl_error *err)
     strl_pool *pool = hierarchy->context->pool;
     leaf_stage stage = {.hierarchy = hierarchy, .level = &hierarchy->levels[0]};
     strl_leaf_shares shares;
+    stage.level->group_count = stage.level->count; /* every leaf is a group of its own */
     unsigned workers = strl_pool_workers(pool);
     strl_status status = strl_leaf_shares_create(hierarchy, &shares, err);
     stage.slots = strl__alloc_zero(strl_pool_window(pool, 0), sizeof *stage.slots);

@@ -7,6 +7,7 @@
 #include "geometry/octahedral.h"
 
 #define CREASE_COSINE 0.76604444f /* 40 degrees */
+#define MOST_FACES 1024u /* round one position; the rest has no say */
 #define NO_INDEX UINT32_MAX
 
 typedef struct face_facts {
@@ -83,17 +84,20 @@ static void fill_corner(const fan_table *table, const face_facts *faces, strl_so
     strl_soup_corner *own = &triangles[corner / 3].corner[corner % 3];
     const float *axis = faces[corner / 3].normal;
     float sum[3] = {0};
-    for (uint32_t c = table->head[slot_of(table, triangles, own->position)]; c != NO_INDEX; c = table->next[c]) {
+    uint32_t seen = 0;
+    for (uint32_t c = table->head[slot_of(table, triangles, own->position)]; c != NO_INDEX && seen < MOST_FACES;
+         c = table->next[c], seen++) {
         const float *n = faces[c / 3].normal;
         if (n[0] * axis[0] + n[1] * axis[1] + n[2] * axis[2] < CREASE_COSINE)
             continue;
         for (int k = 0; k < 3; k++)
             sum[k] += faces[c / 3].angle[c % 3] * n[k];
     }
-    strl_oct_encode(sum, own->normal);
+    bool any = sum[0] != 0 || sum[1] != 0 || sum[2] != 0;
+    strl_oct_encode(any ? sum : axis, own->normal);
 }
 
-bool strl__fill_normals(strl_soup_triangle *triangles, uint32_t own, uint32_t count, strl_arena *scratch)
+bool strl__fill_normals(strl_soup_triangle *triangles, const bool *wanted, uint32_t count, strl_arena *scratch)
 {
     strl_arena_mark mark = strl_arena_get_mark(scratch);
     fan_table table;
@@ -101,8 +105,8 @@ bool strl__fill_normals(strl_soup_triangle *triangles, uint32_t own, uint32_t co
     bool good = faces && build_fans(&table, triangles, count, scratch);
     for (uint32_t t = 0; t < count && good; t++)
         faces[t] = face_of(&triangles[t]);
-    for (uint32_t corner = 0; corner < 3 * own && good; corner++)
-        if (triangles[corner / 3].corner[corner % 3].normal[0] == STRL_NORMAL_MISSING)
+    for (uint32_t corner = 0; corner < 3 * count && good; corner++)
+        if (wanted[corner / 3] && triangles[corner / 3].corner[corner % 3].normal[0] == STRL_NORMAL_MISSING)
             fill_corner(&table, faces, triangles, corner);
     strl_arena_rewind(scratch, mark);
     return good;

@@ -5,9 +5,9 @@
 #include "base/memory.h"
 #include "build/ingest/ingest.h"
 
-/* Fills in missing normals of triangles [0, own) from the faces round each lattice position among all `count` triangles: the mean,
+/* Fills in missing normals of the triangles with wanted[t] from the faces round each lattice position: the mean,
  * weighted by angle, of the faces within 40 degrees of the corner's own. The result for a corner depends on the set of
  * faces at its position and on their order, which must be the same wherever that position is looked at. */
-bool strl__fill_normals(strl_soup_triangle *triangles, uint32_t own, uint32_t count, strl_arena *scratch);
+bool strl__fill_normals(strl_soup_triangle *triangles, const bool *wanted, uint32_t count, strl_arena *scratch);
 
 #endif

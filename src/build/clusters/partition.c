@@ -144,7 +144,7 @@ strl_status strl_partition_create(const strl_ingest *ingest, strl_partition *par
     splitter s = {.ingest = ingest};
     uint32_t cells = ingest->cell_count;
     *partition = (strl_partition){0};
-    while (ingest->triangle_count >> partition->depth > STRL_CLUSTER_TRIANGLES && cells >> (partition->depth + 1) >= 2)
+    while (ingest->triangle_count >> partition->depth > STRL_CLUSTER_TRIANGLES && cells >> (partition->depth + 1) >= 4)
         partition->depth++;
     uint32_t clusters = 1u << partition->depth;
     partition->cluster = strl__alloc(cells, sizeof *partition->cluster);

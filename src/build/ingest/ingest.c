@@ -4,12 +4,15 @@
 #include "base/memory.h"
 #include "build/ingest/internal.h"
 
+#define LEAST_READER_BYTES (8u << 20)
+
 static strl_status open_readers(strl_build_context *context, strl_reader **readers, strl_ingest *ingest, strl_error *err)
 {
     strl_status status = STRL_OK;
+    uint64_t share = context->memory_bytes / 4 / context->desc->input_count;
     for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
         strl_reader_desc desc = {.path = context->desc->inputs[i], .scratch_dir = context->scratch_dir,
-                                 .memory_bytes = context->memory_bytes / 4};
+                                 .memory_bytes = share < LEAST_READER_BYTES ? LEAST_READER_BYTES : share};
         strl_reader_info info;
         status = strl_reader_open(&desc, &readers[i], err);
         if (status)
