@@ -76,6 +76,10 @@ strl_status strl_take_node(strl_hierarchy *hierarchy, strl_level *level, uint32_
 strl_status strl_make_leaves(strl_hierarchy *hierarchy, strl_error *err);
 strl_status strl_make_level(strl_hierarchy *hierarchy, uint32_t level, strl_error *err);
 
+/* Removes faces of which there are more than two identical ones, in pairs, from a group's merged mesh. *dropped: how many. False
+ * without memory. */
+bool strl__drop_duplicate_pairs(strl_mesh *mesh, uint32_t *owner, uint32_t *dropped, strl_arena *arena);
+
 /* Groups of nodes whose shared boundary may be simplified together (Quick-VDR 4.4, conditions 1 to 3). */
 typedef struct strl_groups {
     uint32_t count;

@@ -11,6 +11,9 @@
 /* The boundary of a group is simplified up to the error that its nodes' children have reached anyway. */
 #define BOUNDARY_ERROR_SHARE 1.f
 
+/* A node with more before it is simplified holds what cannot be simplified: then duplicate faces go. */
+#define CROWDED_TRIANGLES 8192u
+
 typedef struct made_group {
     uint32_t count;
     strl_made_node node[STRL_GROUP_MAX];
@@ -124,6 +127,13 @@ static strl_status merge_children(group_work *work, strl_arena *arena, strl_erro
         return status;
     for (uint32_t t = 0; t < work->merged.mesh.triangle_count; t++)
         work->owner[t] /= 2;
+    if (work->merged.mesh.triangle_count > work->count * CROWDED_TRIANGLES) {
+        uint32_t dropped = 0;
+        if (!strl__drop_duplicate_pairs(&work->merged.mesh, work->owner, &dropped, arena))
+            return strl__fail(err, STRL_ERR_MEMORY, "no memory for a group");
+        work->steps += dropped;
+        work->rung = dropped ? STRL_SIMPLIFY_CLUSTERING : work->rung;
+    }
     return find_holders(work, point_of, arena) ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for a group");
 }
 
@@ -168,8 +178,8 @@ static strl_status simplify_boundary(const level_stage *stage, group_work *work,
             work->outside[at++] = work->outside[i];
     }
     work->outside_first[after.point_count] = at;
-    work->steps = simplified.collapse_count;
-    work->rung = simplified.rung;
+    work->steps += simplified.collapse_count;
+    work->rung = simplified.rung > work->rung ? simplified.rung : work->rung;
     *mesh = after;
     return STRL_OK;
 }
