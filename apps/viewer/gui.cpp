@@ -1,6 +1,7 @@
 #include "viewer/gui.h"
 
-#include <cinttypes>
+#include <cfloat>
+#include <cmath>
 #include <cstdio>
 #include <new>
 
@@ -150,7 +151,10 @@ void show_statistics(const strl_gui_facts *facts)
     count_row("requests", facts->requests);
     count_row("missing nodes", facts->missing_nodes);
     real_row("allowed error", "%.2f px", facts->allowed_error_px);
-    real_row("largest error", "%.2f px", facts->max_error_px);
+    if (std::isfinite(facts->max_error_px))
+        real_row("largest error", "%.2f px", facts->max_error_px);
+    else
+        row("largest error", "unbounded"); /* the eye stands in a node's box */
     if (facts->faults)
         count_row("faults", facts->faults);
     ImGui::EndTable();
@@ -188,6 +192,7 @@ void show_help(const char *keys)
 {
     ImVec2 size = ImGui::GetIO().DisplaySize;
     ImGui::SetNextWindowPos(ImVec2(size.x * 0.5f, size.y * 0.5f), ImGuiCond_Always, ImVec2(0.5f, 0.5f));
+    ImGui::SetNextWindowBgAlpha(0.94f);
     ImGui::Begin("##help", NULL, overlay_flags);
     ImGui::TextUnformatted(keys);
     ImGui::End();
