@@ -10,9 +10,13 @@
 #include "build/ingest/internal.h"
 #include "geometry/octahedral.h"
 
+/* Buckets decide where cells are cut, so their size must not depend on the number of threads, or the output would. Sorting takes
+ * some three times a bucket: with this share up to 32 threads stay within the budget. */
+#define SHARES_OF_MEMORY 96u
+
 uint64_t strl__bucket_bytes(const strl_build_context *context)
 {
-    return context->memory_bytes / (12 * (uint64_t)strl_pool_workers(context->pool));
+    return context->memory_bytes / SHARES_OF_MEMORY;
 }
 
 static int compare_keys(const void *a, const void *b)

@@ -53,7 +53,7 @@ strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest,
 strl_status strl__connect_cells(strl_build_context *context, strl_ingest *ingest, pair_spills *pairs, strl_error *err);
 void strl__pair_spills_deinit(pair_spills *pairs);
 
-/* Bytes that one bucket or pair spill may take, so that every worker can hold one and its sort. */
+/* Bytes that one bucket or pair spill may take, so that every worker can hold one and its sort; the same for any number of workers. */
 uint64_t strl__bucket_bytes(const strl_build_context *context);
 
 #endif
