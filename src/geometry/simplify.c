@@ -11,6 +11,7 @@
 #define SEVERAL (UINT32_MAX - 1)
 
 #define LADDER_RATIO 4.f /* the first rung gives up where its next collapse costs so many times its middle one */
+#define SMALL_SHARE 5e-4 /* of a piece's diagonal: errors below are never out of proportion */
 #define LEAST_ERROR 1.f  /* lattice units: below, all errors count as equal */
 
 static void heap_place(simplifier *s, uint32_t at, uint32_t point)
@@ -287,6 +288,21 @@ static float smaller(float a, float b)
     return a < b ? a : b;
 }
 
+/* An error that is small for a piece of this size, whatever its triangles are like. */
+static float least_middle(const simplifier *s)
+{
+    double diagonal2 = 0;
+    for (int k = 0; k < 3; k++) {
+        double least = INFINITY, most = -INFINITY;
+        for (uint32_t p = 0; p < s->mesh->point_count; p++) {
+            least = s->position[p][k] < least ? s->position[p][k] : least;
+            most = s->position[p][k] > most ? s->position[p][k] : most;
+        }
+        diagonal2 += most > least ? (most - least) * (most - least) : 0;
+    }
+    return strl__larger(LEAST_ERROR, (float)(sqrt(diagonal2) * SMALL_SHARE));
+}
+
 /* Collapses on the present rung up to `limit`. *middle: the key at which the first half of what is wanted was done (0 until
  * then); with `adaptive`, stops where keys leave it far behind: then the next rungs do the same for less. */
 static float run_rung(simplifier *s, float limit, bool adaptive, float *middle, strl_simplified *result)
@@ -316,7 +332,7 @@ static float run_rung(simplifier *s, float limit, bool adaptive, float *middle, 
         strl__apply_collapse(s, &star, &plan, result);
         reached = strl__larger(reached, plan.key);
         if (*middle == 0 && s->triangles_left <= half)
-            *middle = strl__larger(reached, LEAST_ERROR);
+            *middle = strl__larger(reached, least_middle(s));
         for (uint32_t i = 0; i < star.neighbour_count; i++)
             mark_stale(s, star.neighbour[i], plan.key);
     }
