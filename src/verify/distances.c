@@ -82,7 +82,7 @@ static void fill_in(const comparison *self, const strl__cut_surface *cut, const 
 /* Half of what is left of the memory for each of the two surfaces. */
 static uint64_t surface_budget(const strl__model *model)
 {
-    return (model->memory_bytes - model->memory_bytes / 4 - model->record_bytes) / 2;
+    return (model->memory_bytes - model->memory_bytes / 3 - model->record_bytes) / 2;
 }
 
 static strl_status compare(comparison *self, uint64_t key, const char *name, strl__cut_surface *cut,

@@ -84,12 +84,14 @@ static bool error_range(float least, float most)
     return least >= 0 && least <= most && most <= MOST_ERROR;
 }
 
-static bool lattice_range(int64_t box[2][3], const int64_t anchor[3])
+static bool lattice_range(const strl__vnode *n)
 {
     bool good = true;
     for (unsigned k = 0; k < 3; k++)
-        good = good && box[0][k] <= box[1][k] && box[0][k] >= -LATTICE_LIMIT && box[1][k] <= LATTICE_LIMIT &&
-               anchor[k] >= -LATTICE_LIMIT && anchor[k] <= LATTICE_LIMIT;
+        good = good && n->box[0][k] <= n->box[1][k] && n->box[0][k] >= -LATTICE_LIMIT &&
+               n->box[1][k] <= LATTICE_LIMIT && n->group_box[0][k] <= n->group_box[1][k] &&
+               n->group_box[0][k] >= -LATTICE_LIMIT && n->group_box[1][k] <= LATTICE_LIMIT &&
+               n->anchor[k] >= -LATTICE_LIMIT && n->anchor[k] <= LATTICE_LIMIT;
     return good;
 }
 
@@ -101,8 +103,7 @@ static void check_ranges(treelets *self, uint32_t id, strl__vnode *n)
                     n->group_size <= tree->node_count,
                 id, "tree %u node %u: rung %u, level %u of %u, group %u of %u with %u members", tree->index, id,
                 n->rung, n->level, tree->level_count, n->group, tree->group_count, n->group_size);
-    RECORD_RULE(self, lattice_range(n->box, n->anchor) && lattice_range(n->group_box, n->anchor), id,
-                "tree %u node %u: a box is upside down or outside 2^62", tree->index, id);
+    RECORD_RULE(self, lattice_range(n), id, "tree %u node %u: a box is upside down or outside 2^62", tree->index, id);
     RECORD_RULE(self,
                 error_range(n->geometric_min, n->geometric_max) && error_range(n->appearance_min, n->appearance_max) &&
                     error_range(0, n->group_geometric) && error_range(0, n->group_appearance),
