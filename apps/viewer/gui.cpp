@@ -25,13 +25,13 @@ const ImVec4 faint = ImVec4(0.62f, 0.66f, 0.70f, 1), warning = ImVec4(1.0f, 0.68
 const ImU32 line_colour = IM_COL32(255, 200, 60, 220);
 const float panel_width = 290, margin = 12;
 
-/* 1234567 -> "1.23 M". */
+/* 1234567 -> "1.23 M"; up to four digits stay as they are. */
 void format_count(char *text, size_t size, uint64_t value)
 {
     const char *units[] = {"", " K", " M", " G", " T"};
     double scaled = (double)value;
     int unit = 0;
-    while (scaled >= 9999.5 && unit < 4)
+    for (double most = 9999.5; scaled >= most && unit < 4; most = 999.5)
         scaled /= 1000, unit++;
     std::snprintf(text, size, unit == 0 ? "%.0f%s" : scaled < 100 ? "%.2f%s" : "%.0f%s", scaled, units[unit]);
 }
