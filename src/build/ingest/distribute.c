@@ -39,7 +39,7 @@ static void quantise(const strl_ingest *ingest, const double position[3], uint32
 static strl_status open_buckets(strl_build_context *context, const model_survey *survey, const strl_ingest *ingest,
                                 bucket_set *buckets, strl_error *err)
 {
-    uint64_t bytes = survey->triangles * strl_soup_bytes(ingest), each = strl__bucket_bytes(context) * 2 / 3;
+    uint64_t bytes = survey->triangles * strl__soup_bucket_bytes(ingest), each = strl__bucket_bytes(context) * 2 / 3;
     uint64_t wanted = bytes / (each ? each : 1) + 1;
     buckets->count = wanted > MAX_BUCKETS ? MAX_BUCKETS : (uint32_t)wanted;
     uint64_t *keys = strl__alloc(survey->sample_count, sizeof *keys);
@@ -200,7 +200,7 @@ static strl_status take_batch(distribution *d, size_t count, strl_error *err)
         widen_box(ingest, &triangle);
         strl__soup_pack(ingest, &triangle, bytes);
         uint32_t to = bucket_of(d->buckets, strl__curve_key_of_triangle(ingest, &triangle));
-        strl_status status = strl_spill_append(d->buckets->spill[to], bytes, strl_soup_bytes(ingest), err);
+        strl_status status = strl_spill_append(d->buckets->spill[to], bytes, strl__soup_bucket_bytes(ingest), err);
         if (status)
             return status;
         ingest->triangle_count++;

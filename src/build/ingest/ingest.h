@@ -69,7 +69,7 @@ void strl_ingest_deinit(strl_ingest *ingest);
 /* Reads `count` triangles from index `first`. scratch: count * strl_soup_bytes() bytes of the caller's. */
 strl_status strl_ingest_read(const strl_ingest *ingest, uint64_t first, uint32_t count, void *scratch,
                              strl_soup_triangle *triangles, strl_error *err);
-/* Bytes of one packed record: 40, and 12 more each with normals and colours. */
+/* Bytes of one packed record. */
 size_t strl_soup_bytes(const strl_ingest *ingest);
 
 #endif

@@ -28,6 +28,8 @@ strl_status strl__survey_choose_lattice(const strl_build_context *context, const
 uint64_t strl__curve_key(const strl_ingest *ingest, const uint32_t position[3]);
 uint64_t strl__curve_key_of_triangle(const strl_ingest *ingest, const strl_soup_triangle *triangle);
 
+/* Records of buckets: all that a triangle has. The soup's are the first strl_soup_bytes() of them. */
+size_t strl__soup_bucket_bytes(const strl_ingest *ingest);
 void strl__soup_pack(const strl_ingest *ingest, const strl_soup_triangle *triangle, uint8_t *bytes);
 void strl__soup_unpack(const strl_ingest *ingest, const uint8_t *bytes, strl_soup_triangle *triangle);
 

@@ -70,27 +70,27 @@ static void radix_sort(keyed *items, keyed *other, uint64_t count)
 
 static strl_status load_sorted(sorting *s, uint32_t bucket, sorted_bucket *out, keyed **keys_out, strl_error *err)
 {
-    size_t bytes = strl_soup_bytes(s->ingest);
+    size_t bytes = strl_soup_bytes(s->ingest), raw_bytes = strl__soup_bucket_bytes(s->ingest);
     strl_spill *spill = s->buckets->spill[bucket];
     strl_status status = STRL_OK;
-    out->count = strl_spill_bytes(spill) / bytes;
-    uint8_t *raw = strl__alloc(out->count, bytes);
+    out->count = strl_spill_bytes(spill) / raw_bytes;
+    uint8_t *raw = strl__alloc(out->count, raw_bytes);
     keyed *keys = strl__alloc(out->count, sizeof *keys), *other = strl__alloc(out->count, sizeof *keys);
     out->records = strl__alloc(out->count, bytes);
     if (!raw || !keys || !other || !out->records) {
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory to sort %llu triangles", (unsigned long long)out->count);
         goto done;
     }
-    status = strl_spill_read(spill, 0, raw, out->count * bytes, err);
+    status = strl_spill_read(spill, 0, raw, out->count * raw_bytes, err);
     for (uint64_t i = 0; i < out->count && !status; i++) {
         strl_soup_triangle triangle;
-        strl__soup_unpack(s->ingest, raw + i * bytes, &triangle);
+        strl__soup_unpack(s->ingest, raw + i * raw_bytes, &triangle);
         keys[i] = (keyed){strl__curve_key_of_triangle(s->ingest, &triangle), i};
     }
     if (!status) {
         radix_sort(keys, other, out->count);
         for (uint64_t i = 0; i < out->count; i++)
-            memcpy(out->records + i * bytes, raw + keys[i].index * bytes, bytes);
+            memcpy(out->records + i * bytes, raw + keys[i].index * raw_bytes, bytes);
     }
 done:
     strl__free(raw);

@@ -1,40 +1,78 @@
 /* Packed triangle records and their order along the curve. */
 #include <string.h>
 
-#include "base/cursor.h"
 #include "build/ingest/internal.h"
+
+/* Positions 36 bytes, normals 8, colours 12, the palette last: the sorted soup goes without it where there is but one. */
+size_t strl__soup_bucket_bytes(const strl_ingest *ingest)
+{
+    return 40u + (ingest->has_normals ? 8u : 0) + (ingest->has_colours ? 12u : 0);
+}
 
 size_t strl_soup_bytes(const strl_ingest *ingest)
 {
-    return 40u + (ingest->has_normals ? 12u : 0) + (ingest->has_colours ? 12u : 0);
+    return strl__soup_bucket_bytes(ingest) - (ingest->palette_count > 1 ? 0 : 4);
+}
+
+/* 21 bits a corner: two coordinates of 10, or the highest bit where the normal is missing. */
+static uint64_t pack_normals(const strl_soup_triangle *triangle)
+{
+    uint64_t word = 0;
+    for (int c = 0; c < 3; c++) {
+        const uint16_t *n = triangle->corner[c].normal;
+        word |= (n[0] == STRL_NORMAL_MISSING ? (uint64_t)1 << 20 : (uint64_t)n[0] << 10 | n[1]) << (21 * c);
+    }
+    return word;
+}
+
+static void unpack_normals(uint64_t word, strl_soup_triangle *triangle)
+{
+    for (int c = 0; c < 3; c++, word >>= 21) {
+        bool missing = word >> 20 & 1;
+        triangle->corner[c].normal[0] = missing ? STRL_NORMAL_MISSING : (uint16_t)(word >> 10 & 1023);
+        triangle->corner[c].normal[1] = missing ? STRL_NORMAL_MISSING : (uint16_t)(word & 1023);
+    }
 }
 
 void strl__soup_pack(const strl_ingest *ingest, const strl_soup_triangle *triangle, uint8_t *bytes)
 {
-    for (int c = 0; c < 3; c++)
-        memcpy(bytes + 12 * c, triangle->corner[c].position, 12);
-    memcpy(bytes + 36, &triangle->palette, 4);
-    bytes += 40;
-    for (int c = 0; c < 3 && ingest->has_normals; c++, bytes += 4)
-        memcpy(bytes, triangle->corner[c].normal, 4);
+    for (int c = 0; c < 3; c++, bytes += 12)
+        memcpy(bytes, triangle->corner[c].position, 12);
+    if (ingest->has_normals) {
+        uint64_t word = pack_normals(triangle);
+        memcpy(bytes, &word, 8);
+        bytes += 8;
+    }
     for (int c = 0; c < 3 && ingest->has_colours; c++, bytes += 4)
         memcpy(bytes, &triangle->corner[c].colour, 4);
+    memcpy(bytes, &triangle->palette, 4);
+}
+
+/* Leaves the palette out. */
+static const uint8_t *unpack_corners(const strl_ingest *ingest, const uint8_t *bytes, strl_soup_triangle *triangle)
+{
+    uint64_t word = UINT64_MAX; /* all missing */
+    for (int c = 0; c < 3; c++, bytes += 12)
+        memcpy(triangle->corner[c].position, bytes, 12);
+    if (ingest->has_normals) {
+        memcpy(&word, bytes, 8);
+        bytes += 8;
+    }
+    unpack_normals(word, triangle);
+    for (int c = 0; c < 3; c++) {
+        triangle->corner[c].colour = 0xffffffffu;
+        if (ingest->has_colours) {
+            memcpy(&triangle->corner[c].colour, bytes, 4);
+            bytes += 4;
+        }
+    }
+    return bytes;
 }
 
 void strl__soup_unpack(const strl_ingest *ingest, const uint8_t *bytes, strl_soup_triangle *triangle)
 {
-    for (int c = 0; c < 3; c++)
-        memcpy(triangle->corner[c].position, bytes + 12 * c, 12);
-    memcpy(&triangle->palette, bytes + 36, 4);
-    bytes += 40;
-    for (int c = 0; c < 3; c++) {
-        triangle->corner[c].normal[0] = triangle->corner[c].normal[1] = STRL_NORMAL_MISSING;
-        triangle->corner[c].colour = 0xffffffffu;
-    }
-    for (int c = 0; c < 3 && ingest->has_normals; c++, bytes += 4)
-        memcpy(triangle->corner[c].normal, bytes, 4);
-    for (int c = 0; c < 3 && ingest->has_colours; c++, bytes += 4)
-        memcpy(&triangle->corner[c].colour, bytes, 4);
+    bytes = unpack_corners(ingest, bytes, triangle);
+    memcpy(&triangle->palette, bytes, 4);
 }
 
 strl_status strl_ingest_read(const strl_ingest *ingest, uint64_t first, uint32_t count, void *scratch,
@@ -42,8 +80,12 @@ strl_status strl_ingest_read(const strl_ingest *ingest, uint64_t first, uint32_t
 {
     size_t bytes = strl_soup_bytes(ingest);
     strl_status status = strl_spill_read(ingest->soup, first * bytes, scratch, count * bytes, err);
-    for (uint32_t i = 0; i < count && !status; i++)
-        strl__soup_unpack(ingest, (const uint8_t *)scratch + i * bytes, &triangles[i]);
+    for (uint32_t i = 0; i < count && !status; i++) {
+        const uint8_t *palette = unpack_corners(ingest, (const uint8_t *)scratch + i * bytes, &triangles[i]);
+        triangles[i].palette = 0;
+        if (ingest->palette_count > 1)
+            memcpy(&triangles[i].palette, palette, 4);
+    }
     return status;
 }
 
