@@ -128,16 +128,6 @@ static bool is_height_field(const polygon *patch, bool closed)
     return !closed || crossings == 1;
 }
 
-/* Height of the new fan's triangle (v, a, b) at a point of the plane, with the weights of its corners. */
-static double height_in(const flat *a, const flat *b, double s, double t, double weights[3])
-{
-    double area = cross2(a->s, a->t, b->s, b->t);
-    weights[1] = cross2(s, t, b->s, b->t) / area;
-    weights[2] = cross2(a->s, a->t, s, t) / area;
-    weights[0] = 1 - weights[1] - weights[2];
-    return weights[1] * a->h + weights[2] * b->h;
-}
-
 /* How far the new surface lies above the old one, per new triangle (by fan index); 0 is always among the values, because the
  * patches agree on the rim. */
 typedef struct gap_range {
@@ -152,52 +142,49 @@ static void note_gap(gap_range *gaps, uint32_t triangle, double gap)
         gaps->most[triangle] = gap;
 }
 
-/* Notes the gap at u and returns the fan index of the new triangle that holds it; NO_INDEX where there is none. */
-static uint32_t note_gap_at_u(const polygon *patch, uint32_t last, gap_range *gaps, double weights[3])
+/* On which side of each spoke v-x[j] u lies: > 0 = counter-clockwise of it. The spokes turn counter-clockwise round v from
+ * the one after v in the ring, so the last one with u at its left begins the new triangle that holds u. Returns that triangle's
+ * fan index; NO_INDEX where there is no new triangle. */
+static uint32_t find_image(const polygon *patch, bool closed, double side[STAR_MAX + 1])
 {
-    double best = -INFINITY, gap = 0;
-    uint32_t image = NO_INDEX;
-    for (uint32_t i = 0; i < last; i++) {
-        uint32_t j = i + 1 == patch->count ? 0 : i + 1;
-        if (i == patch->v_at || j == patch->v_at)
-            continue;
-        double w[3];
-        double height = height_in(&patch->x[i], &patch->x[j], patch->u.s, patch->u.t, w);
-        double inside = w[1] < w[2] ? w[1] : w[2];
-        inside = w[0] < inside ? w[0] : inside;
-        if (inside > best) { /* the triangle that u is most inside of; rounding may put it outside of all */
-            best = inside;
-            gap = height - patch->u.h;
-            image = i;
-            for (int k = 0; k < 3; k++)
-                weights[k] = w[k];
-        }
+    uint32_t n = patch->count, image = NO_INDEX, triangles = closed ? n : n - 1;
+    for (uint32_t step = 1; step + 1 < n; step++) {
+        uint32_t j = patch->v_at + step < n ? patch->v_at + step : patch->v_at + step - n;
+        const flat *d = &patch->x[j];
+        side[j] = cross2(d->s, d->t, patch->u.s, patch->u.t);
+        if (j < triangles && (side[j] >= 0 || image == NO_INDEX))
+            image = j;
     }
-    if (image != NO_INDEX)
-        note_gap(gaps, image, gap);
     return image;
 }
 
-/* Notes the gaps where old spokes u-x[i] cross new ones v-x[j], for the triangles on both sides of the new spoke. */
-static void note_gaps_at_crossings(const polygon *patch, gap_range *gaps)
+/* Notes the gap at u, in the new triangle (v, a, b) that holds it, with its weights there. */
+static void note_gap_at_u(const polygon *patch, uint32_t image, gap_range *gaps, double weights[3])
 {
-    uint32_t n = patch->count;
-    for (uint32_t j = 0; j < n; j++) {
-        uint32_t after = j + 1 == n ? 0 : j + 1, before = j == 0 ? n - 1 : j - 1;
-        if (j == patch->v_at || after == patch->v_at || before == patch->v_at)
-            continue;
+    const flat *a = &patch->x[image], *b = &patch->x[image + 1 == patch->count ? 0 : image + 1], *u = &patch->u;
+    double area = cross2(a->s, a->t, b->s, b->t);
+    weights[1] = cross2(u->s, u->t, b->s, b->t) / area;
+    weights[2] = cross2(a->s, a->t, u->s, u->t) / area;
+    weights[0] = 1 - weights[1] - weights[2];
+    note_gap(gaps, image, weights[1] * a->h + weights[2] * b->h - u->h);
+}
+
+/* Notes the gaps where old spokes u-x[i] cross new ones v-x[j], for the triangles on both sides of the new spoke. The spoke v-x[j]
+ * divides the ring in two; the old spokes that cross it are those to the part in which u is not. */
+static void note_gaps_at_crossings(const polygon *patch, const double *side, gap_range *gaps)
+{
+    uint32_t n = patch->count, v = patch->v_at;
+    for (uint32_t step = 2; step + 2 <= n; step++) {
+        uint32_t j = v + step < n ? v + step : v + step - n, before = j == 0 ? n - 1 : j - 1;
         const flat *d = &patch->x[j];
-        double side_u = cross2(d->s, d->t, patch->u.s, patch->u.t), length2 = d->s * d->s + d->t * d->t;
-        for (uint32_t i = 0; i < n; i++) {
-            const flat *x = &patch->x[i];
-            double side_x = cross2(d->s, d->t, x->s, x->t);
-            if (i == j || i == patch->v_at || (side_u > 0) == (side_x > 0) || side_u == side_x)
-                continue;
-            double along = side_u / (side_u - side_x); /* on the old spoke, from u */
+        double side_u = side[j], inverse = 1 / (d->s * d->s + d->t * d->t);
+        uint32_t begin = side_u >= 0 ? 1 : step + 1, end = side_u >= 0 ? step : n;
+        for (uint32_t k = begin; k < end; k++) {
+            const flat *x = &patch->x[v + k < n ? v + k : v + k - n];
+            double side_x = cross2(d->s, d->t, x->s, x->t), span = side_u - side_x;
+            double along = span != 0 ? side_u / span : 0; /* on the old spoke, from u */
             double s = patch->u.s + along * (x->s - patch->u.s), t = patch->u.t + along * (x->t - patch->u.t);
-            double on_new = (s * d->s + t * d->t) / length2;
-            if (on_new < 0 || on_new > 1)
-                continue;
+            double on_new = (s * d->s + t * d->t) * inverse;
             double gap = on_new * d->h - (patch->u.h + along * (x->h - patch->u.h));
             note_gap(gaps, j, gap);
             note_gap(gaps, before, gap);
@@ -328,26 +315,31 @@ static bool drift_over_plane(const simplifier *s, const strl_star *star, uint32_
     uint32_t last = star->closed ? patch.count : patch.count - 1;
     for (uint32_t i = 0; i < last; i++)
         gaps.least[i] = gaps.most[i] = 0;
-    uint32_t fan_image = note_gap_at_u(&patch, last, &gaps, result->weights);
+    double side[STAR_MAX + 1];
+    uint32_t fan_image = find_image(&patch, star->closed, side);
     if (fan_image == NO_INDEX)
         return false;
-    note_gaps_at_crossings(&patch, &gaps);
+    note_gap_at_u(&patch, fan_image, &gaps, result->weights);
+    note_gaps_at_crossings(&patch, side, &gaps);
     drift_by_height(s, star, &patch, &gaps, fan_image, result->of);
     result->image = star->order[fan_image];
     return true;
 }
 
-static void note_length(collapse_drift *result, const strl_drift *drift)
+static float length_squared(const strl_drift *drift)
 {
-    float length = strl_drift_length(drift);
-    result->longest = length > result->longest ? length : result->longest;
+    float sum = 0;
+    for (int k = 0; k < 3; k++) {
+        float far = -drift->least[k] > drift->most[k] ? -drift->least[k] : drift->most[k];
+        sum += far * far;
+    }
+    return sum;
 }
 
 void strl__collapse_drift(const simplifier *s, const strl_star *star, uint32_t to, collapse_drift *result)
 {
     result->image = NO_INDEX;
     result->weights[0] = 1, result->weights[1] = result->weights[2] = 0;
-    result->longest = 0;
     result->receivers = 0;
     bool over_plane = drift_over_plane(s, star, to, result);
     if (!over_plane) {
@@ -357,14 +349,16 @@ void strl__collapse_drift(const simplifier *s, const strl_star *star, uint32_t t
             result->of[i] = all;
         result->orphan = all;
     }
+    float longest = 0;
     for (uint32_t i = 0; i < star->count; i++)
         if (star->next[i] != to && star->previous[i] != to)
-            note_length(result, &result->of[i]);
+            longest = strl__larger(longest, length_squared(&result->of[i]));
     for (uint32_t i = 0; i < result->receivers; i++) {
         strl_drift both = result->orphan;
         unite(&both, &s->drift[result->receiver[i]]);
-        note_length(result, &both);
+        longest = strl__larger(longest, length_squared(&both));
     }
+    result->longest = sqrtf(longest) * (1 + 1e-6f); /* whatever the rounding, a bound */
 }
 
 void strl__receive_orphans(simplifier *s, const collapse_drift *drift)
