@@ -8,23 +8,49 @@
 static int run(strl_cli_args *args)
 {
     static const strl_backend backends[] = {STRL_BACKEND_DEFAULT, STRL_BACKEND_GL45, STRL_BACKEND_GL3};
-    strl_viewer_desc desc = {.size = {1280, 720}, .error_px = 1, .memory_bytes = 512u << 20, .gpu_memory_bytes = 512u << 20};
+    strl_viewer_desc desc = {
+        .size = {1280, 720}, .error_px = 1, .memory_bytes = 512u << 20, .gpu_memory_bytes = 512u << 20};
     int backend = 0;
     const strl_cli_option options[] = {
         {.name = "size", .kind = STRL_CLI_SIZE, .value = desc.size, .help = "of the window (1280x720)"},
-        {.name = "error", .kind = STRL_CLI_REAL, .value = &desc.error_px, .argument = "PX", .help = "allowed pixel error (1)",
-         .least = 0.1, .most = 100},
-        {.name = "memory", .letter = 'm', .kind = STRL_CLI_BYTES, .value = &desc.memory_bytes, .help = "decoded nodes held (512M)",
-         .least = 1 << 20, .most = 1e15},
-        {.name = "gpu-memory", .kind = STRL_CLI_BYTES, .value = &desc.gpu_memory_bytes, .help = "buffers of nodes (512M)",
-         .least = STRL_RENDERER_LEAST_GPU_BYTES, .most = 1e15},
-        {.name = "screenshots", .kind = STRL_CLI_STRING, .value = &desc.screenshots, .argument = "DIR",
+        {.name = "error",
+         .kind = STRL_CLI_REAL,
+         .value = &desc.error_px,
+         .argument = "PX",
+         .help = "allowed pixel error (1)",
+         .least = 0.1,
+         .most = 100},
+        {.name = "memory",
+         .letter = 'm',
+         .kind = STRL_CLI_BYTES,
+         .value = &desc.memory_bytes,
+         .help = "decoded nodes held (512M)",
+         .least = 1 << 20,
+         .most = 1e15},
+        {.name = "gpu-memory",
+         .kind = STRL_CLI_BYTES,
+         .value = &desc.gpu_memory_bytes,
+         .help = "buffers of nodes (512M)",
+         .least = STRL_RENDERER_LEAST_GPU_BYTES,
+         .most = 1e15},
+        {.name = "screenshots",
+         .kind = STRL_CLI_STRING,
+         .value = &desc.screenshots,
+         .argument = "DIR",
          .help = "where key P saves pictures (the current folder)"},
-        {.name = "backend", .kind = STRL_CLI_ENUM, .value = &backend, .argument = "auto|gl45|gl3", .help = "what draws (auto)"},
+        {.name = "backend",
+         .kind = STRL_CLI_ENUM,
+         .value = &backend,
+         .argument = "auto|gl45|gl3",
+         .help = "what draws (auto)"},
     };
     char notes[2048];
     snprintf(notes, sizeof notes, "MODEL is a container. In the window:\n\n%s", strl_viewer_keys);
-    const strl_cli_usage usage = {.positional = "MODEL", .least = 1, .most = 1, .notes = notes, .options = options,
+    const strl_cli_usage usage = {.positional = "MODEL",
+                                  .least = 1,
+                                  .most = 1,
+                                  .notes = notes,
+                                  .options = options,
                                   .option_count = STRL_CLI_COUNT_OF(options)};
     strl_cli_list inputs;
     int stop = strl_cli_parse(args, &usage, &inputs);

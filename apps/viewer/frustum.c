@@ -48,7 +48,8 @@ static void project(const strl_view *view, const strl_camera *camera, const doub
     out[1] = (float)((1 - point[1] / (point[2] * view->tan_y)) / 2 * camera->height);
 }
 
-uint32_t strl_frustum_lines(const strl_camera *seen, double far, const strl_camera *by, float lines[STRL_FRUSTUM_LINES][4])
+uint32_t strl_frustum_lines(const strl_camera *seen, double far, const strl_camera *by,
+                            float lines[STRL_FRUSTUM_LINES][4])
 {
     /* Corners 0 to 3 are near, 4 to 7 far. */
     static const unsigned char edges[STRL_FRUSTUM_LINES][2] = {{0, 1}, {1, 3}, {3, 2}, {2, 0}, {4, 5}, {5, 7},

@@ -104,8 +104,8 @@ void heading(const char *text)
 void show_controls(const strl_gui_facts *facts, strl_gui_controls *controls)
 {
     ImGui::SetNextItemWidth(-1);
-    ImGui::SliderFloat("##error", &controls->error_px, STRL_GUI_LEAST_ERROR_PX, STRL_GUI_MOST_ERROR_PX, "pixel error %.2f",
-                       ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp);
+    ImGui::SliderFloat("##error", &controls->error_px, STRL_GUI_LEAST_ERROR_PX, STRL_GUI_MOST_ERROR_PX,
+                       "pixel error %.2f", ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp);
     int mode = controls->fly;
     ImGui::RadioButton("orbit", &mode, 0);
     ImGui::SameLine();
@@ -165,7 +165,8 @@ void show_panel(float scale, const strl_gui_facts *facts, strl_gui_controls *con
     char text[32];
     ImGui::SetNextWindowPos(ImVec2(margin * scale, margin * scale), ImGuiCond_FirstUseEver);
     ImGui::SetNextWindowSizeConstraints(ImVec2(panel_width * scale, 0), ImVec2(panel_width * scale, FLT_MAX));
-    ImGui::Begin("Stroll", NULL, ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav);
+    ImGui::Begin("Stroll", NULL,
+                 ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav);
     format_count(text, sizeof text, facts->model_triangles);
     ImGui::TextWrapped("%s", facts->model);
     ImGui::TextColored(faint, "%s triangles", text);
@@ -185,8 +186,9 @@ void show_panel(float scale, const strl_gui_facts *facts, strl_gui_controls *con
     ImGui::End();
 }
 
-const ImGuiWindowFlags overlay_flags = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoNav |
-                                       ImGuiWindowFlags_NoInputs | ImGuiWindowFlags_NoSavedSettings;
+const ImGuiWindowFlags overlay_flags = ImGuiWindowFlags_NoDecoration | ImGuiWindowFlags_AlwaysAutoResize |
+                                       ImGuiWindowFlags_NoNav | ImGuiWindowFlags_NoInputs |
+                                       ImGuiWindowFlags_NoSavedSettings;
 
 void show_help(const char *keys)
 {
@@ -215,7 +217,8 @@ void show_lines(const strl_gui_facts *facts)
         return;
     for (uint32_t i = 0; i < facts->line_count; i++) {
         const float *at = facts->lines[i];
-        list->AddLine(ImVec2(at[0] / scale.x, at[1] / scale.y), ImVec2(at[2] / scale.x, at[3] / scale.y), line_colour, 1.5f);
+        list->AddLine(ImVec2(at[0] / scale.x, at[1] / scale.y), ImVec2(at[2] / scale.x, at[3] / scale.y), line_colour,
+                      1.5f);
     }
 }
 

@@ -35,10 +35,10 @@ typedef struct strl_gui_facts {
     uint64_t triangles, resident_bytes, memory_bytes, gpu_bytes, gpu_memory_bytes, faults;
     uint32_t nodes, nodes_culled, draws, requests, missing_nodes;
     double allowed_error_px, max_error_px;
-    double speed;           /* of flying, world units a second */
-    const char *last_fault; /* empty = none */
-    const char *message;    /* empty = none */
-    const char *keys;       /* the help's lines */
+    double speed;            /* of flying, world units a second */
+    const char *last_fault;  /* empty = none */
+    const char *message;     /* empty = none */
+    const char *keys;        /* the help's lines */
     const float (*lines)[4]; /* x y x y in framebuffer pixels, of a frozen camera's view */
     uint32_t line_count;
 } strl_gui_facts;

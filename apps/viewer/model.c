@@ -20,14 +20,17 @@ static strl_status check_kind(const char *path, strl_error *err)
     char magic[8];
     size_t got = 0;
     if (strstr(path, "://"))
-        return strl__fail(err, STRL_ERR_UNSUPPORTED, "%s: models behind an address are not supported yet, expected a file", path);
+        return strl__fail(err, STRL_ERR_UNSUPPORTED,
+                          "%s: models behind an address are not supported yet, expected a file", path);
     strl_status status = strl_file_open(path, &file, err);
     if (status == STRL_OK)
         status = strl_file_read_some(file, 0, magic, sizeof magic, &got, err);
     strl_file_close(file, NULL);
     if (status == STRL_OK && (got != sizeof magic || memcmp(magic, STRL__MAGIC, sizeof magic) != 0))
-        status = strl__fail(err, STRL_ERR_ARGUMENT, "%s is not a container: build one of it first "
-                            "(stroll build %s -o NAME.stroll) and view that", path, path);
+        status = strl__fail(err, STRL_ERR_ARGUMENT,
+                            "%s is not a container: build one of it first "
+                            "(stroll build %s -o NAME.stroll) and view that",
+                            path, path);
     return status;
 }
 

@@ -136,7 +136,8 @@ void strl_navigator_wheel(strl_navigator *n, double ticks)
         n->speed = clamp(n->speed * pow(SPEED_PER_TICK, ticks), LEAST_DISTANCE * n->radius, MOST_DISTANCE * n->radius);
         return;
     }
-    double distance = clamp(n->distance * pow(ZOOM_PER_TICK, ticks), LEAST_DISTANCE * n->radius, MOST_DISTANCE * n->radius);
+    double distance =
+        clamp(n->distance * pow(ZOOM_PER_TICK, ticks), LEAST_DISTANCE * n->radius, MOST_DISTANCE * n->radius);
     shift(n->eye, axes_of(n).forward, n->distance - distance);
     n->distance = distance;
 }

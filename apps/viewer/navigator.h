@@ -15,9 +15,9 @@ typedef struct strl_navigator {
     unsigned up_axis;
     strl_navigator_mode mode;
     double eye[3];
-    double yaw, pitch;    /* of the view direction, radians; pitch is above the horizon */
-    double distance;      /* to the pivot */
-    double speed;         /* of flying, world units a second */
+    double yaw, pitch; /* of the view direction, radians; pitch is above the horizon */
+    double distance;   /* to the pivot */
+    double speed;      /* of flying, world units a second */
     double fov_y_deg;
     uint32_t view_height; /* pixels: what drags are measured in */
 } strl_navigator;

@@ -42,12 +42,13 @@ static strl_status write_png(uint8_t *rgb, uint32_t width, uint32_t height, cons
     return strl__fail(err, STRL_ERR_IO, "cannot write the image %s: %s", path, png.message);
 }
 
-strl_status strl_screenshot_write(strl_renderer *renderer, uint32_t width, uint32_t height, const char *folder, char *path,
-                                  size_t path_size, strl_error *err)
+strl_status strl_screenshot_write(strl_renderer *renderer, uint32_t width, uint32_t height, const char *folder,
+                                  char *path, size_t path_size, strl_error *err)
 {
     char *file = NULL;
     uint8_t *pixels = strl__alloc((size_t)width * height, 4);
-    strl_status status = pixels ? strl_path_make_directory(folder, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory for an image");
+    strl_status status =
+        pixels ? strl_path_make_directory(folder, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory for an image");
     if (status == STRL_OK)
         status = free_path(folder, &file, err);
     if (status == STRL_OK)

@@ -79,7 +79,8 @@ static void take_screenshot(viewer *v)
 {
     char path[280], text[320];
     strl_error err = {0};
-    strl_status status = strl_screenshot_write(v->renderer, v->size[0], v->size[1], v->desc.screenshots, path, sizeof path, &err);
+    strl_status status =
+        strl_screenshot_write(v->renderer, v->size[0], v->size[1], v->desc.screenshots, path, sizeof path, &err);
     snprintf(text, sizeof text, "%s%.300s", status == STRL_OK ? "saved " : "", status == STRL_OK ? path : err.message);
     say(v, text);
 }
@@ -106,22 +107,53 @@ static bool obey(viewer *v, strl_action action)
 {
     strl_gui_controls *controls = &v->controls;
     switch (action) {
-    case STRL_ACTION_ORBIT: controls->fly = false; break;
-    case STRL_ACTION_FLY: controls->fly = true; break;
-    case STRL_ACTION_HOME: controls->home = true; break;
-    case STRL_ACTION_RESET: controls->reset = true; break;
-    case STRL_ACTION_NO_COLOURS: controls->debug = STRL_DEBUG_NONE; break;
-    case STRL_ACTION_CLUSTER_COLOURS: toggle_debug(v, STRL_DEBUG_CLUSTER); break;
-    case STRL_ACTION_LEVEL_COLOURS: toggle_debug(v, STRL_DEBUG_LEVEL); break;
-    case STRL_ACTION_ERROR_COLOURS: toggle_debug(v, STRL_DEBUG_ERROR); break;
-    case STRL_ACTION_WIREFRAME: controls->wireframe = !controls->wireframe; break;
-    case STRL_ACTION_FLAT: controls->flat = !controls->flat; break;
-    case STRL_ACTION_FREEZE: controls->frozen = !controls->frozen; break;
-    case STRL_ACTION_COARSER: scale_error(v, ERROR_STEP); break;
-    case STRL_ACTION_FINER: scale_error(v, 1 / ERROR_STEP); break;
-    case STRL_ACTION_SCREENSHOT: controls->screenshot = true; break;
-    case STRL_ACTION_HELP: controls->help = !controls->help; break;
-    case STRL_ACTION_QUIT: return true;
+    case STRL_ACTION_ORBIT:
+        controls->fly = false;
+        break;
+    case STRL_ACTION_FLY:
+        controls->fly = true;
+        break;
+    case STRL_ACTION_HOME:
+        controls->home = true;
+        break;
+    case STRL_ACTION_RESET:
+        controls->reset = true;
+        break;
+    case STRL_ACTION_NO_COLOURS:
+        controls->debug = STRL_DEBUG_NONE;
+        break;
+    case STRL_ACTION_CLUSTER_COLOURS:
+        toggle_debug(v, STRL_DEBUG_CLUSTER);
+        break;
+    case STRL_ACTION_LEVEL_COLOURS:
+        toggle_debug(v, STRL_DEBUG_LEVEL);
+        break;
+    case STRL_ACTION_ERROR_COLOURS:
+        toggle_debug(v, STRL_DEBUG_ERROR);
+        break;
+    case STRL_ACTION_WIREFRAME:
+        controls->wireframe = !controls->wireframe;
+        break;
+    case STRL_ACTION_FLAT:
+        controls->flat = !controls->flat;
+        break;
+    case STRL_ACTION_FREEZE:
+        controls->frozen = !controls->frozen;
+        break;
+    case STRL_ACTION_COARSER:
+        scale_error(v, ERROR_STEP);
+        break;
+    case STRL_ACTION_FINER:
+        scale_error(v, 1 / ERROR_STEP);
+        break;
+    case STRL_ACTION_SCREENSHOT:
+        controls->screenshot = true;
+        break;
+    case STRL_ACTION_HELP:
+        controls->help = !controls->help;
+        break;
+    case STRL_ACTION_QUIT:
+        return true;
     }
     return false;
 }
@@ -181,7 +213,9 @@ static strl_status fit_size(viewer *v, bool *drawable, strl_error *err)
 
 static strl_draw_options draw_options(const viewer *v)
 {
-    strl_draw_options options = {.debug = v->controls.debug, .wireframe = v->controls.wireframe, .flat = v->controls.flat,
+    strl_draw_options options = {.debug = v->controls.debug,
+                                 .wireframe = v->controls.wireframe,
+                                 .flat = v->controls.flat,
                                  .background = {30, 33, 38}};
     options.sky_up[v->model.up_axis] = 1;
     return options;
@@ -210,13 +244,29 @@ static strl_gui_facts gather_facts(const viewer *v, const strl_render_stats *dra
 {
     const strl_walk_stats *walk = strl_walk_get_stats(v->model.walk);
     return (strl_gui_facts){
-        .model = v->desc.path, .device = v->device, .model_triangles = v->model.triangles, .fps = v->clock.fps,
-        .frame_ms = v->clock.frame_ms, .select_ms = v->clock.select_mean_ms, .idle = v->resting,
-        .triangles = drawn->triangles, .resident_bytes = walk->resident_bytes, .memory_bytes = v->desc.memory_bytes,
-        .gpu_bytes = drawn->gpu_bytes, .gpu_memory_bytes = v->desc.gpu_memory_bytes, .faults = walk->faults,
-        .nodes = walk->nodes, .nodes_culled = walk->nodes_culled, .draws = drawn->draws, .requests = walk->requests_pending,
-        .missing_nodes = walk->missing_nodes, .allowed_error_px = walk->allowed_error_px, .max_error_px = walk->max_error_px,
-        .speed = v->navigator.speed, .last_fault = walk->last_fault, .keys = strl_viewer_keys,
+        .model = v->desc.path,
+        .device = v->device,
+        .model_triangles = v->model.triangles,
+        .fps = v->clock.fps,
+        .frame_ms = v->clock.frame_ms,
+        .select_ms = v->clock.select_mean_ms,
+        .idle = v->resting,
+        .triangles = drawn->triangles,
+        .resident_bytes = walk->resident_bytes,
+        .memory_bytes = v->desc.memory_bytes,
+        .gpu_bytes = drawn->gpu_bytes,
+        .gpu_memory_bytes = v->desc.gpu_memory_bytes,
+        .faults = walk->faults,
+        .nodes = walk->nodes,
+        .nodes_culled = walk->nodes_culled,
+        .draws = drawn->draws,
+        .requests = walk->requests_pending,
+        .missing_nodes = walk->missing_nodes,
+        .allowed_error_px = walk->allowed_error_px,
+        .max_error_px = walk->max_error_px,
+        .speed = v->navigator.speed,
+        .last_fault = walk->last_fault,
+        .keys = strl_viewer_keys,
         .message = strl_clock_ns() < v->message_end_ns ? v->message : "",
     };
 }
@@ -297,13 +347,16 @@ static strl_status open_window(viewer *v, strl_error *err)
     char title[256];
     const char *slash = strrchr(v->desc.path, '/');
     snprintf(title, sizeof title, "%.200s - Stroll", slash ? slash + 1 : v->desc.path);
-    const strl_window_desc window = {.title = title, .size = {v->desc.size[0], v->desc.size[1]}, .gl3 = v->desc.backend == STRL_BACKEND_GL3};
+    const strl_window_desc window = {
+        .title = title, .size = {v->desc.size[0], v->desc.size[1]}, .gl3 = v->desc.backend == STRL_BACKEND_GL3};
     strl_status status = strl_window_create(&window, &v->window, err);
     if (status != STRL_OK)
         return status;
     strl_window_framebuffer_size(v->window, v->size);
-    const strl_renderer_desc desc = {.backend = v->desc.backend, .width = v->size[0] ? v->size[0] : 1,
-                                     .height = v->size[1] ? v->size[1] : 1, .gpu_memory_bytes = v->desc.gpu_memory_bytes,
+    const strl_renderer_desc desc = {.backend = v->desc.backend,
+                                     .width = v->size[0] ? v->size[0] : 1,
+                                     .height = v->size[1] ? v->size[1] : 1,
+                                     .gpu_memory_bytes = v->desc.gpu_memory_bytes,
                                      .current_context = true};
     status = strl_renderer_create(&desc, &v->renderer, err);
     if (status == STRL_OK)

@@ -12,8 +12,8 @@
 struct strl_window {
     GLFWwindow *handle;
     strl_window_input pending;
-    double cursor[2];       /* where it was last */
-    bool dragging[2];       /* left, right: went down outside the panel */
+    double cursor[2]; /* where it was last */
+    bool dragging[2]; /* left, right: went down outside the panel */
     bool mouse_taken, keyboard_taken;
 };
 
@@ -44,7 +44,8 @@ static void on_key(GLFWwindow *handle, int key, int scancode, int action, int mo
     (void)scancode;
     strl_window *window = glfwGetWindowUserPointer(handle);
     window->pending.touched = true;
-    if (action != GLFW_PRESS || window->keyboard_taken || (modifiers & (GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER)))
+    if (action != GLFW_PRESS || window->keyboard_taken ||
+        (modifiers & (GLFW_MOD_CONTROL | GLFW_MOD_ALT | GLFW_MOD_SUPER)))
         return;
     for (size_t b = 0; b < sizeof bindings / sizeof *bindings; b++)
         if (bindings[b].key == key)
@@ -77,7 +78,8 @@ static void on_button(GLFWwindow *handle, int button, int action, int modifiers)
 static void on_cursor(GLFWwindow *handle, double x, double y)
 {
     strl_window *window = glfwGetWindowUserPointer(handle);
-    double scale = strl_window_pixel_scale(window), dx = (x - window->cursor[0]) * scale, dy = (y - window->cursor[1]) * scale;
+    double scale = strl_window_pixel_scale(window), dx = (x - window->cursor[0]) * scale,
+           dy = (y - window->cursor[1]) * scale;
     strl_window_input *input = &window->pending;
     input->touched = true;
     if (window->dragging[0])
@@ -160,16 +162,16 @@ strl_status strl_window_create(const strl_window_desc *desc, strl_window **windo
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a window");
     if (!glfwInit()) {
         strl__free(made);
-        return strl__fail(err, STRL_ERR_UNSUPPORTED, "no window can be opened: %s (stroll render draws without a display)",
-                          last_complaint());
+        return strl__fail(err, STRL_ERR_UNSUPPORTED,
+                          "no window can be opened: %s (stroll render draws without a display)", last_complaint());
     }
     if (!desc->gl3)
         made->handle = open_handle(desc, 4, 5);
     if (!made->handle)
         made->handle = open_handle(desc, 3, 3);
     if (!made->handle) {
-        strl_status status = strl__fail(err, STRL_ERR_UNSUPPORTED, "no window with OpenGL 3.3 or later can be opened: %s",
-                                        last_complaint());
+        strl_status status = strl__fail(err, STRL_ERR_UNSUPPORTED,
+                                        "no window with OpenGL 3.3 or later can be opened: %s", last_complaint());
         strl_window_destroy(made);
         return status;
     }
@@ -234,7 +236,8 @@ void strl_window_set_taken(strl_window *window, bool mouse, bool keyboard)
 
 static double held(const strl_window *window, int forth, int back)
 {
-    return (double)(glfwGetKey(window->handle, forth) == GLFW_PRESS) - (double)(glfwGetKey(window->handle, back) == GLFW_PRESS);
+    return (double)(glfwGetKey(window->handle, forth) == GLFW_PRESS) -
+           (double)(glfwGetKey(window->handle, back) == GLFW_PRESS);
 }
 
 void strl_window_take_input(strl_window *window, double wait_seconds, strl_window_input *input)

@@ -50,7 +50,7 @@ typedef struct strl_window_desc {
 
 /* The context is current afterwards. STRL_ERR_UNSUPPORTED where there is no display or no context. */
 strl_status strl_window_create(const strl_window_desc *desc, strl_window **window, strl_error *err);
-void strl_window_destroy(strl_window *window); /* NULL is legal */
+void strl_window_destroy(strl_window *window);              /* NULL is legal */
 struct GLFWwindow *strl_window_handle(strl_window *window); /* borrowed, for the panel */
 
 /* Pixels to draw; 0x0 while the window is an icon. */

@@ -137,12 +137,24 @@ static void no_movement_breaks_the_camera(void **state)
         seed = seed * 1664525u + 1013904223u;
         double a = (double)(seed >> 8 & 0xfff) - 2048, b = (double)(seed >> 20) - 2048;
         switch (seed >> 4 & 7) {
-        case 0: strl_navigator_drag_left(&navigator, a, b); break;
-        case 1: strl_navigator_drag_right(&navigator, a * 10, b * 10); break;
-        case 2: strl_navigator_wheel(&navigator, a); break;
-        case 3: strl_navigator_set_mode(&navigator, STRL_NAVIGATOR_FLY); break;
-        case 4: strl_navigator_set_mode(&navigator, STRL_NAVIGATOR_ORBIT); break;
-        default: strl_navigator_move(&navigator, way, true, 0.1); break;
+        case 0:
+            strl_navigator_drag_left(&navigator, a, b);
+            break;
+        case 1:
+            strl_navigator_drag_right(&navigator, a * 10, b * 10);
+            break;
+        case 2:
+            strl_navigator_wheel(&navigator, a);
+            break;
+        case 3:
+            strl_navigator_set_mode(&navigator, STRL_NAVIGATOR_FLY);
+            break;
+        case 4:
+            strl_navigator_set_mode(&navigator, STRL_NAVIGATOR_ORBIT);
+            break;
+        default:
+            strl_navigator_move(&navigator, way, true, 0.1);
+            break;
         }
         view_of(&navigator);
         assert_true(distance(navigator.eye, navigator.centre) < 1e4 * navigator.radius);
