@@ -288,6 +288,17 @@ static float smaller(float a, float b)
     return a < b ? a : b;
 }
 
+/* Whether a collapse of this key is still asked for. */
+static bool wants_more(const simplifier *s, float key)
+{
+    const strl_simplify_desc *desc = s->desc;
+    if (desc->even_error > 0 && key <= desc->even_error)
+        return s->triangles_left > desc->least_triangles;
+    if (desc->even_error > 0 && s->triangles_left <= desc->most_triangles)
+        return false;
+    return s->triangles_left > desc->target_triangles;
+}
+
 /* An error that is small for a piece of this size, whatever its triangles are like. */
 static float least_middle(const simplifier *s)
 {
@@ -312,7 +323,7 @@ static float run_rung(simplifier *s, float limit, bool adaptive, float *middle, 
     for (uint32_t p = 0; p < s->mesh->point_count; p++)
         if (!(s->mesh->flags[p] & STRL_POINT_KEPT) && s->head[p] != NO_INDEX && s->heap_at[p] == NO_INDEX)
             plan_and_push(s, p);
-    while (s->heap_count && s->triangles_left > s->desc->target_triangles) {
+    while (s->heap_count && wants_more(s, s->key[s->heap[0]])) {
         uint32_t point = s->heap[0];
         if (s->key[point] > limit || (adaptive && *middle > 0 && s->key[point] > LADDER_RATIO * *middle))
             break;
@@ -374,7 +385,8 @@ strl_status strl_simplify(const strl_mesh *mesh, const strl_simplify_desc *desc,
     float middle = 0, reached = strl__larger(result->geometric, LEAST_ERROR);
     if (s.triangles_left > desc->target_triangles)
         reached = strl__larger(reached, run_rung(&s, desc->error_limit, true, &middle, result));
-    if (s.triangles_left > desc->target_triangles && !climb_ladder(&s, reached, arena, result))
+    uint32_t enough = desc->even_error > 0 ? desc->most_triangles : desc->target_triangles;
+    if (s.triangles_left > enough && !climb_ladder(&s, reached, arena, result))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to simplify %u triangles", mesh->triangle_count);
     result->triangles_left = s.triangles_left;
     return STRL_OK;

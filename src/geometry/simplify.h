@@ -25,6 +25,9 @@ typedef enum strl_simplify_rung {
 typedef struct strl_simplify_desc {
     uint32_t target_triangles;  /* stop at this many or fewer */
     uint32_t soft_triangles;    /* with so many or fewer, do not pay many times the error for the rest */
+    float even_error;           /* an error that pieces of a model are to end at alike: collapses up to it go on below the target, down
+                                 * to least_triangles; dearer ones stop above it already, from most_triangles on; 0 = off */
+    uint32_t least_triangles, most_triangles;
     float error_limit;          /* stop before a collapse whose error would pass this; lattice units; INFINITY = none */
     strl_simplify_rung last_rung; /* go no further down the ladder */
     float normal_weight;        /* attribute deviation of a normal that turned by one radian */

@@ -9,6 +9,9 @@
 #include "platform/file.h"
 #include "platform/thread.h"
 
+/* Errors grow by about this factor where triangles are halved for the first time. */
+#define FIRST_GROWTH 2.4f
+
 static strl_status open_level(strl_hierarchy *hierarchy, uint32_t index, strl_error *err)
 {
     strl_level *level = &hierarchy->levels[index];
@@ -46,6 +49,8 @@ static strl_status simplify_levels(strl_hierarchy *hierarchy, strl_error *err)
             status = strl_spill_flush(hierarchy->levels[level].payloads, err);
         if (!status && level > 0)
             status = close_meshes(&hierarchy->levels[level - 1], err);
+        if (!status && !strl_choose_even_error(hierarchy, &hierarchy->levels[level]))
+            status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the errors of a level");
     }
     if (!status)
         status = close_meshes(&hierarchy->levels[hierarchy->partition->depth], err);
@@ -187,7 +192,7 @@ strl_status strl__clusters_run(strl_build_context *context, strl_error *err)
 {
     strl_ingest ingest;
     strl_partition partition = {0};
-    strl_hierarchy hierarchy = {.context = context, .ingest = &ingest, .partition = &partition};
+    strl_hierarchy hierarchy = {.context = context, .ingest = &ingest, .partition = &partition, .growth = FIRST_GROWTH};
     strl_status status = strl_ingest_run(context, &ingest, err);
     if (!status) {
         strl__build_stage(context, "partition");

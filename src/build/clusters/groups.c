@@ -109,19 +109,23 @@ static float error_of(const chooser *c, uint32_t node)
     return left->geometric_max > right->geometric_max ? left->geometric_max : right->geometric_max;
 }
 
+/* Condition 1 is asked of the first partner alone: later ones may well be a member's sibling. Condition 3, no chains: a node
+ * joins only where it shares vertices with at least half of the members. */
 static bool may_join(const chooser *c, const uint32_t *members, uint32_t count, uint32_t node)
 {
-    uint32_t soon = c->levels_above < MERGED_SOON ? c->levels_above : MERGED_SOON;
+    uint32_t touching = 0, soon = c->levels_above < MERGED_SOON ? c->levels_above : MERGED_SOON;
+    if (count == 1 && members[0] >> soon == node >> soon)
+        return false;
     for (uint32_t i = 0; i < count; i++) {
         float a = error_of(c, members[i]), b = error_of(c, node);
-        if (members[i] >> soon == node >> soon || a > SIMILAR_ERROR * b || b > SIMILAR_ERROR * a ||
-            shared_between(c, members[i], node) < LEAST_SHARED)
+        if (a > SIMILAR_ERROR * b || b > SIMILAR_ERROR * a)
             return false;
+        touching += shared_between(c, members[i], node) >= LEAST_SHARED;
     }
-    return true;
+    return 2 * touching >= count;
 }
 
-/* The node itself, then those that share most with it, as long as all share vertices with each other (condition 3). */
+/* The node itself, then those that share most with it. */
 static uint32_t gather(const chooser *c, uint32_t node, uint32_t members[STRL_GROUP_MAX])
 {
     uint32_t count = 1;

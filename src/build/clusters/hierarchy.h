@@ -13,7 +13,7 @@
 #include "build/clusters/partition.h"
 #include "container/container.h"
 
-#define STRL_GROUP_MAX 4u
+#define STRL_GROUP_MAX 8u
 /* Appearance: attribute deviation of a normal turned by one radian, and of black against white. */
 #define STRL_NORMAL_WEIGHT 0.25f
 #define STRL_COLOUR_WEIGHT 1.f
@@ -54,6 +54,8 @@ typedef struct strl_hierarchy {
     const strl_partition *partition;
     strl_level *levels;     /* [partition->depth + 1] */
     strl_adjacency next;    /* of the level above the one being made */
+    float even_error;       /* lattice units: where the nodes of the level being made are to end; 0 = at half their triangles */
+    float growth;           /* by which even_error grows from level to level, so that about half the triangles go */
 } strl_hierarchy;
 
 /* One node as a worker has made it, before its bytes are put into the spills in order. */
@@ -72,6 +74,13 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
 /* Appends a made node's bytes to its level and counts its neighbours. In node order, one thread. */
 strl_status strl_take_node(strl_hierarchy *hierarchy, strl_level *level, uint32_t self, strl_made_node *made,
                            strl_error *err);
+
+/* The larger of both errors of a node's base mesh. */
+float strl_node_error(const strl_node *record);
+/* Sorts values in place. */
+float strl_median(float *values, uint32_t count);
+/* Sets even_error for the level above `level`, which is done. */
+bool strl_choose_even_error(strl_hierarchy *hierarchy, const strl_level *level);
 
 strl_status strl_make_leaves(strl_hierarchy *hierarchy, strl_error *err);
 strl_status strl_make_level(strl_hierarchy *hierarchy, uint32_t level, strl_error *err);

@@ -26,6 +26,7 @@ typedef struct leaf_stage {
 
 /* A position in more cells than this has no sensible normal anyway. */
 #define HALO_CELLS 64u
+#define SAMPLE_LEAVES 16u
 
 static int compare_refs(const void *a, const void *b)
 {
@@ -252,13 +253,11 @@ static strl_status mark_shared(const leaf_stage *stage, const shared_ref *refs, 
     return STRL_OK;
 }
 
-static strl_status make_leaf(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
+static strl_status make_one(leaf_stage *stage, uint32_t index, unsigned worker, strl_made_node *made, strl_error *err)
 {
-    leaf_stage *stage = context;
     strl_arena *arena = &stage->arenas[worker];
-    strl_made_node *made = &stage->slots[slot];
     strl_arena_mark mark = strl_arena_get_mark(arena);
-    uint32_t cluster = stage->first_cluster + (uint32_t)index, own = 0;
+    uint32_t cluster = stage->first_cluster + index, own = 0;
     size_t ref_count;
     const shared_ref *refs = refs_of(stage, cluster, &ref_count);
     strl_soup_triangle *triangles;
@@ -287,6 +286,12 @@ static strl_status make_leaf(void *context, uint64_t index, unsigned slot, unsig
     return status;
 }
 
+static strl_status make_leaf(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
+{
+    leaf_stage *stage = context;
+    return make_one(stage, (uint32_t)index, worker, &stage->slots[slot], err);
+}
+
 static strl_status take_leaf(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
 {
     leaf_stage *stage = context;
@@ -295,6 +300,35 @@ static strl_status take_leaf(void *context, uint64_t index, unsigned slot, unsig
     strl_status status = strl_take_node(stage->hierarchy, stage->level, cluster, &stage->slots[slot], err);
     strl_made_node_deinit(&stage->slots[slot]);
     return status ? status : strl__build_report(stage->hierarchy->context, cluster + 1, stage->level->count, err);
+}
+
+typedef struct leaf_sample {
+    leaf_stage *stage;
+    uint32_t count, stride;
+    float errors[SAMPLE_LEAVES];
+} leaf_sample;
+
+static strl_status sample_leaf(void *context, uint64_t index, unsigned worker, strl_error *err)
+{
+    leaf_sample *sample = context;
+    strl_made_node made;
+    strl_status status = make_one(sample->stage, (uint32_t)index * sample->stride, worker, &made, err);
+    sample->errors[index] = strl_node_error(&made.state.record);
+    strl_made_node_deinit(&made);
+    return status;
+}
+
+/* What error half the triangles cost, from some clusters of the bucket at hand. */
+static strl_status sample_error(leaf_stage *stage, uint32_t clusters, strl_error *err)
+{
+    leaf_sample sample = {.stage = stage, .count = clusters < SAMPLE_LEAVES ? clusters : SAMPLE_LEAVES};
+    if (clusters < 2 * SAMPLE_LEAVES)
+        return STRL_OK;
+    sample.stride = clusters / sample.count;
+    strl_status status = strl_pool_for(stage->hierarchy->context->pool, sample.count, sample_leaf, &sample, NULL, err);
+    if (!status)
+        stage->hierarchy->even_error = strl_median(sample.errors, sample.count);
+    return status;
 }
 
 /* Reads one bucket of shares and sorts its records by cluster. */
@@ -333,6 +367,8 @@ strl_status strl_make_leaves(strl_hierarchy *hierarchy, strl_error *err)
     for (uint32_t b = 0; b < shares.bucket_count && !status; b++) {
         status = load_bucket(&stage, shares.spill[b], err);
         stage.first_cluster = shares.bucket_first[b];
+        if (!status && b == 0)
+            status = sample_error(&stage, shares.bucket_first[1] - shares.bucket_first[0], err);
         if (!status)
             status = strl_pool_ordered(pool, shares.bucket_first[b + 1] - shares.bucket_first[b], 0, make_leaf,
                                        take_leaf, &stage, NULL, err);

@@ -8,11 +8,16 @@
 #include "geometry/record.h"
 #include "geometry/simplify.h"
 
-/* The boundary of a group is simplified up to the error that its nodes' children have reached anyway. */
-#define BOUNDARY_ERROR_SHARE 1.f
+/* The boundary of a group is simplified up to a little more than the error that its nodes' children have reached anyway. */
+#define BOUNDARY_ERROR_SHARE 1.25f
 
 /* A node with more before it is simplified holds what cannot be simplified: then duplicate faces go. */
 #define CROWDED_TRIANGLES 8192u
+
+/* Bounds of what errors grow by where triangles are halved; a level of few nodes does not say enough. */
+#define LEAST_GROWTH 1.3
+#define MOST_GROWTH 4.
+#define LEAST_EVEN_NODES 16u
 
 typedef struct made_group {
     uint32_t count;
@@ -340,6 +345,44 @@ static strl_status take_group(void *context, uint64_t index, unsigned slot, unsi
     made_group_deinit(made);
     return status ? status
                   : strl__build_report(stage->hierarchy->context, stage->groups.first[index + 1], stage->level->count, err);
+}
+
+float strl_node_error(const strl_node *record)
+{
+    return fmaxf(record->geometric_max, record->appearance_max);
+}
+
+static int compare_floats(const void *a, const void *b)
+{
+    float x, y;
+    memcpy(&x, a, sizeof x);
+    memcpy(&y, b, sizeof y);
+    return x < y ? -1 : x > y;
+}
+
+float strl_median(float *values, uint32_t count)
+{
+    qsort(values, count, sizeof *values, compare_floats);
+    return count ? values[count / 2] : 0;
+}
+
+/* If a growth of g left a share r of the triangles, g to the power ln 2 / ln (1 / r) would have left half. */
+bool strl_choose_even_error(strl_hierarchy *hierarchy, const strl_level *level)
+{
+    float *errors = strl__alloc(level->count, sizeof *errors);
+    double finest = 0, base = 0;
+    if (!errors)
+        return false;
+    for (uint32_t i = 0; i < level->count; i++) {
+        errors[i] = strl_node_error(&level->nodes[i].record);
+        finest += level->nodes[i].record.triangle_count;
+        base += level->nodes[i].record.base_triangle_count;
+    }
+    double left = fmin(fmax(base / finest, 0.35), 0.7);
+    hierarchy->growth = (float)fmin(fmax(pow(hierarchy->growth, log(0.5) / log(left)), LEAST_GROWTH), MOST_GROWTH);
+    hierarchy->even_error = level->count >= LEAST_EVEN_NODES ? hierarchy->growth * strl_median(errors, level->count) : 0;
+    strl__free(errors);
+    return true;
 }
 
 strl_status strl_make_level(strl_hierarchy *hierarchy, uint32_t level, strl_error *err)
