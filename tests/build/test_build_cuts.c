@@ -10,10 +10,8 @@
 #include <cmocka.h>
 
 #include "base/hash.h"
-#include "build/built.h"
+#include "build/cuts.h"
 #include "build/meshes.h"
-#include "build/surface_distance.h"
-#include "container/cut.h"
 
 #ifdef __SANITIZE_ADDRESS__
 #define SMALLER 5u
@@ -22,38 +20,6 @@
 #define SMALLER 1u
 #define RANDOM_CUTS 100u
 #endif
-
-/* ---- the input, as the lattice has it ---- */
-typedef struct input {
-    uint64_t count;
-    int64_t (*triangle)[3][3];
-    double (*corner)[3][3];
-    surface surface; /* lattice units */
-} input;
-
-static void load_input(const built_model *model, input *in)
-{
-    in->triangle = built_leaves(model, &in->count);
-    in->corner = malloc(in->count * sizeof *in->corner);
-    assert_non_null(in->corner);
-    for (uint64_t i = 0; i < 9 * in->count; i++)
-        ((double *)in->corner)[i] = (double)((const int64_t *)in->triangle)[i];
-    surface_create(&in->surface, (uint32_t)in->count, (const double(*)[3][3])in->corner);
-}
-
-static void free_input(input *in)
-{
-    surface_destroy(&in->surface);
-    free(in->triangle);
-    free(in->corner);
-}
-
-static void random_point(const double corner[3][3], uint64_t *random, double p[3])
-{
-    double root = sqrt(mesh_below(random, 1000001) * 1e-6), along = mesh_below(random, 1000001) * 1e-6;
-    for (int k = 0; k < 3; k++)
-        p[k] = (1 - root) * corner[0][k] + root * (1 - along) * corner[1][k] + root * along * corner[2][k];
-}
 
 /* ---- states of nodes ---- */
 static bool same_place(const int64_t a[3], const int64_t b[3])
@@ -90,7 +56,7 @@ static void assert_one_collapse_apart(const built_model *model, uint32_t node, u
     }
 }
 
-static void check_state(const built_model *model, const input *in, uint32_t node, uint32_t s, int64_t (*triangle)[3][3], uint64_t *random)
+static void check_state(const built_model *model, const cut_input *in, uint32_t node, uint32_t s, int64_t (*triangle)[3][3], uint64_t *random)
 {
     const strl_pm *mesh = &model->mesh[node];
     uint32_t count = built_triangles(model, node, s, triangle);
@@ -102,7 +68,7 @@ static void check_state(const built_model *model, const input *in, uint32_t node
         uint32_t t = mesh_below(random, count);
         for (int k = 0; k < 9; k++)
             ((double *)corner)[k] = (double)((const int64_t *)triangle[t])[k];
-        random_point((const double(*)[3])corner, random, p);
+        cut_random_point((const double(*)[3])corner, random, p);
         double distance = surface_distance(&in->surface, i & 1 ? p : corner[i / 2 % 3]);
         if (distance > claim)
             fail_msg("node %u of level %u, state %u of %u: the claim is %g, a point lies %g from the input", node,
@@ -114,13 +80,13 @@ static void a_hundred_states_of_fifty_nodes_are_meshes_within_their_claims(void 
 {
     (void)state;
     built_model model;
-    input in;
+    cut_input in;
     uint64_t random = 1;
     strl_error err = {0};
     built_scene("isosurface", "states.ply", 100000 / SMALLER, true);
     built_build_one(built_path("states.ply"), built_path("states.stroll"));
     built_open(&model, built_path("states.stroll"));
-    load_input(&model, &in);
+    cut_input_load(&model, &in);
     assert_true(model.tree.node_count > 50 / SMALLER);
     uint32_t nodes = model.tree.node_count < 50 ? model.tree.node_count : 50;
     for (uint32_t i = 0; i < nodes; i++) {
@@ -142,7 +108,7 @@ static void a_hundred_states_of_fifty_nodes_are_meshes_within_their_claims(void 
         free(fine);
         free(coarse);
     }
-    free_input(&in);
+    cut_input_free(&in);
     built_close(&model);
 }
 
@@ -178,39 +144,7 @@ static void errors_and_boxes_grow_to_the_root(void **state)
     built_close(&model);
 }
 
-/* ---- cuts ---- */
-typedef struct cut_mesh {
-    int64_t (*triangle)[3][3];
-    size_t count, capacity;
-    uint32_t worst_rung, dependent; /* active nodes of groups of several */
-} cut_mesh;
-
-static void add_node(const built_model *model, uint32_t node, uint32_t s, cut_mesh *cut)
-{
-    assert_true(strl__grow(&cut->triangle, &cut->capacity, cut->count + model->mesh[node].triangle_end[s], sizeof *cut->triangle));
-    cut->count += built_triangles(model, node, s, cut->triangle + cut->count);
-    if (model->node[node].rung > cut->worst_rung)
-        cut->worst_rung = model->node[node].rung;
-    cut->dependent += model->node[node].group_size > 1;
-}
-
-static void uniform_cut(const built_model *model, double length, cut_mesh *cut)
-{
-    strl_cut walk;
-    strl_node record;
-    strl_error err = {0};
-    uint32_t id;
-    cut->count = cut->worst_rung = cut->dependent = 0;
-    strl_cut_init(&walk, model->container, 0, length);
-    for (;;) {
-        if (strl_cut_next(&walk, &id, &record, &err) != STRL_OK)
-            fail_msg("%s", err.message);
-        if (id == STRL_NONE)
-            return;
-        add_node(model, id, strl_cut_state(&walk, &model->mesh[id]), cut);
-    }
-}
-
+/* ---- random cuts ---- */
 /* Groups by id, to split at random: a group splits only after the groups of all its members' parents. */
 typedef struct groups {
     uint32_t count, *first, *member;
@@ -269,7 +203,7 @@ static void random_cut(const built_model *model, groups *list, uint64_t *random,
         const strl_node *node = &model->node[i];
         bool reached = node->parent == STRL_NONE || list->split[model->node[node->parent].group];
         if (reached && !list->split[node->group]) /* any state goes beside any other */
-            add_node(model, i, mesh_below(random, model->mesh[i].step_count + 1), cut);
+            cut_mesh_add(model, i, mesh_below(random, model->mesh[i].step_count + 1), cut);
     }
 }
 
@@ -362,10 +296,10 @@ static void a_closed_mesh_has_no_crack_in_any_cut(void **state)
         boundary_steps += model.node[i].boundary_steps;
     double coarsest = (double)model.node[0].geometric_max * model.tree.step;
     for (uint32_t i = 0; i < 8; i++) {
-        uniform_cut(&model, coarsest * pow(0.25, i), &cut);
+        cut_uniform(&model, coarsest * pow(0.25, i), &cut);
         assert_closed(&cut, "uniform", i);
     }
-    uniform_cut(&model, 0, &cut);
+    cut_uniform(&model, 0, &cut);
     assert_int_equal(cut.count, model.tree.triangle_count);
     assert_closed(&cut, "finest", 0);
     for (uint32_t i = 0; i < RANDOM_CUTS; i++) {
@@ -388,7 +322,7 @@ static int compare_stored_places(const void *a, const void *b)
 }
 
 /* Ends of open edges of the input: sorted, malloc. */
-static int64_t (*rim_of_input(const input *in, size_t *count))[3]
+static int64_t (*rim_of_input(const cut_input *in, size_t *count))[3]
 {
     size_t odd;
     edge *edges = list_odd_edges(in->count, (const int64_t(*)[3][3])in->triangle, &odd);
@@ -420,14 +354,14 @@ static void open_edges_end_at_boundary_points_of_the_input(void **state)
 {
     (void)state;
     built_model model;
-    input in;
+    cut_input in;
     groups list;
     cut_mesh cut = {0};
     uint64_t random = 5;
     uint32_t checked = 0;
     size_t rim_count;
     built_open(&model, built_path("states.stroll"));
-    load_input(&model, &in);
+    cut_input_load(&model, &in);
     list_groups(&model, &list);
     int64_t(*rim)[3] = rim_of_input(&in, &rim_count);
     assert_true(rim_count > 0);
@@ -442,47 +376,18 @@ static void open_edges_end_at_boundary_points_of_the_input(void **state)
     free(rim);
     strl__free(cut.triangle);
     free_groups(&list);
-    free_input(&in);
+    cut_input_free(&in);
     built_close(&model);
 }
 
-/* ---- both distances of uniform cuts ---- */
 static void uniform_cuts_are_within_their_length(void **state)
 {
     (void)state;
     const char *const models[2] = {"states.stroll", "closed.stroll"};
     for (int m = 0; m < 2; m++) {
         built_model model;
-        input in;
-        cut_mesh cut = {0};
-        uint64_t random = 3;
         built_open(&model, built_path(models[m]));
-        load_input(&model, &in);
-        double coarsest = (double)model.node[0].geometric_max, finest = model.tree.leaf_geometric;
-        for (int i = 0; i < 8; i++) {
-            double length = finest * pow(coarsest / finest, i / 7.), worst[2] = {0, 0};
-            uniform_cut(&model, length * model.tree.step, &cut);
-            double(*corner)[3][3] = malloc((cut.count + 1) * sizeof *corner);
-            assert_non_null(corner);
-            for (size_t k = 0; k < 9 * cut.count; k++)
-                ((double *)corner)[k] = (double)((const int64_t *)cut.triangle)[k];
-            surface now;
-            surface_create(&now, (uint32_t)cut.count, (const double(*)[3][3])corner);
-            for (uint32_t k = 0; k < 30000 / SMALLER; k++) {
-                double p[3];
-                random_point((const double(*)[3])corner[mesh_random(&random) % cut.count], &random, p);
-                worst[0] = fmax(worst[0], surface_distance(&in.surface, p));
-                random_point((const double(*)[3])in.corner[mesh_random(&random) % in.count], &random, p);
-                worst[1] = fmax(worst[1], surface_distance(&now, p));
-            }
-            if (worst[0] > length || worst[1] > length)
-                fail_msg("%s: the cut at %g (lattice units) reaches %g from the input, which reaches %g from it", models[m], length,
-                         worst[0], worst[1]);
-            surface_destroy(&now);
-            free(corner);
-        }
-        strl__free(cut.triangle);
-        free_input(&in);
+        assert_uniform_cuts_hold(&model, models[m], 8, 30000 / SMALLER);
         built_close(&model);
     }
 }
