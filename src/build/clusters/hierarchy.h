@@ -50,7 +50,7 @@ void strl_adjacency_deinit(strl_adjacency *adjacency);
 
 typedef struct strl_hierarchy {
     strl_build_context *context;
-    const strl_ingest *ingest;
+    strl_ingest *ingest; /* gives up its streams when they are used up */
     const strl_partition *partition;
     strl_level *levels;     /* [partition->depth + 1] */
     strl_adjacency next;    /* of the level above the one being made */

@@ -360,6 +360,8 @@ strl_status strl_make_leaves(strl_hierarchy *hierarchy, strl_error *err)
     stage.level->group_count = stage.level->count; /* every leaf is a group of its own */
     unsigned workers = strl_pool_workers(pool);
     strl_status status = strl_leaf_shares_create(hierarchy, &shares, err);
+    if (!status)
+        status = strl_ingest_drop(&hierarchy->ingest->shared, err);
     stage.slots = strl__alloc_zero(strl_pool_window(pool, 0), sizeof *stage.slots);
     stage.arenas = strl__alloc_zero(workers, sizeof *stage.arenas);
     if (!status && (!stage.slots || !stage.arenas))
@@ -382,5 +384,5 @@ strl_status strl_make_leaves(strl_hierarchy *hierarchy, strl_error *err)
     strl__free(stage.slots);
     strl__free(stage.arenas);
     strl_leaf_shares_deinit(&shares);
-    return status;
+    return status ? status : strl_ingest_drop(&hierarchy->ingest->soup, err);
 }

@@ -90,6 +90,13 @@ done:
     return status;
 }
 
+strl_status strl_ingest_drop(strl_spill **stream, strl_error *err)
+{
+    strl_spill *spill = *stream;
+    *stream = NULL;
+    return strl_spill_close_and_delete(spill, err);
+}
+
 static void names_deinit(strl_names *names)
 {
     for (size_t i = 0; i < names->count; i++)

@@ -65,6 +65,8 @@ typedef struct strl_ingest {
 
 strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, strl_error *err);
 void strl_ingest_deinit(strl_ingest *ingest);
+/* Deletes one of the streams when it is used up. */
+strl_status strl_ingest_drop(strl_spill **stream, strl_error *err);
 
 /* Reads `count` triangles from index `first`. scratch: count * strl_soup_bytes() bytes of the caller's. */
 strl_status strl_ingest_read(const strl_ingest *ingest, uint64_t first, uint32_t count, void *scratch,
