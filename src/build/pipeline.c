@@ -65,13 +65,17 @@ static strl_status open_scratch(const strl_build_desc *desc, char **directory, s
         snprintf(*directory, size, "%s/%s.tmp", desc->scratch, name);
     else
         snprintf(*directory, size, "%s.tmp", desc->output);
+    lock_path = strl_path_join(*directory, "lock");
+    if (!lock_path)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
+    bool was_there = strl_path_exists(*directory);
     strl_status status = desc->scratch ? strl_path_make_directory(desc->scratch, err) : STRL_OK;
     if (!status)
         status = strl_path_make_directory(*directory, err);
-    if (status)
-        return status;
-    lock_path = strl_path_join(*directory, "lock");
-    status = lock_path ? strl_lock_acquire(lock_path, lock, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
+    if (!status)
+        status = strl_lock_acquire(lock_path, lock, err);
+    if (status == STRL_ERR_MEMORY && !was_there) /* nobody else has locked it yet */
+        strl_path_remove_directory(*directory, NULL);
     strl__free(lock_path);
     return status;
 }

@@ -132,10 +132,10 @@ static strl_status take_connected(void *context, uint64_t index, unsigned slot, 
         if (!count_edge(c, out->edges[i], SHARED_WEIGHT))
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the graph of %u cells", c->ingest->cell_count);
     release(out);
-    if (!status)
+    if (!status) {
         status = strl_spill_close_and_delete(c->pairs->spill[index], err);
-    if (!status)
-        c->pairs->spill[index] = NULL;
+        c->pairs->spill[index] = NULL; /* closed in any case */
+    }
     return status ? status : strl__build_report(c->context, index + 1, c->pairs->count, err);
 }
 

@@ -310,9 +310,10 @@ static strl_status append_bucket(void *context, uint64_t index, unsigned slot, u
         status = strl_spill_append(s->pairs->spill[to], &out->pairs[i], sizeof *out->pairs, err);
     }
     release(out);
-    if (!status)
+    if (!status) {
         status = strl_spill_close_and_delete(s->buckets->spill[index], err);
-    s->buckets->spill[index] = status ? s->buckets->spill[index] : NULL;
+        s->buckets->spill[index] = NULL; /* closed in any case */
+    }
     return status ? status : strl__build_report(s->context, first, ingest->triangle_count, err);
 }
 
