@@ -25,7 +25,8 @@
 typedef struct triangle {
     uint32_t corner[3]; /* grid vertices */
     uint32_t owner;     /* node index within the level */
-    float error, deviation, shift;
+    strl_drift drift;
+    float deviation, shift;
 } triangle;
 
 typedef struct built_node {
@@ -98,7 +99,7 @@ static void make_leaves(builder *b)
                 triangle *t = &b->triangles[b->triangle_count++];
                 memcpy(t->corner, corners[k], sizeof t->corner);
                 t->owner = leaf;
-                t->error = 0.9f; /* half a cell's diagonal */
+                t->drift = (strl_drift){0};
                 t->deviation = t->shift = 0;
             }
         }
@@ -140,6 +141,7 @@ static piece take_piece(builder *b, uint32_t first, uint32_t end)
             }
     }
     assert_true(strl_mesh_create(&p.mesh, points, points, triangles, &b->arena));
+    p.mesh.start_error = 0.9f; /* half a cell's diagonal */
     for (uint32_t v = 0; v < points; v++) {
         int64_t position[3];
         position_of(p.vertex[v], position);
@@ -152,7 +154,7 @@ static piece take_piece(builder *b, uint32_t first, uint32_t end)
         const triangle *t = &b->triangles[p.source[i]];
         for (unsigned k = 0; k < 3; k++)
             p.mesh.triangle[i][k] = b->local[t->corner[k]];
-        p.mesh.error[i] = t->error, p.mesh.deviation[i] = t->deviation, p.mesh.shift[i] = t->shift;
+        p.mesh.drift[i] = t->drift, p.mesh.deviation[i] = t->deviation, p.mesh.shift[i] = t->shift;
     }
     return p;
 }
@@ -179,7 +181,7 @@ static void put_back(builder *b, const piece *p, const strl_simplified *done)
         }
         for (unsigned k = 0; k < 3; k++)
             t->corner[k] = p->vertex[p->mesh.wedge[done->corner[i][k]].point];
-        t->error = done->error[i], t->deviation = done->deviation[i], t->shift = done->shift[i];
+        t->drift = done->drift[i], t->deviation = done->deviation[i], t->shift = done->shift[i];
     }
 }
 
