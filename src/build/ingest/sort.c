@@ -297,7 +297,10 @@ static strl_status append_bucket(void *context, uint64_t index, unsigned slot, u
     uint64_t first = strl_spill_bytes(ingest->soup) / bytes;
     uint32_t base = ingest->cell_count;
     (void)worker;
-    strl_status status = strl_spill_append(ingest->soup, out->records, out->count * bytes, err);
+    strl_status status = strl_spill_close_and_delete(s->buckets->spill[index], err); /* its disk is needed for the soup */
+    s->buckets->spill[index] = NULL; /* closed in any case */
+    if (!status)
+        status = strl_spill_append(ingest->soup, out->records, out->count * bytes, err);
     if (!status && !strl__grow(&ingest->cells, &s->cell_capacity, base + out->cell_count, sizeof *ingest->cells))
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu cells", base + out->cell_count);
     for (size_t i = 0; i < out->cell_count && !status; i++) {
@@ -310,10 +313,6 @@ static strl_status append_bucket(void *context, uint64_t index, unsigned slot, u
         status = strl_spill_append(s->pairs->spill[to], &out->pairs[i], sizeof *out->pairs, err);
     }
     release(out);
-    if (!status) {
-        status = strl_spill_close_and_delete(s->buckets->spill[index], err);
-        s->buckets->spill[index] = NULL; /* closed in any case */
-    }
     return status ? status : strl__build_report(s->context, first, ingest->triangle_count, err);
 }
 
