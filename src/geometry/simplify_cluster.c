@@ -72,6 +72,15 @@ static bool prepare(clustering *c, simplifier *s, strl_arena *arena)
     return true;
 }
 
+/* A point whose triangles have all vanished is no place to go to: it has no wedge left. */
+static bool is_on_surface(const simplifier *s, uint32_t point)
+{
+    for (uint32_t corner = s->head[point]; corner != NO_INDEX; corner = s->corner_next[corner])
+        if (!s->dead[corner / 3])
+            return true;
+    return false;
+}
+
 /* Kept points first: they cannot move, so they represent their cells. */
 static void choose_representatives(clustering *c, double size)
 {
@@ -79,7 +88,7 @@ static void choose_representatives(clustering *c, double size)
         c->slots[i].point = NO_INDEX;
     for (int kept = 1; kept >= 0; kept--)
         for (uint32_t p = 0; p < c->s->mesh->point_count; p++) {
-            if (((c->s->mesh->flags[p] & STRL_POINT_KEPT) != 0) != (kept != 0) || c->s->head[p] == NO_INDEX)
+            if (((c->s->mesh->flags[p] & STRL_POINT_KEPT) != 0) != (kept != 0) || !is_on_surface(c->s, p))
                 continue;
             cell_slot *slot = find_cell(c, c->s->position[p], size);
             if (slot->point == NO_INDEX)
@@ -95,8 +104,8 @@ static void merge_cells(clustering *c, double size, float limit, bool disjoint_o
         strl_star star;
         collapse_plan plan;
         uint32_t to = find_cell(c, s->position[p], size)->point;
-        if ((s->mesh->flags[p] & STRL_POINT_KEPT) || to == p || to == NO_INDEX || s->head[p] == NO_INDEX ||
-            s->head[to] == NO_INDEX)
+        if ((s->mesh->flags[p] & STRL_POINT_KEPT) || to == p || to == NO_INDEX || !is_on_surface(s, p) ||
+            !is_on_surface(s, to))
             continue;
         bool same = find_root(c->component, p) == find_root(c->component, to);
         if ((same && disjoint_only) || !strl__star_gather(s, p, &star) || star.count == 0)
