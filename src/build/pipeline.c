@@ -80,6 +80,18 @@ static strl_status open_scratch(const strl_build_desc *desc, char **directory, s
     return status;
 }
 
+/* What a worker holds at most, measured on soups and scans: a group's meshes, merged, and what simplifies them. */
+#define WORKER_BYTES (24ull << 20)
+#define SHARED_BYTES (32ull << 20)
+
+/* As many threads as were asked for, but no more than the memory feeds. The output does not depend on their number. */
+static unsigned count_workers(const strl_build_desc *desc, uint64_t memory_bytes)
+{
+    unsigned wanted = desc->jobs ? desc->jobs : strl_cpu_count();
+    uint64_t fed = (memory_bytes - SHARED_BYTES) / WORKER_BYTES;
+    return wanted < fed ? wanted : (unsigned)fed;
+}
+
 strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err)
 {
     char *directory = NULL;
@@ -91,7 +103,7 @@ strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *
     strl_status status = check_request(desc, err);
     if (status)
         return status;
-    unsigned jobs = desc->jobs ? desc->jobs : strl_cpu_count();
+    unsigned jobs = count_workers(desc, context.memory_bytes);
     status = open_scratch(desc, &directory, &lock, err);
     if (!status)
         status = strl_pool_create(jobs - 1, &context.pool, err);

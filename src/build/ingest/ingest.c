@@ -1,8 +1,11 @@
 #include "build/ingest/ingest.h"
 
+#include <inttypes.h>
+
 #include "base/fail.h"
 #include "base/memory.h"
 #include "build/ingest/internal.h"
+#include "platform/file.h"
 
 #define LEAST_READER_BYTES (8u << 20)
 
@@ -43,6 +46,20 @@ static void note_drops(strl_build_context *context, strl_reader *const *readers)
     }
 }
 
+/* Scratch of a build, most of it spilled triangles and base meshes. */
+#define SCRATCH_BYTES_OF_TRIANGLE 80u
+
+/* Before anything is written: a build that cannot end should not begin. */
+static strl_status check_disk(const strl_build_context *context, uint64_t triangles, strl_error *err)
+{
+    uint64_t free_bytes, needed = triangles * SCRATCH_BYTES_OF_TRIANGLE;
+    strl_status status = strl_path_free_bytes(context->scratch_dir, &free_bytes, err);
+    if (!status && free_bytes < needed)
+        status = strl__fail(err, STRL_ERR_DISK_FULL, "%s has %" PRIu64 " bytes free, expected %" PRIu64 " for the scratch of %" PRIu64
+                            " triangles: name another folder by --scratch", context->scratch_dir, free_bytes, needed, triangles);
+    return status;
+}
+
 strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, strl_error *err)
 {
     model_survey survey = {0};
@@ -61,6 +78,9 @@ strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, st
     context->result->triangles_in = survey.triangles;
     note_drops(context, readers);
     context->progress.triangles_in = survey.triangles;
+    status = check_disk(context, survey.triangles, err);
+    if (status)
+        goto done;
     ingest->has_normals = survey.any_normal;
     ingest->has_colours = survey.any_colour;
     status = strl__survey_choose_lattice(context, &survey, ingest, err);
