@@ -87,6 +87,15 @@ static void make_flat(strl_mesh *mesh, uint64_t seed, strl_arena *arena)
     make_field(mesh, 20, 64, 0, 30, 0, seed, arena);
 }
 
+void mesh_make_disc(strl_mesh *mesh, uint64_t seed, strl_arena *arena)
+{
+    make_field(mesh, 60, 20, 0, 8, 0, seed, arena);
+    for (uint32_t p = 0; p < mesh->point_count; p++) {
+        const int32_t *at = mesh->position[p];
+        mesh->wedge[p].colour = at[0] * at[0] + at[1] * at[1] < 400 * 400 ? 0xffffffffu : 0xff000000u;
+    }
+}
+
 /* Rings round an axis between two poles; each point a little off. */
 static void make_ball(strl_mesh *mesh, int32_t radius, uint32_t rough, uint64_t seed, strl_arena *arena)
 {

@@ -551,6 +551,54 @@ static void check_recorded(run *r)
     free(points);
 }
 
+/* ---- appearance ---- */
+/* How far into the wrong side of the disc's edge a state has taken white or black, beyond what the start's own triangles blur. */
+static double edge_moved(const run *r, uint32_t state)
+{
+    const double blur = 30; /* no triangle of the start is longer than this */
+    double moved = 0;
+    uint64_t random = 2;
+    for (uint32_t t = 0; t < r->mesh.triangle_count; t++) {
+        if (r->result.removed_at[t] < state)
+            continue;
+        double p[3][2], shade[3];
+        for (int c = 0; c < 3; c++) {
+            const strl_wedge *wedge = &r->mesh.wedge[resolve(r, r->mesh.triangle[t][c], state)];
+            p[c][0] = r->mesh.position[wedge->point][0], p[c][1] = r->mesh.position[wedge->point][1];
+            shade[c] = wedge->colour == 0xffffffffu;
+        }
+        for (int i = 0; i < 12; i++) {
+            double a = mesh_below(&random, 1001) * 1e-3, b = (1 - a) * mesh_below(&random, 1001) * 1e-3, c = 1 - a - b;
+            double radius = hypot(a * p[0][0] + b * p[1][0] + c * p[2][0], a * p[0][1] + b * p[1][1] + c * p[2][1]);
+            bool white = a * shade[0] + b * shade[1] + c * shade[2] > 0.5;
+            moved = fmax(moved, (white ? radius - 400 : 400 - radius) - blur);
+        }
+    }
+    return moved;
+}
+
+static void the_edge_of_a_disc_moves_no_farther_than_claimed(void **state)
+{
+    (void)state;
+    const mesh_kind disc = {.name = "disc", .make = mesh_make_disc, .manifold = true};
+    for (int rung = STRL_SIMPLIFY_TOPOLOGY; rung <= STRL_SIMPLIFY_CLUSTERING; rung++) {
+        run r;
+        begin(&r, &disc, 3, (strl_simplify_rung)rung);
+        r.desc.target_triangles = 40;
+        simplify(&r);
+        assert_true(r.result.triangles_left < r.mesh.triangle_count / 8);
+        for (uint32_t i = 1; i <= STATES; i++) {
+            uint32_t s = r.result.collapse_count * i / STATES;
+            const strl_collapse *last = &r.result.collapses[s - 1];
+            double claim = fmax((double)last->appearance, (double)last->geometric), moved = edge_moved(&r, s);
+            if (moved > claim)
+                fail_msg("rung %d, after %u of %u collapses (%u triangles): the edge moved by %g, the appearance error is %g", rung, s,
+                         r.result.collapse_count, last->triangles_left, moved, claim);
+        }
+        end(&r);
+    }
+}
+
 /* ---- targets ---- */
 static void a_flat_square_needs_few_triangles(void **state)
 {
@@ -736,6 +784,7 @@ int main(void)
         cmocka_unit_test(the_limits_that_are_asked_for_hold),
         cmocka_unit_test(closed_meshes_stay_closed_and_open_edges_end_at_the_rim),
         cmocka_unit_test(the_first_rung_keeps_the_topology),
+        cmocka_unit_test(the_edge_of_a_disc_moves_no_farther_than_claimed),
         cmocka_unit_test(a_flat_square_needs_few_triangles),
         cmocka_unit_test(a_thousand_boxes_meet_their_target),
         cmocka_unit_test(few_boxes_meet_small_targets),
