@@ -3,6 +3,8 @@
 
 #include <math.h>
 
+#define RIM_WEIGHT 2.f
+
 /* The second target in quadric order is planned too where its quadric is not so many times worse. */
 #define SECOND_CHOICE 3
 
@@ -204,6 +206,8 @@ void strl__plan_collapse(simplifier *s, const strl_star *star, uint32_t to, coll
     plan->geometric = nextafterf(drift.longest + s->mesh->start_error, INFINITY);
     plan->deviation = sqrtf(deviation * deviation + change * change);
     plan->shift = strl__larger(shift, (float)sqrt(longest) * fminf(1, plan->deviation));
+    if (star->on_boundary) /* two rims that meet in the image can both draw back: each may have half */
+        plan->shift = strl__larger(plan->shift, RIM_WEIGHT * drift.longest);
     plan->key = strl__larger(plan->geometric, plan->shift);
 }
 
