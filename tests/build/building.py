@@ -1,4 +1,5 @@
-"""What the builder's scripts share: running stroll as a child whose memory the system counts, and data that may be absent."""
+"""What the builder's scripts share: running stroll as a child whose memory the system counts, and data that may be
+absent."""
 import glob
 import json
 import os
@@ -33,7 +34,8 @@ class Done:
         self.peak_bytes, self.seconds = peak_bytes, seconds
 
     def __repr__(self):
-        return f"{' '.join(self.words)}\n  exit {self.code} after {self.seconds:.1f} s, {self.peak_bytes / MIB:.0f} MiB\n  {self.error}"
+        return (f"{' '.join(self.words)}\n  exit {self.code} after {self.seconds:.1f} s, "
+                f"{self.peak_bytes / MIB:.0f} MiB\n  {self.error}")
 
 
 def run(*words, timeout=300, prefix=()):

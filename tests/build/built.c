@@ -51,8 +51,10 @@ void mesh_file_write_ply(const mesh_file *mesh, const char *path)
 {
     FILE *file = fopen(path, "wb");
     assert_non_null(file);
-    fprintf(file, "ply\nformat binary_little_endian 1.0\nelement vertex %u\nproperty double x\nproperty double y\n"
-                  "property double z\n", mesh->vertex_count);
+    fprintf(file,
+            "ply\nformat binary_little_endian 1.0\nelement vertex %u\nproperty double x\nproperty double y\n"
+            "property double z\n",
+            mesh->vertex_count);
     if (mesh->normal)
         fprintf(file, "property float nx\nproperty float ny\nproperty float nz\n");
     if (mesh->colour)
@@ -208,7 +210,8 @@ uint8_t *built_read_file(const char *path, size_t *size)
 void built_scene(const char *scene, const char *name, uint64_t triangles, bool normals)
 {
     strl_error err = {0};
-    strl_scene_desc desc = {.name = scene, .path = built_path(name), .triangles = triangles, .seed = 1, .no_normals = !normals};
+    strl_scene_desc desc = {
+        .name = scene, .path = built_path(name), .triangles = triangles, .seed = 1, .no_normals = !normals};
     if (strl_scene_write(&desc, NULL, NULL, &err) != STRL_OK)
         fail_msg("%s", err.message);
 }
@@ -216,7 +219,8 @@ void built_scene(const char *scene, const char *name, uint64_t triangles, bool n
 /* ---- building and looking ---- */
 strl_build_result built_build(const char *const *inputs, uint32_t count, const char *output, unsigned jobs)
 {
-    strl_build_desc desc = {.inputs = inputs, .input_count = count, .output = output, .memory_bytes = 256u << 20, .jobs = jobs ? jobs : 2};
+    strl_build_desc desc = {
+        .inputs = inputs, .input_count = count, .output = output, .memory_bytes = 256u << 20, .jobs = jobs ? jobs : 2};
     strl_build_result result;
     strl_error err = {0};
     if (strl_build_clusters(&desc, &result, &err) != STRL_OK)

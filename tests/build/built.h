@@ -11,8 +11,8 @@
 /* A mesh to be written as a file. Zero-initialise; arrays grow by mesh_file_add_... */
 typedef struct mesh_file {
     double (*position)[3];
-    float (*normal)[3];    /* NULL = without */
-    uint8_t (*colour)[3];  /* NULL = without */
+    float (*normal)[3];   /* NULL = without */
+    uint8_t (*colour)[3]; /* NULL = without */
     uint32_t (*face)[3];
     uint32_t vertex_count, face_count;
     size_t vertex_capacity, face_capacity;

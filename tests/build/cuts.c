@@ -42,7 +42,8 @@ void cut_random_point(const double corner[3][3], uint64_t *random, double p[3])
 
 void cut_mesh_add(const built_model *model, uint32_t node, uint32_t s, cut_mesh *cut)
 {
-    assert_true(strl__grow(&cut->triangle, &cut->capacity, cut->count + model->mesh[node].triangle_end[s], sizeof *cut->triangle));
+    assert_true(strl__grow(&cut->triangle, &cut->capacity, cut->count + model->mesh[node].triangle_end[s],
+                           sizeof *cut->triangle));
     cut->count += built_triangles(model, node, s, cut->triangle + cut->count);
     if (model->node[node].rung > cut->worst_rung)
         cut->worst_rung = model->node[node].rung;
@@ -67,7 +68,8 @@ void cut_uniform(const built_model *model, double length, cut_mesh *cut)
 }
 
 /* The largest distance of random points of the triangles from the surface. */
-static double sampled_reach(const surface *from, size_t count, const double (*corner)[3][3], uint32_t samples, uint64_t *random)
+static double sampled_reach(const surface *from, size_t count, const double (*corner)[3][3], uint32_t samples,
+                            uint64_t *random)
 {
     double worst = 0, p[3];
     for (uint32_t i = 0; i < samples; i++) {
@@ -94,7 +96,8 @@ void assert_uniform_cuts_hold(const built_model *model, const char *name, unsign
         double away = sampled_reach(&in.surface, cut.count, (const double(*)[3][3])corner, samples, &random);
         double lost = sampled_reach(&now, in.count, (const double(*)[3][3])in.corner, samples, &random);
         if (away > length || lost > length)
-            fail_msg("%s: the cut at %g (lattice units) reaches %g from the input, which reaches %g from it", name, length, away, lost);
+            fail_msg("%s: the cut at %g (lattice units) reaches %g from the input, which reaches %g from it", name,
+                     length, away, lost);
         surface_destroy(&now);
         free(corner);
     }

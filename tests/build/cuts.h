@@ -31,7 +31,8 @@ void cut_uniform(const built_model *model, double length, cut_mesh *cut);
 /* Uniformly distributed over the triangle. */
 void cut_random_point(const double corner[3][3], uint64_t *random, double p[3]);
 
-/* `cuts` of them, from the finest claim to the coarsest; `samples` points each way. Fails the test where one lies farther away. */
+/* `cuts` of them, from the finest claim to the coarsest; `samples` points each way. Fails the
+ * test where one lies farther away. */
 void assert_uniform_cuts_hold(const built_model *model, const char *name, unsigned cuts, uint32_t samples);
 
 #endif

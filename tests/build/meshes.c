@@ -104,7 +104,8 @@ static void make_ball(strl_mesh *mesh, int32_t radius, uint32_t rough, uint64_t 
     uint32_t face = 0, south = RINGS * SECTORS, north = south + 1;
     allocate(mesh, RINGS * SECTORS + 2, 2 * RINGS * SECTORS, arena);
     for (uint32_t p = 0; p < south; p++) {
-        double polar = 3.14159265358979 * (p / SECTORS + 1) / (RINGS + 1), round = 6.28318530717959 * (p % SECTORS) / SECTORS;
+        double polar = 3.14159265358979 * (p / SECTORS + 1) / (RINGS + 1),
+               round = 6.28318530717959 * (p % SECTORS) / SECTORS;
         double r = radius + (double)mesh_below(&random, rough + 1);
         mesh->position[p][0] = (int32_t)lrint(r * sin(polar) * cos(round));
         mesh->position[p][1] = (int32_t)lrint(r * sin(polar) * sin(round));
@@ -143,7 +144,8 @@ static void make_fins(strl_mesh *mesh, uint64_t seed, strl_arena *arena)
     uint32_t face = 0;
     allocate(mesh, SPINE + SHEETS * SIDE * SPINE, 2 * SHEETS * SIDE * SIDE, arena);
     for (uint32_t p = 0; p < mesh->point_count; p++) {
-        uint32_t sheet = p < SPINE ? 0 : (p - SPINE) / (SIDE * SPINE), in = p < SPINE ? p : (p - SPINE) % (SIDE * SPINE);
+        uint32_t sheet = p < SPINE ? 0 : (p - SPINE) / (SIDE * SPINE),
+                 in = p < SPINE ? p : (p - SPINE) % (SIDE * SPINE);
         double out = p < SPINE ? 0 : 100. * (in / SPINE + 1), turn = 2.1 * sheet;
         mesh->position[p][0] = (int32_t)(out * cos(turn)) + (int32_t)mesh_below(&random, 20);
         mesh->position[p][1] = (int32_t)(out * sin(turn)) + (int32_t)mesh_below(&random, 20);
@@ -170,7 +172,8 @@ static void make_soup(strl_mesh *mesh, uint64_t seed, strl_arena *arena)
             mesh->position[p][k] = (int32_t)mesh_below(&random, 600) + (k == 0 ? base : 0);
     }
     for (uint32_t t = 0; t < TRIANGLES; t++) {
-        uint32_t a = mesh_below(&random, POINTS - 12), b = a + 1 + mesh_below(&random, 5), c = a + 6 + mesh_below(&random, 5);
+        uint32_t a = mesh_below(&random, POINTS - 12), b = a + 1 + mesh_below(&random, 5),
+                 c = a + 6 + mesh_below(&random, 5);
         set_triangle(mesh, t, a, t & 1 ? b : c, t & 1 ? c : b);
     }
 }
@@ -231,7 +234,7 @@ void mesh_add_seam(strl_mesh *mesh, bool other_palette, uint64_t seed, strl_aren
 }
 
 const mesh_kind mesh_kinds[] = {
-    {"hills", mesh_make_hills, false, true}, {"noise", make_noise, false, true},   {"flat", make_flat, false, true},
-    {"sphere", mesh_make_sphere, true, true}, {"potato", make_potato, true, true}, {"fins", make_fins, false, false},
+    {"hills", mesh_make_hills, false, true},  {"noise", make_noise, false, true},     {"flat", make_flat, false, true},
+    {"sphere", mesh_make_sphere, true, true}, {"potato", make_potato, true, true},    {"fins", make_fins, false, false},
     {"soup", make_soup, false, false},        {"boxes", make_some_boxes, true, true}, {NULL, NULL, false, false},
 };

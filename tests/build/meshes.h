@@ -19,7 +19,8 @@ void mesh_make_sphere(strl_mesh *mesh, uint64_t seed, strl_arena *arena);
 void mesh_make_boxes(strl_mesh *mesh, uint32_t boxes, uint64_t seed, strl_arena *arena);
 /* A flat square of some thousand triangles, black, with a white disc of radius 400 about its middle. */
 void mesh_make_disc(strl_mesh *mesh, uint64_t seed, strl_arena *arena);
-/* A wedge more for the points at x = 0, with another palette for triangles beyond it, and colours that differ at random. */
+/* A wedge more for the points at x = 0, with another palette for triangles beyond it, and colours that differ at
+ * random. */
 void mesh_add_seam(strl_mesh *mesh, bool other_palette, uint64_t seed, strl_arena *arena);
 /* As if the mesh were so far from some input, everywhere. */
 void mesh_begin_with_error(strl_mesh *mesh, float error);

@@ -23,7 +23,9 @@ void surface_destroy(surface *tree);
 double surface_distance(const surface *tree, const double p[3]);
 /* The same by looking at every triangle. */
 double surface_distance_slow(uint32_t count, const double (*corner)[3][3], const double p[3]);
-/* The largest distance of the corners, the middles of edges and `samples` seeded points of each triangle to the surface. */
-double surface_reach(const surface *tree, uint32_t count, const double (*corner)[3][3], unsigned samples, uint64_t seed);
+/* The largest distance of the corners, the middles of edges and `samples` seeded points of each triangle to
+ * the surface. */
+double surface_reach(const surface *tree, uint32_t count, const double (*corner)[3][3], unsigned samples,
+                     uint64_t seed);
 
 #endif

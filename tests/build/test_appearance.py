@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""A plane with a detailed picture keeps 30 dB at one pixel of error; the same plane in one colour needs next to no triangles."""
+"""A plane with a detailed picture keeps 30 dB at one pixel of error; the same plane in one colour needs next to no
+triangles."""
 import json
 import os
 
@@ -46,7 +47,8 @@ def a_painted_plane_keeps_its_picture(folder):
     source, model, _ = make(folder, "painted-plane")
     path, frames = cameras(folder)
     reference = os.path.join(folder, "reference")
-    must("render", source, "--full", "--path", path, "--size", SIZE, "--supersample", "4", "--depth", "-o", reference, "--quiet")
+    must("render", source, "--full", "--path", path, "--size", SIZE, "--supersample", "4", "--depth", "-o",
+         reference, "--quiet")
     counts = triangles_drawn(folder, model, path, frames, "--supersample", "4", "--depth")
     done = run("compare", reference, os.path.join(folder, "drawn"), "--error", "1", "--psnr", "30", "--json")
     print(done.output.strip()[:600], counts, flush=True)

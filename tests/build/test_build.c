@@ -1,4 +1,5 @@
-/* What goes into a build comes out of its leaves: triangles, parts, normals, wedges; and nothing depends on the threads. */
+/* What goes into a build comes out of its leaves: triangles, parts, normals, wedges; and nothing
+ * depends on the threads. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -111,7 +112,9 @@ static void what_is_dropped_is_counted_by_kind(void **state)
     mesh_file_add_face(&mesh, bad[0], bad[1], bad[2]);
     for (uint32_t i = 0; i < 5; i++)
         mesh_file_add_face(&mesh, i, i, i + 1); /* degenerate as given */
-    mesh_file_add_face(&mesh, 7, mesh_file_add_vertex(&mesh, mesh.position[7][0], mesh.position[7][1] + 1e-13, mesh.position[7][2]), 9);
+    mesh_file_add_face(
+        &mesh, 7, mesh_file_add_vertex(&mesh, mesh.position[7][0], mesh.position[7][1] + 1e-13, mesh.position[7][2]),
+        9);
     mesh_file_write_ply(&mesh, built_path("drops.ply"));
     strl_build_result result = built_build_one(built_path("drops.ply"), built_path("drops.stroll"));
     assert_int_equal(result.triangles_in, mesh.face_count);
@@ -126,7 +129,8 @@ static void what_is_dropped_is_counted_by_kind(void **state)
     assert_int_equal(model.info.dropped_degenerate, 6);
     built_close(&model);
     mesh_file_free(&mesh);
-    built_write_text("lines.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\nl 1 2 3\nl 2 4\np 1\np 2 3\nf 1 2 3\nf 1 2\nf 2 4 3\n");
+    built_write_text("lines.obj",
+                     "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 1\nl 1 2 3\nl 2 4\np 1\np 2 3\nf 1 2 3\nf 1 2\nf 2 4 3\n");
     result = built_build_one(built_path("lines.obj"), built_path("lines.stroll"));
     assert_int_equal(result.triangles_leaf, 2);
     assert_true(result.dropped_lines >= 2 && result.dropped_points >= 2);
@@ -182,8 +186,10 @@ static void assert_parts_lie_where_they_were(const built_model *model, char name
 static void with_several_inputs_each_file_is_a_group(void **state)
 {
     (void)state;
-    built_write_text("one.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 10 0 0\nv 11 0 0\nv 10 1 0\no a\nf 1 2 3\no b\nf 4 5 6\n");
-    built_write_text("two.obj", "v 20 0 0\nv 21 0 0\nv 20 1 0\nv 30 0 0\nv 31 0 0\nv 30 1 0\ng c\nf 1 2 3\ng d\nf 4 5 6\n");
+    built_write_text("one.obj",
+                     "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 10 0 0\nv 11 0 0\nv 10 1 0\no a\nf 1 2 3\no b\nf 4 5 6\n");
+    built_write_text("two.obj",
+                     "v 20 0 0\nv 21 0 0\nv 20 1 0\nv 30 0 0\nv 31 0 0\nv 30 1 0\ng c\nf 1 2 3\ng d\nf 4 5 6\n");
     const char *inputs[2] = {built_path("one.obj"), built_path("two.obj")};
     strl_build_result result = built_build(inputs, 2, built_path("groups.stroll"), 0);
     assert_int_equal(result.inputs, 2);
@@ -298,7 +304,8 @@ static void missing_normals_are_computed_with_a_crease(void **state)
             leaves++;
         }
     assert_true(leaves > 1);
-    assert_true(vertices >= mesh.vertex_count && vertices < mesh.vertex_count * 11 / 10); /* no seams but those of leaves */
+    assert_true(vertices >= mesh.vertex_count &&
+                vertices < mesh.vertex_count * 11 / 10); /* no seams but those of leaves */
     built_close(&model);
     mesh_file_free(&mesh);
 }
@@ -337,7 +344,8 @@ static void normals_and_colours_that_are_given_stay(void **state)
     assert_non_null(mesh.normal);
     assert_non_null(mesh.colour);
     for (uint32_t v = 0; v < mesh.vertex_count; v++) {
-        float x = (float)mesh.position[v][0], y = (float)mesh.position[v][1]; /* nothing to do with the plane; not of unit length */
+        float x = (float)mesh.position[v][0],
+              y = (float)mesh.position[v][1]; /* nothing to do with the plane; not of unit length */
         mesh.normal[v][0] = 3, mesh.normal[v][1] = x - 0.5f, mesh.normal[v][2] = y;
         mesh.colour[v][0] = (uint8_t)(255 * x), mesh.colour[v][1] = (uint8_t)(255 * y), mesh.colour[v][2] = 77;
     }

@@ -29,11 +29,13 @@ static bool same_place(const int64_t a[3], const int64_t b[3])
 
 static bool is_degenerate(int64_t (*triangle)[3])
 {
-    return same_place(triangle[0], triangle[1]) || same_place(triangle[1], triangle[2]) || same_place(triangle[2], triangle[0]);
+    return same_place(triangle[0], triangle[1]) || same_place(triangle[1], triangle[2]) ||
+           same_place(triangle[2], triangle[0]);
 }
 
 /* State s - 1 is state s with one point moved onto another: what has the point becomes its neighbour or a line. */
-static void assert_one_collapse_apart(const built_model *model, uint32_t node, uint32_t s, int64_t (*fine)[3][3], int64_t (*coarse)[3][3])
+static void assert_one_collapse_apart(const built_model *model, uint32_t node, uint32_t s, int64_t (*fine)[3][3],
+                                      int64_t (*coarse)[3][3])
 {
     const strl_pm *mesh = &model->mesh[node];
     uint32_t first = mesh->vertex_end[s - 1], moved = 0;
@@ -43,7 +45,8 @@ static void assert_one_collapse_apart(const built_model *model, uint32_t node, u
     for (uint32_t v = 0; v < first; v++)
         moved += !memcmp(mesh->position[v], mesh->position[first], sizeof *mesh->position);
     assert_int_equal(moved, 0); /* the point is new with this state */
-    uint32_t fine_count = built_triangles(model, node, s, fine), coarse_count = built_triangles(model, node, s - 1, coarse);
+    uint32_t fine_count = built_triangles(model, node, s, fine),
+             coarse_count = built_triangles(model, node, s - 1, coarse);
     assert_true(coarse_count <= fine_count);
     for (uint32_t t = 0; t < fine_count; t++) {
         for (int c = 0; c < 3; c++)
@@ -56,7 +59,8 @@ static void assert_one_collapse_apart(const built_model *model, uint32_t node, u
     }
 }
 
-static void check_state(const built_model *model, const cut_input *in, uint32_t node, uint32_t s, int64_t (*triangle)[3][3], uint64_t *random)
+static void check_state(const built_model *model, const cut_input *in, uint32_t node, uint32_t s,
+                        int64_t (*triangle)[3][3], uint64_t *random)
 {
     const strl_pm *mesh = &model->mesh[node];
     uint32_t count = built_triangles(model, node, s, triangle);
@@ -95,7 +99,8 @@ static void a_hundred_states_of_fifty_nodes_are_meshes_within_their_claims(void 
         if (strl_pm_check(mesh, &err) != STRL_OK)
             fail_msg("node %u: %s", node, err.message);
         assert_true(mesh->step_count >= 100);
-        int64_t(*fine)[3][3] = malloc(mesh->triangle_count * sizeof *fine), (*coarse)[3][3] = malloc(mesh->triangle_count * sizeof *coarse);
+        int64_t(*fine)[3][3] = malloc(mesh->triangle_count * sizeof *fine),
+        (*coarse)[3][3] = malloc(mesh->triangle_count * sizeof *coarse);
         assert_non_null(fine);
         assert_non_null(coarse);
         for (uint32_t j = 0; j < 100; j++) {
@@ -135,10 +140,12 @@ static void errors_and_boxes_grow_to_the_root(void **state)
             continue;
         const strl_node *parent = &model.node[node->parent];
         assert_true(parent->geometric_min >= node->geometric_max && parent->appearance_min >= node->appearance_max);
-        assert_true(parent->group_geometric >= node->group_geometric && parent->group_appearance >= node->group_appearance);
+        assert_true(parent->group_geometric >= node->group_geometric &&
+                    parent->group_appearance >= node->group_appearance);
         for (int k = 0; k < 3; k++) {
             assert_true(parent->box_min[k] <= node->box_min[k] && parent->box_max[k] >= node->box_max[k]);
-            assert_true(parent->group_box_min[k] <= node->group_box_min[k] && parent->group_box_max[k] >= node->group_box_max[k]);
+            assert_true(parent->group_box_min[k] <= node->group_box_min[k] &&
+                        parent->group_box_max[k] >= node->group_box_max[k]);
         }
     }
     built_close(&model);
@@ -168,7 +175,8 @@ static void list_groups(const built_model *model, groups *list)
     for (uint32_t i = 0; i < nodes; i++)
         list->member[list->first[model->node[i].group + 1]++] = i;
     for (uint32_t i = 0; i < nodes; i++)
-        assert_int_equal(model->node[i].group_size, list->first[model->node[i].group + 1] - list->first[model->node[i].group]);
+        assert_int_equal(model->node[i].group_size,
+                         list->first[model->node[i].group + 1] - list->first[model->node[i].group]);
 }
 
 static void free_groups(groups *list)
@@ -345,8 +353,8 @@ static void assert_open_at_the_rim_only(const cut_mesh *cut, const int64_t (*rim
     for (size_t i = 0; i < odd; i++)
         if (!bsearch(edges[i].low, rim, rim_count, sizeof *rim, compare_stored_places) ||
             !bsearch(edges[i].high, rim, rim_count, sizeof *rim, compare_stored_places))
-            fail_msg("cut %u has %zu open edges, one of which ends at %lld %lld %lld, where the input is closed", number, odd,
-                     (long long)edges[i].low[0], (long long)edges[i].low[1], (long long)edges[i].low[2]);
+            fail_msg("cut %u has %zu open edges, one of which ends at %lld %lld %lld, where the input is closed",
+                     number, odd, (long long)edges[i].low[0], (long long)edges[i].low[1], (long long)edges[i].low[2]);
     free(edges);
 }
 

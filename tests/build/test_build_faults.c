@@ -1,4 +1,5 @@
-/* A build that cannot go on fails with one sentence and leaves its folder as it was: whatever allocation, read or write it is. */
+/* A build that cannot go on fails with one sentence and leaves its folder as it was: whatever allocation,
+ * read or write it is. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -23,8 +24,11 @@ static const char OLDER[] = "an older container";
 static strl_status build(const char *input, unsigned jobs, strl_error *err)
 {
     const char *inputs[1] = {input};
-    strl_build_desc desc = {.inputs = inputs, .input_count = 1, .output = built_path("out.stroll"),
-                            .memory_bytes = STRL_BUILD_LEAST_MEMORY, .jobs = jobs};
+    strl_build_desc desc = {.inputs = inputs,
+                            .input_count = 1,
+                            .output = built_path("out.stroll"),
+                            .memory_bytes = STRL_BUILD_LEAST_MEMORY,
+                            .jobs = jobs};
     strl_build_result result;
     *err = (strl_error){0};
     return strl_build_clusters(&desc, &result, err);
@@ -59,7 +63,8 @@ static void make_input(void)
 }
 
 /* fail_after(n) for growing n until the build gets through. other: a status that is as good as `expected`. */
-static void fail_each(void (*fail_after)(uint64_t n), unsigned jobs, strl_status expected, strl_status other, uint64_t least_failures)
+static void fail_each(void (*fail_after)(uint64_t n), unsigned jobs, strl_status expected, strl_status other,
+                      uint64_t least_failures)
 {
     uint64_t failures = 0;
     make_input();
@@ -142,9 +147,11 @@ static void what_cannot_be_built_is_refused(void **state)
         strl_error err = {0};
         strl_build_result result;
         const char *input = built_path(refusals[i].input);
-        strl_build_desc desc = {.inputs = &input, .input_count = 1, .output = built_path(refusals[i].output), .jobs = 1};
+        strl_build_desc desc = {
+            .inputs = &input, .input_count = 1, .output = built_path(refusals[i].output), .jobs = 1};
         strl_status status = strl_build_clusters(&desc, &result, &err);
-        if (status == STRL_OK || (refusals[i].status && status != refusals[i].status) || !strstr(err.message, refusals[i].word))
+        if (status == STRL_OK || (refusals[i].status && status != refusals[i].status) ||
+            !strstr(err.message, refusals[i].word))
             fail_msg("%s -> %s: %s (%s)", refusals[i].input, refusals[i].output, err.message, strl_status_name(status));
         assert_one_sentence(&err, status);
         assert_int_equal(built_files_left(), files);
@@ -158,7 +165,9 @@ static void too_little_memory_is_refused(void **state)
     strl_error err = {0};
     strl_build_result result;
     const char *input = built_path("in.ply");
-    strl_build_desc desc = {.inputs = &input, .input_count = 1, .output = built_path("new.stroll"),
+    strl_build_desc desc = {.inputs = &input,
+                            .input_count = 1,
+                            .output = built_path("new.stroll"),
                             .memory_bytes = STRL_BUILD_LEAST_MEMORY - 1};
     assert_int_equal(strl_build_clusters(&desc, &result, &err), STRL_ERR_ARGUMENT);
     assert_non_null(strstr(err.message, "memory"));
@@ -190,8 +199,12 @@ static void progress_that_says_no_cancels(void **state)
     for (uint64_t after = 1;; after++) {
         stop s = {.after = after};
         const char *input = built_path("in.ply");
-        strl_build_desc desc = {.inputs = &input, .input_count = 1, .output = built_path("out.stroll"), .jobs = 2,
-                                .progress = count_or_stop, .context = &s};
+        strl_build_desc desc = {.inputs = &input,
+                                .input_count = 1,
+                                .output = built_path("out.stroll"),
+                                .jobs = 2,
+                                .progress = count_or_stop,
+                                .context = &s};
         strl_build_result result;
         strl_error err = {0};
         strl_status status = strl_build_clusters(&desc, &result, &err);

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The models of the data folder that these readers read: built within the root's bound, nothing lost. Those of more than 300 K
-triangles only where STRL_LONG_TESTS is set."""
+"""The models of the data folder that these readers read: built within the root's bound, nothing lost. Those of more than
+300 K triangles only where STRL_LONG_TESTS is set."""
 import os
 import sys
 import tempfile
@@ -38,8 +38,9 @@ def try_model(source, output):
         print(f"{os.path.basename(source)}: {error}", flush=True)
         return False
     print(f"{os.path.basename(source)}: {result['triangles_in']} triangles, root {result['root_triangles']}, "
-          f"{result['bytes_out'] / result['triangles_leaf']:.1f} bytes and {result['scratch_bytes'] / result['triangles_in']:.0f} of scratch a "
-          f"triangle, {result['peak_rss_bytes'] / MIB:.0f} MiB, {result['seconds']:.1f} s, "
+          f"{result['bytes_out'] / result['triangles_leaf']:.1f} bytes and "
+          f"{result['scratch_bytes'] / result['triangles_in']:.0f} of scratch a triangle, "
+          f"{result['peak_rss_bytes'] / MIB:.0f} MiB, {result['seconds']:.1f} s, "
           f"{result['triangles_in'] / result['seconds'] / 1e6:.2f} M a second", flush=True)
     return True
 

@@ -68,7 +68,8 @@ static void a_soup_of_random_triangles(void **state)
     for (uint32_t t = 0; t < 100000 / SMALLER; t++) {
         double at[3] = {unit(&random), unit(&random), unit(&random)};
         for (int c = 0; c < 3; c++)
-            mesh_file_add_vertex(&mesh, at[0] + 0.02 * unit(&random), at[1] + 0.02 * unit(&random), at[2] + 0.02 * unit(&random));
+            mesh_file_add_vertex(&mesh, at[0] + 0.02 * unit(&random), at[1] + 0.02 * unit(&random),
+                                 at[2] + 0.02 * unit(&random));
         mesh_file_add_face(&mesh, 3 * t, 3 * t + 1, 3 * t + 2);
     }
     check_mesh(&mesh, "soup", 4000);

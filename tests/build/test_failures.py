@@ -122,7 +122,8 @@ def a_full_disk_is_one_sentence(folder):
     for megabytes, scratch_elsewhere in ((2, False), (1, True), (6, False)):
         disk, elsewhere = os.path.join(folder, "disk"), os.path.join(folder, "elsewhere")
         os.makedirs(disk, exist_ok=True)
-        mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={megabytes}m", "tmpfs", disk], stderr=subprocess.DEVNULL)
+        mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={megabytes}m", "tmpfs", disk],
+                                 stderr=subprocess.DEVNULL)
         if mounted.returncode:
             print("mount is not allowed: no small disk to fill")
             return
@@ -154,7 +155,8 @@ def start_long_build(folder, out):
     source = os.path.join(folder, "long.ply")
     if not os.path.exists(source):
         must("scene", "isosurface", "--triangles", "400K", "-o", source, "--quiet")
-    child = subprocess.Popen([STROLL, "build", source, "-o", out], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    child = subprocess.Popen([STROLL, "build", source, "-o", out], stdout=subprocess.PIPE,
+                             stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 30
     while not os.path.exists(out + ".tmp/lock"):
         assert child.poll() is None and time.monotonic() < deadline
@@ -165,7 +167,8 @@ def start_long_build(folder, out):
 def signals_stop_a_build_cleanly(folder):
     out = older_output(folder)
     stopped = 0
-    for number, wait in ((signal.SIGINT, 0), (signal.SIGTERM, 0.1), (signal.SIGINT, 0.4), (signal.SIGINT, 1), (signal.SIGTERM, 1.8)):
+    for number, wait in ((signal.SIGINT, 0), (signal.SIGTERM, 0.1), (signal.SIGINT, 0.4), (signal.SIGINT, 1),
+                         (signal.SIGTERM, 1.8)):
         child = start_long_build(folder, out)
         time.sleep(wait * SLOW)
         child.send_signal(number)
@@ -212,7 +215,8 @@ def mistakes_on_the_command_line_exit_with_2(folder):
     write_box_stl(source)
     out = os.path.join(folder, "out.stroll")
     for words in ([source], ["-o", out], [source, "-o", out, "--memory", "1K"], [source, "-o", out, "--jobs", "0"],
-                  [source, "-o", out, "--grid", "-1"], [source, "-o", out, "--up", "w"], [source, "-o", out, "--nonsense"],
+                  [source, "-o", out, "--grid", "-1"], [source, "-o", out, "--up", "w"],
+                  [source, "-o", out, "--nonsense"],
                   [source, "-o", out, "--structure", "pudding"]):
         done = run("build", *words)
         assert done.code == 2 and done.error, done
@@ -220,7 +224,7 @@ def mistakes_on_the_command_line_exit_with_2(folder):
 
 
 run_tests(an_output_equal_to_an_input_is_refused, what_is_no_input_is_refused, a_pipe_as_input_does_not_hang,
-          a_place_that_cannot_be_written_is_refused, without_rights_it_is_refused, an_older_output_stays_when_the_build_fails,
-          a_full_disk_is_one_sentence, files_of_others_in_the_scratch_folder_stay, signals_stop_a_build_cleanly,
+          a_place_that_cannot_be_written_is_refused, without_rights_it_is_refused,
+          an_older_output_stays_when_the_build_fails, a_full_disk_is_one_sentence, files_of_others_in_the_scratch_folder_stay, signals_stop_a_build_cleanly,
           a_second_build_of_the_same_output_is_refused, what_a_killed_build_left_does_no_harm,
           mistakes_on_the_command_line_exit_with_2)

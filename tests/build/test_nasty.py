@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Every nasty PLY, STL and OBJ is built, with what was dropped counted, or refused with one sentence: soon, in little memory,
-without a signal, and with nothing left behind."""
+"""Every nasty PLY, STL and OBJ is built, with what was dropped counted, or refused with one sentence: soon, in little
+memory, without a signal, and with nothing left behind."""
 import json
 import os
 import sys

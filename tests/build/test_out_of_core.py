@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Two million triangles are built within 128 MiB, whoever measures: the operating system counts the memory, the folder the disk."""
+"""Two million triangles are built within 128 MiB, whoever measures: the operating system counts the memory, the
+folder the disk."""
 import json
 import os
 import threading
