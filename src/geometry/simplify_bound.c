@@ -361,6 +361,63 @@ void strl__collapse_drift(const simplifier *s, const strl_star *star, uint32_t t
     result->longest = sqrtf(longest) * (1 + 1e-6f); /* whatever the rounding, a bound */
 }
 
+/* The wedge of each point of the ring, as the star's triangles use it. */
+static void list_ring_wedges(const simplifier *s, const strl_star *star, uint32_t *wedge)
+{
+    for (uint32_t i = 0; i < star->count; i++) {
+        uint32_t t = star->order[i];
+        wedge[i] = s->corner[star->triangle[t]][(star->corner[t] + 1) % 3];
+    }
+    uint32_t last = star->order[star->count - 1];
+    wedge[star->count] = s->corner[star->triangle[last]][(star->corner[last] + 2) % 3];
+}
+
+static float colour_gap(const simplifier *s, uint32_t u, uint32_t x, double along, uint32_t v, uint32_t y, double on_new)
+{
+    float most = 0;
+    for (int k = 0; k < 3; k++) {
+        float before = s->colour[u][k] + (float)along * (s->colour[x][k] - s->colour[u][k]);
+        float after = s->colour[v][k] + (float)on_new * (s->colour[y][k] - s->colour[v][k]);
+        most = strl__larger(most, fabsf(before - after));
+    }
+    return most;
+}
+
+float strl__colour_change(const simplifier *s, const strl_star *star, uint32_t to, float *reach)
+{
+    polygon patch;
+    uint32_t wedge[STAR_MAX + 1], own = s->corner[star->triangle[0]][star->corner[0]];
+    bool exact, varies = false;
+    *reach = 0;
+    for (uint32_t i = 0; i < star->count; i++)
+        for (unsigned c = 0; c < 3; c++)
+            for (int k = 0; k < 3; k++)
+                varies |= s->colour[s->corner[star->triangle[i]][c]][k] != s->colour[own][k];
+    if (!varies)
+        return 0;
+    for (uint32_t i = 0; i < star->neighbour_count; i++)
+        *reach = strl__larger(*reach, (float)distance(s->position[to], s->position[star->neighbour[i]]));
+    uint32_t target = strl__wedge_target(s, star, to, own, &exact);
+    if (!star->manifold || !build_patch(s, star, to, &patch) || target == NO_INDEX)
+        return 1;
+    list_ring_wedges(s, star, wedge);
+    float most = 0;
+    uint32_t n = patch.count, v = patch.v_at;
+    for (uint32_t step = 2; step + 2 <= n; step++) {
+        uint32_t j = v + step < n ? v + step : v + step - n;
+        const flat *d = &patch.x[j];
+        double side_u = cross2(d->s, d->t, patch.u.s, patch.u.t), inverse = 1 / (d->s * d->s + d->t * d->t);
+        for (uint32_t k = side_u >= 0 ? 1 : step + 1; k < (side_u >= 0 ? step : n); k++) {
+            uint32_t i = v + k < n ? v + k : v + k - n;
+            double side_x = cross2(d->s, d->t, patch.x[i].s, patch.x[i].t), span = side_u - side_x;
+            double along = span != 0 ? side_u / span : 0;
+            double x = patch.u.s + along * (patch.x[i].s - patch.u.s), y = patch.u.t + along * (patch.x[i].t - patch.u.t);
+            most = strl__larger(most, colour_gap(s, own, wedge[i], along, target, wedge[j], (x * d->s + y * d->t) * inverse));
+        }
+    }
+    return most;
+}
+
 void strl__receive_orphans(simplifier *s, const collapse_drift *drift)
 {
     for (uint32_t i = 0; i < drift->receivers; i++)

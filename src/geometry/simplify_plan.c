@@ -201,11 +201,13 @@ void strl__plan_collapse(simplifier *s, const strl_star *star, uint32_t to, coll
     const double *u = s->position[star->point], *v = s->position[to];
     for (int i = 0; i < 3; i++)
         longest += (u[i] - v[i]) * (u[i] - v[i]);
-    float change = attribute_change(s, star, to, drift.image, drift.weights);
+    float reach, change = attribute_change(s, star, to, drift.image, drift.weights);
+    float colour = s->desc->colour_weight * strl__colour_change(s, star, to, &reach);
+    change = strl__larger(change, colour);
     plan->to = to;
     plan->geometric = nextafterf(drift.longest + s->mesh->start_error, INFINITY);
     plan->deviation = sqrtf(deviation * deviation + change * change);
-    plan->shift = strl__larger(shift, (float)sqrt(longest) * fminf(1, plan->deviation));
+    plan->shift = strl__larger(shift, strl__larger((float)sqrt(longest), reach) * fminf(1, plan->deviation));
     if (star->on_boundary) /* two rims that meet in the image can both draw back: each may have half */
         plan->shift = strl__larger(plan->shift, RIM_WEIGHT * drift.longest);
     plan->key = strl__larger(plan->geometric, plan->shift);
