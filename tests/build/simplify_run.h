@@ -7,7 +7,7 @@
 #include "geometry/simplify.h"
 
 /* States of a run that are measured. */
-#ifdef __SANITIZE_ADDRESS__
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define RUN_STATES 5u
 #else
 #define RUN_STATES 16u

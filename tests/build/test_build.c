@@ -13,7 +13,7 @@
 #include "build/built.h"
 #include "geometry/octahedral.h"
 
-#ifdef __SANITIZE_ADDRESS__
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define SMALLER 8u
 #else
 #define SMALLER 1u

@@ -13,7 +13,7 @@
 #include "build/cuts.h"
 #include "build/meshes.h"
 
-#ifdef __SANITIZE_ADDRESS__
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define SMALLER 5u
 #define RANDOM_CUTS 12u
 #else

@@ -13,7 +13,7 @@
 #include "build/built.h"
 #include "platform/file.h"
 
-#ifdef __SANITIZE_ADDRESS__
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define STRIDE 12u
 #else
 #define STRIDE 40u

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The models of the data folder that these readers read: built within the root's bound, nothing lost. Those of more than
-300 K triangles only where STRL_LONG_TESTS is set."""
+"""The models of the data folder that these readers read: built within the root's bound, nothing lost. Those of more
+than 300 K triangles only where STRL_LONG_TESTS is set."""
 import os
 import sys
 import tempfile

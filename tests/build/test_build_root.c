@@ -11,7 +11,7 @@
 #include "build/cuts.h"
 #include "build/meshes.h"
 
-#ifdef __SANITIZE_ADDRESS__
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define SMALLER 10u
 #define MOST_SECONDS 300
 #else

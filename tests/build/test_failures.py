@@ -225,6 +225,7 @@ def mistakes_on_the_command_line_exit_with_2(folder):
 
 run_tests(an_output_equal_to_an_input_is_refused, what_is_no_input_is_refused, a_pipe_as_input_does_not_hang,
           a_place_that_cannot_be_written_is_refused, without_rights_it_is_refused,
-          an_older_output_stays_when_the_build_fails, a_full_disk_is_one_sentence, files_of_others_in_the_scratch_folder_stay, signals_stop_a_build_cleanly,
+          an_older_output_stays_when_the_build_fails, a_full_disk_is_one_sentence,
+          files_of_others_in_the_scratch_folder_stay, signals_stop_a_build_cleanly,
           a_second_build_of_the_same_output_is_refused, what_a_killed_build_left_does_no_harm,
           mistakes_on_the_command_line_exit_with_2)

@@ -74,7 +74,7 @@ def the_least_memory_is_enough(folder):
 
 def without_shared_vertices_it_still_fits(folder):
     source = os.path.join(folder, "in.ply")
-    must("scene", "boxes", "--triangles", "600K", "-o", source, "--quiet")
+    must("scene", "boxes", "--triangles", "240K", "-o", source, "--quiet")
     build_within(source, folder, 128, 2)
 
 
