@@ -10,6 +10,7 @@
 /* Stands for "more than one wedge" while wedges are counted. */
 #define SEVERAL (UINT32_MAX - 1)
 
+#define FREE_DIVISOR 8   /* collapses that add no error go on below the target, down to this part of it */
 #define LADDER_RATIO 4.f /* the first rung gives up where its next collapse costs so many times its middle one */
 #define SMALL_SHARE 5e-4 /* of a piece's diagonal: errors below are never out of proportion */
 #define LEAST_ERROR 1.f  /* lattice units: below, all errors count as equal */
@@ -292,6 +293,8 @@ static float smaller(float a, float b)
 static bool wants_more(const simplifier *s, float key)
 {
     const strl_simplify_desc *desc = s->desc;
+    if (key <= s->free_key) /* costs nothing that is not claimed already: flat places */
+        return s->triangles_left > desc->target_triangles / FREE_DIVISOR;
     if (desc->even_error > 0 && key <= desc->even_error)
         return s->triangles_left > desc->least_triangles;
     if (desc->even_error > 0 && s->triangles_left <= desc->most_triangles)
@@ -382,8 +385,9 @@ strl_status strl_simplify(const strl_mesh *mesh, const strl_simplify_desc *desc,
     if (!allocate_result(&s, result, arena) || !allocate(&s, mesh, arena))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to simplify %u triangles", mesh->triangle_count);
     load(&s, result);
+    s.free_key = strl__larger(result->geometric, result->appearance) * (1 + 1e-5f); /* claims are rounded up */
     float middle = 0, reached = strl__larger(result->geometric, LEAST_ERROR);
-    if (s.triangles_left > desc->target_triangles)
+    if (s.triangles_left > desc->target_triangles / FREE_DIVISOR)
         reached = strl__larger(reached, run_rung(&s, desc->error_limit, true, &middle, result));
     uint32_t enough = desc->even_error > 0 ? desc->most_triangles : desc->target_triangles;
     if (s.triangles_left > enough && !climb_ladder(&s, reached, arena, result))

@@ -56,6 +56,7 @@ typedef struct simplifier {
     uint32_t *stamp;        /* per point, against `tick` */
     uint32_t tick;
     uint32_t triangles_left;
+    float free_key;         /* the largest key that was claimed before anything collapsed */
     strl_simplify_rung rung;
     /* candidates: a binary heap of points by key */
     uint32_t *heap, heap_count;
