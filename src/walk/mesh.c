@@ -6,38 +6,14 @@
 #include "walk/internal.h"
 
 #include <inttypes.h>
-#include <math.h>
 #include <string.h>
+
+#include "geometry/colour.h"
 
 /* Every mesh within the limits of progressive.h decodes in less. */
 #define SCRATCH_BYTES ((size_t)64 << 20)
 
-/* ---- colour */
-
-static float linear_of(unsigned code)
-{
-    float value = (float)code / 255;
-    return value <= 0.04045f ? value / 12.92f : powf((value + 0.055f) / 1.055f, 2.4f);
-}
-
-static unsigned code_of(float linear)
-{
-    float value = linear <= 0.0031308f ? linear * 12.92f : 1.055f * powf(linear, 1 / 2.4f) - 0.055f;
-    return (unsigned)lrintf(value * 255);
-}
-
-static uint32_t multiplied(uint32_t vertex, uint32_t material)
-{
-    if (vertex == UINT32_MAX || material == UINT32_MAX)
-        return vertex & material;
-    uint32_t product = ((vertex >> 24) * (material >> 24) + 127) / 255 << 24;
-    for (unsigned shift = 0; shift < 24; shift += 8) {
-        unsigned a = vertex >> shift & 255, b = material >> shift & 255;
-        unsigned code = a == 255 ? b : b == 255 ? a : code_of(linear_of(a) * linear_of(b));
-        product |= code << shift;
-    }
-    return product;
-}
+/* ---- vertices */
 
 static void make_vertices(const strl_pm *pm, strl_vertex *vertices)
 {
@@ -46,7 +22,7 @@ static void make_vertices(const strl_pm *pm, strl_vertex *vertices)
         uint32_t colour = pm->colour ? pm->colour[v] : UINT32_MAX;
         uint32_t material = pm->palette[pm->palette_index ? pm->palette_index[v] : 0].rgba;
         if (colour != last[0] || material != last[1])
-            product = multiplied(colour, material);
+            product = strl_rgba_multiply(colour, material);
         last[0] = colour, last[1] = material;
         memcpy(vertices[v].position, pm->position[v], sizeof vertices[v].position);
         memcpy(vertices[v].normal, pm->normal[v], sizeof vertices[v].normal);
