@@ -87,8 +87,8 @@ static void take_screenshot(viewer *v)
 
 static void reset(viewer *v)
 {
-    bool help = v->controls.help;
-    v->controls = (strl_gui_controls){.error_px = (float)v->desc.error_px, .help = help};
+    strl_gui_controls old = v->controls;
+    v->controls = (strl_gui_controls){.error_px = (float)v->desc.error_px, .help = old.help, .screenshot = old.screenshot};
     strl_navigator_init(&v->navigator, v->model.bounds, v->model.up_axis);
 }
 
@@ -114,10 +114,10 @@ static bool obey(viewer *v, strl_action action)
         controls->fly = true;
         break;
     case STRL_ACTION_HOME:
-        controls->home = true;
+        strl_navigator_home(&v->navigator);
         break;
     case STRL_ACTION_RESET:
-        controls->reset = true;
+        reset(v); /* now: the same frame's later keys change what it resets */
         break;
     case STRL_ACTION_NO_COLOURS:
         controls->debug = STRL_DEBUG_NONE;
@@ -158,7 +158,7 @@ static bool obey(viewer *v, strl_action action)
     return false;
 }
 
-/* What keys and the panel's buttons asked for alike. */
+/* What the panel's buttons asked for. */
 static void obey_controls(viewer *v)
 {
     if (v->controls.reset)
