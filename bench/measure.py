@@ -1,4 +1,5 @@
 """Running the program and noting what the operating system saw. Standard library only."""
+import hashlib
 import json
 import os
 import pathlib
@@ -38,10 +39,12 @@ def commit_of(root):
     return done.stdout.strip() or "unknown"
 
 
-def machine(root):
+def machine(root, program):
+    """What every record says. `program` tells two builds apart even where the commit does not."""
     memory_bytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    return {"commit": commit_of(root), "cpu": cpu_model(), "cores": len(os.sched_getaffinity(0)),
-            "memory_gib": round(memory_bytes / 2**30, 1), "system": system_name(), "kernel": platform.release()}
+    return {"commit": commit_of(root), "program": hashlib.sha256(program.read_bytes()).hexdigest()[:12], "cpu": cpu_model(),
+            "cores": len(os.sched_getaffinity(0)), "memory_gib": round(memory_bytes / 2**30, 1), "system": system_name(),
+            "kernel": platform.release()}
 
 
 class Outcome:
@@ -81,7 +84,7 @@ def run(command, cores=None, allowed=(0,)):
     return outcome
 
 
-def read_stats(path):
+def read_lines(path):
     with open(path, encoding="utf-8") as file:
         return [json.loads(line) for line in file if line.strip()]
 
@@ -104,8 +107,8 @@ class Log:
         self.path, self.facts = pathlib.Path(path), facts
         self.path.parent.mkdir(parents=True, exist_ok=True)
 
-    def add(self, measure, model, **figures):
-        record = {"measure": measure, "model": model, **figures, **self.facts}
+    def add(self, measure, model, settings, **figures):
+        record = {"measure": measure, "model": model, "settings": settings, **figures, **self.facts}
         with open(self.path, "a", encoding="utf-8") as file:
             file.write(json.dumps(record) + "\n")
         return record
@@ -113,6 +116,14 @@ class Log:
     def latest(self):
         records = {}
         if self.path.exists():
-            for record in read_stats(self.path):
+            for record in read_lines(self.path):
                 records[record["measure"], record["model"]] = record
         return records
+
+    def is_current(self, record):
+        """Of the program as it is: a commit that changes texts alone makes no record old."""
+        return record["program"] == self.facts["program"]
+
+    def has(self, measure, model, settings):
+        record = self.latest().get((measure, model))
+        return record is not None and self.is_current(record) and record["settings"] == settings

@@ -1,59 +1,72 @@
 #!/usr/bin/env python3
 """Measures what docs/benchmarks.md shows: images, claimed errors, build rate, bytes, frame times.
 
-    bench/must_show.py --data DIR [--stroll build/stroll] [--models a,b] [--parts build,images,...] [--write-docs]
+    bench/must_show.py --data DIR [--models a,b] [--parts build,images,...] [--frames N] [--again] [--write-docs]
 
-DIR holds the models (NAME.ply, .stl, .obj, or those with .zst); isosurfaces are generated. Parts:
+A model is a file of DIR (NAME.ply, .stl, .obj, or those with .zst) or isosurface_N (isosurface_10m), which is generated.
+--models replaces each part's own models. Parts:
 
-    build    one build under --memory 1G: counts, bytes per triangle, peak memory, root      (all models)
-    images   orbit and fly-through against the input as read: coverage, depth, PSNR          (all models)
-    verify   verify --against the input                                                     (all models)
-    rate     five interleaved pairs of builds on one core and on two                        (isosurface_10m)
-    bytes    the same container for --jobs 1, 2, 3 and 8                                     (isosurface_1m)
-    walk     select_ms and frame_ms on one smooth path through 1 M and 10 M triangles        (isosurface_1m, _10m)
-    roots    builds every PLY, STL and OBJ file of DIR: the root's size                      (all files)
+    build         one build under --memory 1G: counts, bytes per triangle, peak memory, root      (all models)
+    images        orbit and fly-through against the input as read: coverage, depth; sheets        (all models)
+    psnr          the same paths with --supersample 4                                             (all models)
+    verify        verify --against the input                                                      (all models)
+    backends      gl45 against gl3 and OpenGL ES on an orbit                                      (dragon_scans, isosurface_1m)
+    rate          five interleaved pairs of builds on one core and on two                         (isosurface_10m)
+    bytes         the same container for --jobs 1, 2, 3 and 8                                     (isosurface_1m)
+    dependencies  with and without: locked vertices per level, triangles drawn at one pixel       (isosurface_10m)
+    walk          select_ms and frame_ms of all models on one smooth path                         (isosurface_1m, _10m)
+    roots         builds every PLY, STL and OBJ file of DIR: the root's size                      (all files)
 
-Each record goes at once to --log (JSON lines); --write-docs rewrites the tables of docs/benchmarks.md from the log, so that
-parts may be measured one after another. `build` also writes the model's row of bench/results.csv."""
+Each record goes at once to --log (JSON lines). What is there of the same program with the same settings is kept, so a
+run that was stopped goes on; --again measures anew. --write-docs rewrites the tables of docs/benchmarks.md from the log
+and the rows of bench/results.csv, so that parts may be measured one after another."""
 import argparse
 import hashlib
 import json
 import math
 import pathlib
+import re
 import shutil
 import sys
+import time
 
 import counts
 import measure
+import sheets
 import tables
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-FILE_MODELS = ("terrain_n49e011", "dragon_scans", "iso_engine", "motorBike", "turbineblade")
-SCENE_MODELS = {"isosurface_1m": 1_000_000, "isosurface_10m": 10_000_000}
-MODELS = FILE_MODELS + tuple(SCENE_MODELS)
-PARTS = ("build", "images", "verify", "rate", "bytes", "walk", "roots")
+MODELS = ("terrain_n49e011", "dragon_scans", "iso_engine", "motorBike", "turbineblade", "isosurface_10m")
+PATHS = ("orbit", "flythrough")
 SUFFIXES = (".ply", ".stl", ".obj")
-SIZE = "1280x720"
-PAIRS = 5
+SCENE = re.compile(r"isosurface_(\d+)([km]?)")
+BACKEND_FRAMES = 8
+WALK_FRAMES_A_FRAME = 5  # 300 where the others have 60: a smooth path
 
 
 class Bench:
     def __init__(self, options):
+        self.options = options
         self.stroll = options.stroll.resolve()
-        self.data, self.scratch, self.frames = options.data, options.scratch, options.frames
-        self.keep = options.keep
-        self.log = measure.Log(options.log, measure.machine(ROOT))
+        self.data, self.scratch = options.data, options.scratch
+        self.log = measure.Log(options.log, measure.machine(ROOT, self.stroll))
 
     def program(self, *words, **settings):
         return measure.run([self.stroll, *words, "--quiet"], **settings)
 
+    def kept(self, name, model, settings):
+        """True where this need not be measured again."""
+        kept = not self.options.again and self.log.has(name, model, settings)
+        print(f"must_show: {name} {model}{': kept' if kept else ''}", flush=True)
+        return kept
+
     def input_of(self, model):
         """The model's file, generated or unpacked where it must be."""
-        if model in SCENE_MODELS:
+        if scene_triangles(model):
             path = self.scratch / f"{model}.ply"
             if not self.is_fresh(path):
                 partial = path.with_suffix(".part.ply")
-                self.program("scene", "isosurface", "--triangles", SCENE_MODELS[model], "--seed", 1, "-o", partial)
+                self.program("scene", "isosurface", "--triangles", scene_triangles(model), "--seed", 1, "-o", partial)
                 partial.rename(path)
             return path
         for path in sorted(self.data.rglob(f"{model}.*")):
@@ -70,73 +83,111 @@ class Bench:
         """Made by the program as it is now."""
         return path.exists() and path.stat().st_mtime > self.stroll.stat().st_mtime
 
-    def container_of(self, model):
-        path = self.scratch / f"{model}.stroll"
+    def container_of(self, model, *options):
+        path = self.scratch / f"{model}{''.join(options)}.stroll"
         if not self.is_fresh(path):
-            self.program("build", self.input_of(model), "-o", path, "--memory", "1G")
+            self.program("build", self.input_of(model), "-o", path, "--memory", "1G", *options)
         return path
+
+    def render(self, model_file, target, path, *options):
+        """Settled images of a path, named or from a file, in the folder `target`. Returns frames' statistics and seconds."""
+        shutil.rmtree(target, ignore_errors=True)
+        stats = target.with_suffix(".jsonl")
+        outcome = self.program("render", model_file, "--path", path, "--seed", 1, "--size", self.options.size, "--error", 1,
+                               "-o", target, "--stats", stats, *options)
+        return measure.read_lines(stats), outcome.seconds
+
+    def drop(self, *folders):
+        for folder in () if self.options.keep else folders:
+            shutil.rmtree(folder)
+
+
+def scene_triangles(model):
+    """How many triangles isosurface_N has; 0 = it is a file."""
+    match = SCENE.fullmatch(model)
+    return int(match[1]) * {"": 1, "k": 10**3, "m": 10**6}[match[2]] if match else 0
 
 
 def part_build(bench, model):
+    if bench.kept("build", model, {}):
+        return
     source, container = bench.input_of(model), bench.scratch / f"{model}.stroll"
     outcome = bench.program("build", source, "-o", container, "--memory", "1G", "--json")
     report = outcome.json()
-    bench.log.add("build", model, report=report, seconds=outcome.seconds, system_peak_rss_bytes=outcome.peak_rss_bytes,
-                  bytes_per_triangle=report["bytes_out"] / max(1, report["triangles_in"]),
-                  bytes_in=source.stat().st_size)
-    scene = model in SCENE_MODELS
-    counts.put_row(counts.row_of("isosurface" if scene else model, SCENE_MODELS.get(model, ""), 1 if scene else "",
-                                 report))
+    bench.log.add("build", model, {}, report=report, seconds=outcome.seconds, system_peak_rss_bytes=outcome.peak_rss_bytes,
+                  bytes_per_triangle=report["bytes_out"] / max(1, report["triangles_in"]), bytes_in=source.stat().st_size)
 
 
-def render(bench, target, model_file, path, *extra):
-    """Renders a path into the folder `target` and returns the statistics of its frames."""
-    shutil.rmtree(target, ignore_errors=True)
-    stats = target.with_suffix(".jsonl")
-    outcome = bench.program("render", model_file, "--path", path, "--frames", bench.frames, "--seed", 1, "--size", SIZE,
-                            "--error", 1, "-o", target, "--stats", stats, *extra)
-    return measure.read_stats(stats), outcome.seconds
-
-
-def compare_pair(bench, model, path, name, *extra):
-    """Container against the input as read; keeps the two contact sheets and drops the frames."""
-    ours, reference = bench.scratch / f"{model}_{path}_{name}", bench.scratch / f"{model}_{path}_{name}_reference"
-    stats, seconds = render(bench, ours, bench.container_of(model), path, *extra)
-    _, reference_seconds = render(bench, reference, bench.input_of(model), path, "--full", *extra)
-    outcome = bench.program("compare", ours, reference, "--error", 1, "--json", allowed=(0, 1))
-    for folder in (ours, reference):
-        sheet = folder / "contact.png"
-        if sheet.exists():
-            shutil.copyfile(sheet, folder.with_suffix(".png"))
-        if not bench.keep:
-            shutil.rmtree(folder)
-    return {"compare": outcome.json(), "holds": outcome.status == 0, "said": outcome.errors, "stats": stats,
-            "seconds": seconds, "reference_seconds": reference_seconds}
+def compare_pair(bench, model, path, frames, options, limits, sheet=None):
+    """Container against the input as read, with the input's cameras: paths made from both differ by a lattice step."""
+    reference, ours = bench.scratch / f"{model}_{path}_reference", bench.scratch / f"{model}_{path}"
+    _, reference_seconds = bench.render(bench.input_of(model), reference, path, "--frames", frames, "--full", *options)
+    stats, seconds = bench.render(bench.container_of(model), ours, reference / "path.json", *options)
+    outcome = bench.program("compare", reference, ours, "--error", 1, "--json", *limits, allowed=(0, 1))
+    compared = outcome.json()
+    if sheet and frames > 1:
+        sheet.parent.mkdir(exist_ok=True)
+        sheets.side_by_side(reference / "contact.png", ours / "contact.png", frames, sheet)
+    bench.drop(reference, ours)
+    return compared, stats, {"seconds": seconds, "reference_seconds": reference_seconds, "said": outcome.errors}
 
 
 def part_images(bench, model):
-    for path in ("orbit", "flythrough"):
-        plain = compare_pair(bench, model, path, "plain", "--depth")
-        stats = plain.pop("stats")
+    settings = {"frames": bench.options.frames, "size": bench.options.size}
+    for path in PATHS:
+        if bench.kept(f"images_{path}", model, settings):
+            continue
+        sheet = bench.scratch / "sheets" / f"{model}_{path}.png"
+        compared, stats, times = compare_pair(bench, model, path, settings["frames"], ("--depth",), ("--psnr", 0), sheet)
         covered = [frame["triangles"] / frame["covered_pixels"] for frame in stats if frame["covered_pixels"]]
-        bench.log.add(f"images_{path}", model, triangles_per_covered_pixel=measure.spread(covered),
-                      max_error_px=max(frame["max_error_px"] for frame in stats), **plain)
-        filtered = compare_pair(bench, model, path, "x4", "--supersample", 4)
-        filtered.pop("stats")
-        bench.log.add(f"psnr_{path}", model, **filtered)
+        claims = [frame["max_error_px"] for frame in stats if frame["max_error_px"] is not None]
+        bench.log.add(f"images_{path}", model, settings, compare=compared, triangles_per_covered_pixel=measure.spread(covered),
+                      max_error_px=max(claims, default=None), unbounded_frames=len(stats) - len(claims), **times)
+
+
+def part_psnr(bench, model):
+    settings = {"frames": bench.options.psnr_frames or bench.options.frames, "size": bench.options.size}
+    for path in PATHS:
+        if bench.kept(f"psnr_{path}", model, settings):
+            continue
+        options = ("--depth", "--supersample", 4)
+        compared, _, times = compare_pair(bench, model, path, settings["frames"], options, ())
+        bench.log.add(f"psnr_{path}", model, settings, compare=compared, **times)
 
 
 def part_verify(bench, model):
+    if bench.kept("verify", model, {}):
+        return
     outcome = bench.program("verify", bench.container_of(model), "--against", bench.input_of(model), "--memory", "1G",
                             "--json", allowed=(0, 1))
-    bench.log.add("verify", model, report=outcome.json(), holds=outcome.status == 0, said=outcome.errors,
+    bench.log.add("verify", model, {}, report=outcome.json(), holds=outcome.status == 0, said=outcome.errors,
                   seconds=outcome.seconds, system_peak_rss_bytes=outcome.peak_rss_bytes)
 
 
+def part_backends(bench, model):
+    settings = {"frames": min(BACKEND_FRAMES, bench.options.frames), "size": bench.options.size}
+    if bench.kept("backends", model, settings):
+        return
+    base, container, others = bench.scratch / f"{model}_gl45", bench.container_of(model), {}
+    bench.render(container, base, "orbit", "--frames", settings["frames"], "--depth", "--backend", "gl45")
+    for backend in ("gl3", "gles"):
+        folder = bench.scratch / f"{model}_{backend}"
+        bench.render(container, folder, base / "path.json", "--depth", "--backend", backend)
+        compared = bench.program("compare", base, folder, "--error", 1, "--json", allowed=(0, 1)).json()
+        same = sum(frame.read_bytes() == (folder / frame.name).read_bytes() for frame in base.glob("frame_*.png"))
+        others[backend] = {"compare": compared, "same_frames": same}
+        bench.drop(folder)
+    bench.drop(base)
+    bench.log.add("backends", model, settings, others=others)
+
+
 def part_rate(bench, model):
+    settings = {"pairs": bench.options.pairs}
+    if bench.kept("rate", model, settings):
+        return
     source, container = bench.input_of(model), bench.scratch / f"{model}_rate.stroll"
     pairs = []
-    for _ in range(PAIRS):
+    for _ in range(settings["pairs"]):
         rates = []
         for cores in (1, 2):
             container.unlink(missing_ok=True)
@@ -145,19 +196,45 @@ def part_rate(bench, model):
             rates.append(outcome.json()["triangles_in"] / outcome.seconds)
         pairs.append(rates)
     container.unlink(missing_ok=True)
-    bench.log.add("rate", model, pairs=pairs, one_core=measure.spread([one for one, _ in pairs]),
+    bench.log.add("rate", model, settings, pairs=pairs, one_core=measure.spread([one for one, _ in pairs]),
                   two_cores=measure.spread([two for _, two in pairs]),
                   speedup=measure.spread([two / one for one, two in pairs]))
 
 
 def part_bytes(bench, model):
-    digests = {}
+    if bench.kept("bytes", model, {}):
+        return
+    digests, container = {}, bench.scratch / f"{model}_jobs.stroll"
     for jobs in (1, 2, 3, 8):
-        container = bench.scratch / f"{model}_jobs.stroll"
         bench.program("build", bench.input_of(model), "-o", container, "--jobs", jobs)
         digests[jobs] = hashlib.sha256(container.read_bytes()).hexdigest()
         container.unlink()
-    bench.log.add("bytes", model, digests=digests, holds=len(set(digests.values())) == 1)
+    bench.log.add("bytes", model, {}, digests=digests, holds=len(set(digests.values())) == 1)
+
+
+def level_facts(bench, container):
+    facts = bench.program("info", container, "--json").json()["trees"][0]
+    names = ("level", "nodes", "groups", "base_vertices", "shared_vertices", "locked_share", "boundary_steps", "base_triangles")
+    return [{name: level[name] for name in names} for level in facts["per_level"]]
+
+
+def part_dependencies(bench, model):
+    """The null renderer counts what would be drawn; only a path along the surface needs one that sees it."""
+    settings = {"frames": bench.options.frames, "size": bench.options.size}
+    if bench.kept("dependencies", model, settings):
+        return
+    sides = {"with": bench.container_of(model), "without": bench.container_of(model, "--no-dependencies")}
+    figures = {name: {"levels": level_facts(bench, container), "bytes": container.stat().st_size, "triangles": {}}
+               for name, container in sides.items()}
+    cameras, stats = bench.scratch / f"{model}_path.json", bench.scratch / f"{model}_dependencies.jsonl"
+    for path in PATHS:
+        bench.program("render", sides["with"], "--path", path, "--frames", settings["frames"], "--seed", 1, "--size", "64x36",
+                      "--save-path", cameras)
+        for name, container in sides.items():
+            bench.program("render", container, "--path", cameras, "--size", settings["size"], "--error", 1, "--backend", "null",
+                          "--stats", stats)
+            figures[name]["triangles"][path] = measure.spread([frame["triangles"] for frame in measure.read_lines(stats)])
+    bench.log.add("dependencies", model, settings, **{f"{name}_dependencies": figure for name, figure in figures.items()})
 
 
 def write_spiral(path, bounds, frames):
@@ -175,86 +252,114 @@ def write_spiral(path, bounds, frames):
     path.write_text(json.dumps({"fov_y_deg": 60, "frames": places}), encoding="utf-8")
 
 
-def part_walk(bench, _):
-    """Three interleaved passes of both models over one path, so that a slow minute of the machine meets both."""
-    path = bench.scratch / "spiral.json"
-    bounds = bench.program("info", bench.container_of("isosurface_10m"), "--json").json()["bounds"]
-    write_spiral(path, tables.flat(bounds), bench.frames * 5)
-    frames = {model: [] for model in SCENE_MODELS}
+def part_walk(bench, models):
+    """Three interleaved passes of all models over one path, so that a slow minute of the machine meets each."""
+    settings = {"frames": bench.options.frames * WALK_FRAMES_A_FRAME, "size": bench.options.size, "models": list(models)}
+    if all([bench.kept("walk", model, settings) for model in models]):
+        return
+    path, stats = bench.scratch / "spiral.json", bench.scratch / "walk.jsonl"
+    bounds = bench.program("info", bench.container_of(models[-1]), "--json").json()["bounds"]
+    write_spiral(path, bounds, settings["frames"])
+    frames = {model: [] for model in models}
     for _ in range(3):
-        for model in SCENE_MODELS:
-            stats_file = bench.scratch / f"{model}_walk.jsonl"
-            target = bench.scratch / f"{model}_walk"
-            bench.program("render", bench.container_of(model), "--path", path, "--size", SIZE, "--error", 1,
-                          "--realtime", "--stats", stats_file, "-o", target)
-            frames[model] += measure.read_stats(stats_file)
-            shutil.rmtree(target, ignore_errors=True)
-    medians = {}
+        for model in models:
+            bench.program("render", bench.container_of(model), "--path", path, "--size", settings["size"], "--error", 1,
+                          "--realtime", "--stats", stats)
+            frames[model] += measure.read_lines(stats)
     for model, records in frames.items():
         columns = {name: measure.spread([frame[name] for frame in records])
                    for name in ("frame_ms", "select_ms", "triangles", "missing_nodes")}
-        medians[model] = columns["frame_ms"]["median"]
-        bench.log.add("walk", model, **columns)
-    bench.log.add("growth", "isosurface", frame_ms_ratio=medians["isosurface_10m"] / medians["isosurface_1m"])
+        bench.log.add("walk", model, settings, **columns)
 
 
 def part_roots(bench, _):
     for source in sorted(path for path in bench.data.iterdir() if path.suffix in SUFFIXES):
+        if bench.kept("root", source.stem, {}):
+            continue
         container = bench.scratch / "roots.stroll"
         outcome = bench.program("build", source, "-o", container, "--memory", "1G", "--json", allowed=(0, 1))
         report = outcome.json() if outcome.status == 0 else {}
-        bench.log.add("root", source.stem, report=report, holds=outcome.status == 0, said=outcome.errors)
+        bench.log.add("root", source.stem, {}, report=report, holds=outcome.status == 0, said=outcome.errors)
         container.unlink(missing_ok=True)
-        if report:
-            counts.put_row(counts.row_of(source.stem, "", "", report))
 
 
-MODELS_OF_PART = {"rate": ("isosurface_10m",), "bytes": ("isosurface_1m",), "walk": ("",), "roots": ("",)}
+# Each part with the models it has where --models names none.
+PARTS = {"build": (part_build, MODELS), "images": (part_images, MODELS), "psnr": (part_psnr, MODELS),
+         "verify": (part_verify, MODELS), "backends": (part_backends, ("dragon_scans", "isosurface_1m")),
+         "rate": (part_rate, ("isosurface_10m",)), "bytes": (part_bytes, ("isosurface_1m",)),
+         "dependencies": (part_dependencies, ("isosurface_10m",)),
+         "walk": (part_walk, (("isosurface_1m", "isosurface_10m"),)), "roots": (part_roots, ("",))}
 
 
-def run_parts(bench, parts, models):
+def models_of(part, chosen):
+    own = PARTS[part][1]
+    if not chosen or part == "roots":
+        return own
+    return (tuple(chosen),) if part == "walk" else chosen
+
+
+def run_parts(bench, parts, chosen):
     failures = 0
     for part in parts:
-        wanted = MODELS_OF_PART.get(part) or models
-        for model in wanted:
-            print(f"must_show: {part} {model}".rstrip(), flush=True)
+        start = time.monotonic()
+        for model in models_of(part, chosen):
             try:
-                globals()[f"part_{part}"](bench, model)
-            except (measure.Failed, counts.Failed) as failure:
+                PARTS[part][0](bench, model)
+            except (measure.Failed, sheets.Bad, OSError) as failure:
                 failures += 1
                 print(f"must_show: {part} {model}: {failure}", file=sys.stderr, flush=True)
+        print(f"must_show: {part} took {time.monotonic() - start:.0f} s", flush=True)
     return failures
 
 
-def words_of(text, legal, parser, what):
-    words = tuple(word for word in text.split(",") if word)
-    for word in words:
-        if word not in legal:
-            parser.error(f"there is no {what} {word}; they are {', '.join(legal)}")
-    return words
+def put_counts(bench, table):
+    """What no clock changes, of the program as it is."""
+    for (name, model), record in bench.log.latest().items():
+        if name in ("build", "root") and record["report"] and bench.log.is_current(record):
+            triangles = scene_triangles(model)
+            key = ("isosurface", triangles, 1) if triangles else (model, "", "")
+            counts.put_row(counts.row_of(*key, record["report"]), table)
 
 
-def main():
+def words_of(text):
+    return [word for word in text.split(",") if word]
+
+
+def parse_options():
     parser = argparse.ArgumentParser(description="Measures what docs/benchmarks.md shows.")
     parser.add_argument("--data", type=pathlib.Path, required=True, help="folder of models")
     parser.add_argument("--stroll", type=pathlib.Path, default=ROOT / "build" / "stroll", help="the program")
     parser.add_argument("--scratch", type=pathlib.Path, default=ROOT / "build" / "bench", help="folder for what is made")
     parser.add_argument("--log", type=pathlib.Path, default=ROOT / "build" / "bench" / "must_show.jsonl")
-    parser.add_argument("--models", default=",".join(MODELS))
-    parser.add_argument("--parts", default=",".join(PARTS))
-    parser.add_argument("--frames", type=int, default=60)
+    parser.add_argument("--models", default="", help="instead of each part's own, with commas between")
+    parser.add_argument("--parts", default=",".join(PARTS), help="with commas between; default: all")
+    parser.add_argument("--frames", type=int, default=60, help="of each path (60); the walk has five times as many")
+    parser.add_argument("--psnr-frames", type=int, default=0, help="of each path of part psnr (as --frames)")
+    parser.add_argument("--size", default="1280x720", help="of images (1280x720)")
+    parser.add_argument("--pairs", type=int, default=5, help="of builds in part rate (5)")
+    parser.add_argument("--again", action="store_true", help="measure what the log has already")
     parser.add_argument("--keep", action="store_true", help="keep the frames")
-    parser.add_argument("--write-docs", action="store_true", help="rewrite the tables of docs/benchmarks.md")
+    parser.add_argument("--write-docs", action="store_true", help="rewrite the tables and the counts from the log")
+    parser.add_argument("--docs", type=pathlib.Path, default=ROOT / "docs" / "benchmarks.md")
+    parser.add_argument("--counts", type=pathlib.Path, default=counts.TABLE)
     options = parser.parse_args()
-    parts = words_of(options.parts, PARTS, parser, "part")
-    models = words_of(options.models, MODELS, parser, "model")
+    options.parts = words_of(options.parts)
+    for part in options.parts:
+        if part not in PARTS:
+            parser.error(f"there is no part {part}; they are {', '.join(PARTS)}")
+    return options
+
+
+def main():
+    options = parse_options()
     options.scratch.mkdir(parents=True, exist_ok=True)
     bench = Bench(options)
-    failures = run_parts(bench, parts, models)
+    failures = run_parts(bench, options.parts, words_of(options.models))
     text = tables.markdown(bench.log.latest())
     print(text)
     if options.write_docs:
-        tables.write_docs(ROOT / "docs" / "benchmarks.md", text)
+        tables.write_docs(options.docs, text)
+        put_counts(bench, options.counts)
     return 1 if failures else 0
 
 

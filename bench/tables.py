@@ -1,20 +1,13 @@
 """From the records of must_show.py to the Markdown tables of docs/benchmarks.md."""
 
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
-
-
-def flat(value):
-    """Every number of nested lists and objects, in order."""
-    if isinstance(value, dict):
-        value = list(value.values())
-    if isinstance(value, (list, tuple)):
-        return [number for part in value for number in flat(part)]
-    return [value]
+PATHS = ("orbit", "flythrough")
+MOST_ROOT_TRIANGLES = 16384
 
 
 def number(value, digits=2):
     if value is None:
-        return "?"
+        return "-"
     if isinstance(value, bool):
         return "yes" if value else "NO"
     if isinstance(value, int):
@@ -22,14 +15,20 @@ def number(value, digits=2):
     return f"{value:,.{digits}f}"
 
 
+def percent(value, digits=3):
+    return "-" if value is None else f"{100 * value:.{digits}f} %"
+
+
 def mebibytes(value):
-    return "?" if value is None else f"{value / 2**20:,.0f} MiB"
+    return f"{value / 2**20:,.0f} MiB"
 
 
-def table(title, header, rows):
+def table(part, title, header, rows):
+    """The command stands with its table: whoever doubts a figure can take it again."""
     if not rows:
         return []
-    lines = [f"### {title}", "", "| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    lines = [f"### {title}", "", f"`bench/must_show.py --data DIR --parts {part}`", "",
+             "| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
     lines += ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
     return lines + [""]
 
@@ -41,30 +40,48 @@ def records_of(records, measure):
 def build_rows(records):
     for record in records_of(records, "build"):
         report = record["report"]
-        yield (record["model"], number(report["triangles_in"]), number(report["triangles_leaf"]),
-               number(report["nodes"]), report["levels"], number(report["root_triangles"]),
-               number(record["bytes_per_triangle"]), mebibytes(record["system_peak_rss_bytes"]),
-               number(record["seconds"], 1))
+        dropped = sum(report["dropped"][kind] for kind in ("nonfinite", "degenerate"))
+        yield (record["model"], number(report["triangles_in"]), number(dropped), number(report["nodes"]), report["levels"],
+               number(report["root_triangles"]), number(record["bytes_per_triangle"]),
+               mebibytes(record["system_peak_rss_bytes"]), number(record["seconds"], 1))
 
 
 def image_rows(records):
-    for path in ("orbit", "flythrough"):
-        psnr = {record["model"]: record for record in records_of(records, f"psnr_{path}")}
+    for path in PATHS:
         for record in records_of(records, f"images_{path}"):
-            compare, filtered = record["compare"], psnr.get(record["model"], {}).get("compare", {})
-            yield (record["model"], path, number(compare.get("coverage_violations")),
-                   number(compare.get("depth_within_share"), 5),
-                   number(filtered.get("psnr_median_db")), number(filtered.get("psnr_min_db")),
-                   number(record["triangles_per_covered_pixel"].get("median")), number(record["max_error_px"]),
-                   number(record["holds"]))
+            compare, covered = record["compare"], record["triangles_per_covered_pixel"]
+            claim = number(record["max_error_px"])
+            if record["unbounded_frames"]:
+                claim += f" (eye within a node's box: {record['unbounded_frames']} frames)"
+            yield (record["model"], path, compare["frames"], number(compare["uncovered_pixels"]),
+                   number(compare["overcovered_pixels"]), percent(compare["depth_within"]), number(covered.get("median")),
+                   number(covered.get("max")), claim, number(compare["holds"]))
+
+
+def psnr_rows(records):
+    for path in PATHS:
+        for record in records_of(records, f"psnr_{path}"):
+            compare = record["compare"]
+            yield (record["model"], path, compare["frames"], number(compare["psnr_median_db"]), number(compare["psnr_min_db"]),
+                   number(compare["psnr_median_db"] >= compare["least_psnr_db"]))
 
 
 def verify_rows(records):
     for record in records_of(records, "verify"):
         report = record["report"]
         yield (record["model"], number(record["holds"]), number(report.get("claimed_over_measured_median")),
-               number(report.get("open_edges")), mebibytes(record["system_peak_rss_bytes"]),
+               number(report.get("claimed_over_measured_least")), f"{report['cracked_cuts']} of {report['cuts']}",
+               number(report["open_edges"]), number(report["clustered_nodes"]), mebibytes(record["system_peak_rss_bytes"]),
                number(record["seconds"], 1))
+
+
+def backend_rows(records):
+    for record in records_of(records, "backends"):
+        for backend, other in record["others"].items():
+            compare = other["compare"]
+            yield (record["model"], f"gl45, {backend}", f"{other['same_frames']} of {compare['frames']}",
+                   number(compare["uncovered_pixels"] + compare["overcovered_pixels"]), percent(compare["depth_within"]),
+                   number(compare["psnr_min_db"]))
 
 
 def rate_rows(records):
@@ -72,33 +89,53 @@ def rate_rows(records):
         for name, label, scale in (("one_core", "one core, M triangles/s", 1e-6),
                                    ("two_cores", "two cores, M triangles/s", 1e-6), ("speedup", "two over one", 1)):
             figures = record[name]
-            yield (record["model"], label, number(figures["max"] * scale), number(figures["median"] * scale),
-                   number(figures["min"] * scale))
+            yield (record["model"], label, figures["count"], number(figures["max"] * scale, 3),
+                   number(figures["median"] * scale, 3), number(figures["min"] * scale, 3))
+
+
+def dependency_rows(records):
+    for record in records_of(records, "dependencies"):
+        for level, plain in zip(record["with_dependencies"]["levels"], record["without_dependencies"]["levels"]):
+            yield (record["model"], level["level"], number(level["nodes"]), number(level["groups"]),
+                   percent(level["locked_share"], 2), percent(plain["locked_share"], 2), number(level["boundary_steps"]),
+                   number(level["base_triangles"]), number(plain["base_triangles"]))
+
+
+def drawn_rows(records):
+    for record in records_of(records, "dependencies"):
+        for path in PATHS:
+            sides = [record[f"{side}_dependencies"]["triangles"][path]["median"] for side in ("with", "without")]
+            yield (record["model"], path, number(int(sides[0])), number(int(sides[1])), number(sides[1] / max(1, sides[0])))
 
 
 def walk_rows(records):
     for record in records_of(records, "walk"):
         for name in ("select_ms", "frame_ms", "triangles", "missing_nodes"):
-            figures = record[name]
-            yield (record["model"], name, number(float(figures["median"])), number(float(figures["q1"])),
-                   number(float(figures["q3"])), number(float(figures["p99"])))
+            figures, digits = record[name], 3 if name.endswith("_ms") else 0
+            yield (record["model"], name, *(number(float(figures[column]), digits) for column in ("median", "q1", "q3", "p99")))
 
 
 def root_rows(records):
     for record in records_of(records, "root"):
-        report = record["report"]
-        yield (record["model"], number(report.get("triangles_in")), number(report.get("root_triangles")),
-               "built" if record["holds"] else record["said"])
+        report, root = record["report"], record["report"].get("root_triangles")
+        yield (record["model"], number(report.get("triangles_in")), number(root),
+               number(root <= MOST_ROOT_TRIANGLES) if record["holds"] else record["said"])
+
+
+def growth_lines(records):
+    for record in records_of(records, "walk"):
+        first, last = record["settings"]["models"][0], record["settings"]["models"][-1]
+        if record["model"] == last and first != last and ("walk", first) in records:
+            ratio = record["frame_ms"]["median"] / records["walk", first]["frame_ms"]["median"]
+            yield f"`frame_ms` from {first} to {last} on one path: x {number(ratio)}."
 
 
 def closing_lines(records):
-    lines = []
-    for record in records_of(records, "growth"):
-        lines.append(f"`frame_ms` from 1 M to 10 M triangles on one path: x {number(record['frame_ms_ratio'])}.")
+    lines = list(growth_lines(records))
     for record in records_of(records, "bytes"):
         jobs = ", ".join(str(jobs) for jobs in record["digests"])
-        lines.append(f"Same bytes for `--jobs` {jobs} ({record['model']}): {number(record['holds'])}.")
-    return lines
+        lines.append(f"Same bytes for `--jobs` {jobs} ({record['model']}, `--parts bytes`): {number(record['holds'])}.")
+    return [text for line in lines for text in (line, "")]
 
 
 def machine_lines(records):
@@ -108,23 +145,36 @@ def machine_lines(records):
                 f"Linux {record['kernel']}, commit {record['commit']}")
         if line not in machines:
             machines.append(line)
-    return [f"Machine: {line}." for line in machines]
+    return [text for line in machines for text in (f"Machine: {line}.", "")]
+
+
+TABLES = (
+    ("build", "Builds", ("model", "triangles in", "dropped", "nodes", "levels", "root triangles", "bytes per triangle",
+                         "peak memory", "seconds"), build_rows),
+    ("images", "Images at one pixel, against the input as read",
+     ("model", "path", "frames", "uncovered", "overcovered", "depth within", "triangles per covered pixel, median", "most",
+      "claimed px, largest", "limits hold"), image_rows),
+    ("psnr", "PSNR at one pixel, `--supersample 4`", ("model", "path", "frames", "median dB", "least dB", "30 dB"), psnr_rows),
+    ("verify", "verify --against", ("model", "holds", "claimed over measured, median", "least", "cracked cuts", "open edges",
+                                    "nodes by clustering", "peak memory", "seconds"), verify_rows),
+    ("backends", "One picture from every renderer", ("model", "renderers", "frames of the same bytes", "coverage violations",
+                                                     "depth within", "PSNR least dB"), backend_rows),
+    ("rate", "Build rate, interleaved pairs", ("model", "figure", "pairs", "best", "median", "worst"), rate_rows),
+    ("dependencies", "Dependencies: each level with and without",
+     ("model", "level", "nodes", "groups", "locked with", "locked without", "boundary steps", "base triangles with",
+      "base triangles without"), dependency_rows),
+    ("dependencies", "Dependencies: triangles drawn at one pixel, median of the path",
+     ("model", "path", "with", "without", "without over with"), drawn_rows),
+    ("walk", "A walk on one smooth path", ("model", "figure", "median", "lower quartile", "upper quartile", "p99"), walk_rows),
+    ("roots", "Roots", ("file", "triangles in", "root triangles", f"at most {MOST_ROOT_TRIANGLES:,}"), root_rows),
+)
 
 
 def markdown(records):
-    lines = machine_lines(records) + [""]
-    lines += table("Builds", ("model", "triangles in", "leaf triangles", "nodes", "levels", "root triangles",
-                              "bytes per triangle", "peak memory", "seconds"), list(build_rows(records)))
-    lines += table("Images at one pixel, against the input as read",
-                   ("model", "path", "coverage violations", "share of depths within", "PSNR median dB", "PSNR minimum dB",
-                    "triangles per covered pixel", "claimed px, largest", "limits hold"), list(image_rows(records)))
-    lines += table("verify --against", ("model", "holds", "claimed over measured, median", "open edges", "peak memory",
-                                        "seconds"), list(verify_rows(records)))
-    lines += table("Build rate, five interleaved pairs", ("model", "figure", "best", "median", "worst"),
-                   list(rate_rows(records)))
-    lines += table("A walk on one smooth path", ("model", "figure", "median", "lower quartile", "upper quartile", "p99"),
-                   list(walk_rows(records)))
-    lines += table("Roots", ("file", "triangles in", "root triangles", "outcome"), list(root_rows(records)))
+    """records: as Log.latest gives them, by (measure, model)."""
+    lines = machine_lines(records)
+    for part, title, header, rows_of in TABLES:
+        lines += table(part, title, header, list(rows_of(records)))
     return "\n".join(lines + closing_lines(records)).rstrip() + "\n"
 
 
