@@ -1,0 +1,110 @@
+#!/usr/bin/env python3
+"""bench/must_show.py measures every part on a small model, keeps what it has, and its tables lack no figure.
+
+usage: test_must_show.py PROGRAM. Nothing here depends on how fast anything is."""
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(os.environ.get("STRL_TEST_ROOT", pathlib.Path(__file__).resolve().parents[2]))
+sys.path.insert(0, str(ROOT / "bench"))
+sys.dont_write_bytecode = True
+import measure
+import sheets
+import tables
+
+MODELS = ("isosurface_3k", "isosurface_6k")
+ONE_EACH = ("build", "images_orbit", "images_flythrough", "psnr_orbit", "psnr_flythrough", "verify", "backends", "rate", "bytes",
+            "dependencies", "walk")
+
+
+class Test:
+    def __init__(self, program, folder):
+        self.program, self.folder, self.failures = program, folder, 0
+        self.data, self.log, self.docs, self.counts = (folder / name for name in ("data", "log.jsonl", "docs.md", "counts.csv"))
+        self.data.mkdir()
+        self.docs.write_text(f"before\n{tables.BEGIN}\nSTALE\n{tables.END}\nafter\n")
+        self.counts.write_text("model,triangles,seed,triangles_in,triangles_leaf,nodes,levels,root_triangles,bytes_out\n")
+
+    def check(self, claim, holds, detail=""):
+        print("%s %s" % ("ok  " if holds else "FAIL", claim))
+        if not holds:
+            self.failures += 1
+            print("     " + str(detail))
+
+    def must_show(self, *words, models=MODELS):
+        command = [sys.executable, "-B", ROOT / "bench" / "must_show.py", "--data", self.data, "--stroll", self.program,
+                   "--scratch", self.folder / "scratch", "--log", self.log, "--docs", self.docs, "--counts", self.counts,
+                   "--models", ",".join(models), "--frames", 2, "--size", "160x90", "--pairs", 1, *words]
+        return subprocess.run([str(word) for word in command], capture_output=True, text=True)
+
+    def test_parts(self):
+        subprocess.run([self.program, "scene", "plain-plane", "--triangles", "2K", "-o", self.data / "plane.ply", "--quiet"],
+                       check=True)
+        result = self.must_show("--write-docs", "--psnr-frames", 1)
+        self.check("every part is measured", result.returncode == 0, result.stderr)
+        records = measure.Log(self.log, {}).latest()
+        wanted = {(name, model) for name in ONE_EACH for model in MODELS} | {("root", "plane")}
+        self.check("each record is there", set(records) == wanted, set(records) ^ wanted)
+        said = {record["settings"].get("frames") for (name, _), record in records.items() if name.startswith("psnr")}
+        self.check("the frames of a part stand in its record", said == {1}, said)
+
+    def test_tables(self):
+        text = self.docs.read_text()
+        parts = text.split("### ")[1:]
+        self.check("the tables replace the old ones", text.startswith("before\n") and text.endswith("\nafter\n") and
+                   "STALE" not in text, text)
+        self.check("each table is there", len(parts) == len(tables.TABLES), [part.split("\n")[0] for part in parts])
+        for part in parts:
+            title, rows = part.split("\n")[0], [line for line in part.split("\n") if line.startswith("| ")]
+            cells = [cell.strip() for row in rows for cell in row.strip("|").split("|")]
+            self.check(f"no figure of \"{title}\" is missing", len(rows) > 1 and "-" not in cells and "" not in cells, rows)
+        counted = [line.split(",")[0] for line in self.counts.read_text().splitlines()[1:]]
+        self.check("counts are written", counted == ["isosurface", "isosurface", "plane"], counted)
+
+    def test_sheet(self):
+        rows = sheets.read_png(self.folder / "scratch" / "sheets" / f"{MODELS[0]}_orbit.png")
+        width = len(rows[0]) // 9  # three pictures of three bytes a pixel
+        left, middle, right = (b"".join(bytes(row[3 * width * i:3 * width * (i + 1)]) for row in rows) for i in range(3))
+        self.check("a sheet shows reference, ours and their difference", len(set(left)) > 20 and
+                   all(c == min(255, sheets.GAIN * abs(a - b)) for a, b, c in zip(left, middle, right)), len(rows))
+
+    def test_png(self):
+        picture = [bytearray((x * y * 7 + x * c) % 256 for x in range(9) for c in range(3)) for y in range(5)]
+        sheets.write_png(self.folder / "a.png", picture)
+        self.check("a picture comes back", sheets.read_png(self.folder / "a.png") == picture)
+
+    def test_resume(self):
+        lines = len(self.log.read_text().splitlines())
+        result = self.must_show("--parts", "build,images,verify")
+        self.check("what is there is kept", result.returncode == 0 and result.stdout.count(": kept") == 8 and
+                   len(self.log.read_text().splitlines()) == lines, result.stdout)
+        result = self.must_show("--parts", "build", "--again", models=MODELS[:1])
+        self.check("--again measures anew", result.returncode == 0 and len(self.log.read_text().splitlines()) == lines + 1,
+                   result.stderr)
+        old = [json.loads(line) for line in self.log.read_text().splitlines()]
+        self.log.write_text("".join(json.dumps({**record, "program": "another"}) + "\n" for record in old))
+        result = self.must_show("--parts", "build", models=MODELS[:1])
+        self.check("another program's records are not kept", ": kept" not in result.stdout, result.stdout)
+
+    def test_refusals(self):
+        result = self.must_show("--parts", "build", models=("missing",))
+        self.check("a model that is not there is named", result.returncode == 1 and "missing.ply" in result.stderr, result.stderr)
+        result = self.must_show("--parts", "sprint")
+        self.check("an unknown part is wrong usage", result.returncode == 2, result.stderr)
+
+
+def main():
+    program = os.path.abspath(sys.argv[1])
+    with tempfile.TemporaryDirectory() as folder:
+        test = Test(program, pathlib.Path(folder))
+        for part in (test.test_parts, test.test_tables, test.test_sheet, test.test_png, test.test_resume, test.test_refusals):
+            part()
+        return 1 if test.failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
