@@ -10,7 +10,7 @@ A model is a file of DIR (NAME.ply, .stl, .obj, or those with .zst) or isosurfac
     images        orbit and fly-through against the input as read: coverage, depth; sheets        (all models)
     psnr          the same paths with --supersample 4                                             (all models)
     verify        verify --against the input                                                      (all models)
-    backends      gl45 against gl3 and OpenGL ES on an orbit                                      (dragon_scans, isosurface_1m)
+    backends      gl45 against gl3 and OpenGL ES on an orbit                           (dragon_scans, isosurface_1m)
     rate          five interleaved pairs of builds on one core and on two                         (isosurface_10m)
     bytes         the same container for --jobs 1, 2, 3 and 8                                     (isosurface_1m)
     dependencies  with and without: locked vertices per level, triangles drawn at one pixel       (isosurface_10m)
@@ -114,8 +114,9 @@ def part_build(bench, model):
     source, container = bench.input_of(model), bench.scratch / f"{model}.stroll"
     outcome = bench.program("build", source, "-o", container, "--memory", "1G", "--json")
     report = outcome.json()
-    bench.log.add("build", model, {}, report=report, seconds=outcome.seconds, system_peak_rss_bytes=outcome.peak_rss_bytes,
-                  bytes_per_triangle=report["bytes_out"] / max(1, report["triangles_in"]), bytes_in=source.stat().st_size)
+    bench.log.add("build", model, {}, report=report, seconds=outcome.seconds, bytes_in=source.stat().st_size,
+                  system_peak_rss_bytes=outcome.peak_rss_bytes,
+                  bytes_per_triangle=report["bytes_out"] / max(1, report["triangles_in"]))
 
 
 def compare_pair(bench, model, path, frames, options, limits, sheet=None):
@@ -141,8 +142,9 @@ def part_images(bench, model):
         compared, stats, times = compare_pair(bench, model, path, settings["frames"], ("--depth",), ("--psnr", 0), sheet)
         covered = [frame["triangles"] / frame["covered_pixels"] for frame in stats if frame["covered_pixels"]]
         claims = [frame["max_error_px"] for frame in stats if frame["max_error_px"] is not None]
-        bench.log.add(f"images_{path}", model, settings, compare=compared, triangles_per_covered_pixel=measure.spread(covered),
-                      max_error_px=max(claims, default=None), unbounded_frames=len(stats) - len(claims), **times)
+        bench.log.add(f"images_{path}", model, settings, compare=compared, max_error_px=max(claims, default=None),
+                      unbounded_frames=len(stats) - len(claims),
+                      triangles_per_covered_pixel=measure.spread(covered), **times)
 
 
 def part_psnr(bench, model):
@@ -214,7 +216,8 @@ def part_bytes(bench, model):
 
 def level_facts(bench, container):
     facts = bench.program("info", container, "--json").json()["trees"][0]
-    names = ("level", "nodes", "groups", "base_vertices", "shared_vertices", "locked_share", "boundary_steps", "base_triangles")
+    names = ("level", "nodes", "groups", "base_vertices", "shared_vertices", "locked_share", "boundary_steps",
+             "base_triangles")
     return [{name: level[name] for name in names} for level in facts["per_level"]]
 
 
@@ -228,12 +231,13 @@ def part_dependencies(bench, model):
                for name, container in sides.items()}
     cameras, stats = bench.scratch / f"{model}_path.json", bench.scratch / f"{model}_dependencies.jsonl"
     for path in PATHS:
-        bench.program("render", sides["with"], "--path", path, "--frames", settings["frames"], "--seed", 1, "--size", "64x36",
-                      "--save-path", cameras)
+        bench.program("render", sides["with"], "--path", path, "--frames", settings["frames"], "--seed", 1,
+                      "--size", "64x36", "--save-path", cameras)
         for name, container in sides.items():
-            bench.program("render", container, "--path", cameras, "--size", settings["size"], "--error", 1, "--backend", "null",
-                          "--stats", stats)
-            figures[name]["triangles"][path] = measure.spread([frame["triangles"] for frame in measure.read_lines(stats)])
+            bench.program("render", container, "--path", cameras, "--size", settings["size"], "--error", 1,
+                          "--backend", "null", "--stats", stats)
+            drawn = [frame["triangles"] for frame in measure.read_lines(stats)]
+            figures[name]["triangles"][path] = measure.spread(drawn)
     bench.log.add("dependencies", model, settings, **{f"{name}_dependencies": figure for name, figure in figures.items()})
 
 
