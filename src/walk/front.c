@@ -1,209 +1,18 @@
 /* The cut through the trees (Quick-VDR 5.1, 5.2), found anew from the roots in each frame, level by
- * level, dependency group by dependency group. A group's error and box hold those of its children's
- * groups, so what a level decides the next one never contradicts; should a file say otherwise, a
- * group that is not complete stays coarse, and the cut is whole all the same. */
-#include "walk/internal.h"
+ * level, dependency group by dependency group. What a level decides the next one never contradicts
+ * (closure.c); should a file's bounds be wrong, a group that is not complete stays coarse, and the cut
+ * is whole all the same. */
+#include "walk/descent.h"
 
 #include <math.h>
-#include <string.h>
 
-#include "base/hash.h"
+#define PREFETCH_SHARE 1e-3 /* what may be wanted later comes after all that is wanted now */
 
-/* Urgencies: records come before the nodes that they describe; what may be wanted later comes after
- * all that is wanted now. */
-#define RECORDS_FIRST 4.0
-#define PREFETCH_SHARE 1e-3
-#define MOST_URGENT 1e30
-
-typedef struct context {
-    strl_walk *walk;
-    strl__cut *cut;
-    uint32_t index; /* of the placement */
-    const strl__placement *placement;
-    const strl_tree *tree;
-    strl_error *err;
-} context;
-
-static strl_status no_memory(strl_error *err)
-{
-    return strl__fail(err, STRL_ERR_MEMORY, "no memory to refine the front");
-}
-
-/* ---- projected errors */
-
-strl_box strl__world_box(const strl_tree *tree, const strl__placement *placement, const int64_t min[3],
-                         const int64_t max[3])
-{
-    strl_box box;
-    for (int row = 0; row < 3; row++) {
-        const double *m = placement->transform + 4 * row;
-        box.min[row] = box.max[row] = m[3];
-        for (int i = 0; i < 3; i++) {
-            double a = m[i] * (tree->origin[i] + tree->step * (double)min[i]);
-            double b = m[i] * (tree->origin[i] + tree->step * (double)max[i]);
-            box.min[row] += a < b ? a : b;
-            box.max[row] += a < b ? b : a;
-        }
-    }
-    return box;
-}
-
-static double group_px(const context *c, const strl_node *record)
-{
-    strl_box box = strl__world_box(c->tree, c->placement, record->group_box_min, record->group_box_max);
-    double error = fmaxf(record->group_geometric, record->group_appearance);
-    return strl_view_error_px(c->cut->view, &box, error * c->placement->length_scale);
-}
-
-static bool asks_itself(const context *c, const strl_node *record)
-{
-    strl_box box = strl__world_box(c->tree, c->placement, record->box_min, record->box_max);
-    double error = fmaxf(record->geometric_min, record->appearance_min);
-    return strl_view_error_px(c->cut->view, &box, error * c->placement->length_scale) > c->cut->allowed_px;
-}
-
-/* ---- lists */
-
-static bool add_visit(strl__visits *visits, strl__node *node, bool active)
-{
-    if (!strl__grow(&visits->items, &visits->capacity, visits->count + 1, sizeof *visits->items))
-        return false;
-    visits->items[visits->count++] = (strl__visit){node, STRL_NONE, active};
-    return true;
-}
-
-static bool add_node(strl__nodes *nodes, strl__node *node)
-{
-    if (!strl__grow(&nodes->items, &nodes->capacity, nodes->count + 1, sizeof *nodes->items))
-        return false;
-    nodes->items[nodes->count++] = node;
-    return true;
-}
-
-static bool add_candidate(strl__candidates *candidates, strl__node *node, uint32_t treelet, double urgency)
-{
-    if (!strl__grow(&candidates->items, &candidates->capacity, candidates->count + 1, sizeof *candidates->items))
-        return false;
-    candidates->items[candidates->count++] = (strl__candidate){(float)fmin(urgency, MOST_URGENT), treelet, node};
-    return true;
-}
-
-/* ---- children */
-
-typedef enum outlook { HERE, RECORDS_ABSENT, BACKING_OFF } outlook;
-
-/* True where a file's records contradict each other: the child is another node's. */
-static bool is_foreign(const strl_node *parent, uint32_t parent_id, const strl_node *child)
-{
-    return child->parent != parent_id || child->level + 1 != parent->level;
-}
-
-static uint32_t id_of(const strl__node *node)
-{
-    return node->treelet->data.first_node + (uint32_t)(node - node->treelet->nodes);
-}
-
-static void check_child(strl_walk *walk, const strl__node *parent, strl__node *child)
-{
-    if (!is_foreign(parent->record, id_of(parent), child->record) || child->retry.frame > walk->frame)
-        return;
-    strl_error error = {0};
-    strl__fail(&error, STRL_ERR_FORMAT, "tree %u: node %u is not the child of node %u that it is said to be",
-               parent->treelet->tree, id_of(child), id_of(parent));
-    strl__back_off(walk, &child->retry);
-    strl__note_fault(walk, &error);
-}
-
-/* The records of one child, or a candidate for the treelet that has them. */
-static outlook find_child(context *c, strl__node *parent, uint32_t id, double urgency, strl__candidates *to,
-                          strl__node **child)
-{
-    strl_walk *walk = c->walk;
-    *child = strl__node_find(walk, parent->treelet->tree, id);
-    if (*child) {
-        check_child(walk, parent, *child);
-        bool waiting = (*child)->residency == STRL__ABSENT && (*child)->retry.frame > walk->frame;
-        if (waiting && (*child)->retry.failures < STRL__GIVE_UP_FAILURES)
-            c->cut->waits = true;
-        return waiting ? BACKING_OFF : HERE;
-    }
-    const strl__treelet *treelet = strl__treelets_find(&walk->treelets, parent->treelet->tree, id / STRL_TREELET_NODES);
-    if (treelet && treelet->residency == STRL__ABSENT && treelet->retry.frame > walk->frame) {
-        c->cut->waits |= treelet->retry.failures < STRL__GIVE_UP_FAILURES;
-        return BACKING_OFF;
-    }
-    c->cut->waits = true;
-    add_candidate(to, parent, id / STRL_TREELET_NODES, urgency); /* without memory it is asked for in a later frame */
-    return RECORDS_ABSENT;
-}
-
-/* Collects the children of all members in walk->children. The worst outlook of any. */
-static strl_status find_children(context *c, const strl__group *group, double urgency, strl__candidates *to,
-                                 outlook *worst)
-{
-    strl_walk *walk = c->walk;
-    walk->children.count = 0;
-    *worst = HERE;
-    for (uint32_t i = group->first; i != STRL_NONE; i = walk->level.items[i].next) {
-        strl__node *parent = walk->level.items[i].node;
-        for (uint32_t k = 0; k < parent->record->child_count; k++) {
-            strl__node *child;
-            outlook found = find_child(c, parent, parent->record->first_child + k, urgency * RECORDS_FIRST, to, &child);
-            *worst = found > *worst ? found : *worst;
-            if (child && !add_node(&walk->children, child))
-                return no_memory(c->err);
-        }
-    }
-    return STRL_OK;
-}
-
-/* ---- groups */
-
-static strl_status gather_groups(strl_walk *walk, strl_error *err)
-{
-    strl__groups *groups = &walk->groups;
-    size_t size = 16;
-    while (size < 2 * walk->level.count)
-        size *= 2;
-    if (!strl__grow(&groups->table, &groups->table_capacity, size, sizeof *groups->table) ||
-        !strl__grow(&groups->items, &groups->capacity, walk->level.count, sizeof *groups->items))
-        return no_memory(err);
-    memset(groups->table, 0, size * sizeof *groups->table);
-    groups->count = 0;
-    for (uint32_t i = 0; i < walk->level.count; i++) {
-        uint32_t id = walk->level.items[i].node->record->group;
-        size_t slot = (size_t)strl__mix64(id) & (size - 1);
-        while (groups->table[slot] && groups->items[groups->table[slot] - 1].id != id)
-            slot = (slot + 1) & (size - 1);
-        if (!groups->table[slot]) {
-            groups->items[groups->count++] = (strl__group){id, i, i, 1};
-            groups->table[slot] = (uint32_t)groups->count;
-            continue;
-        }
-        strl__group *group = &groups->items[groups->table[slot] - 1];
-        walk->level.items[group->last].next = i;
-        group->last = i;
-        group->members++;
-    }
-    return STRL_OK;
-}
-
-static bool is_complete(const strl_walk *walk, const strl__group *group)
-{
-    uint32_t size = walk->level.items[group->first].node->record->group_size;
-    for (uint32_t i = group->first; i != STRL_NONE; i = walk->level.items[i].next) {
-        const strl_node *record = walk->level.items[i].node->record;
-        if (record->child_count == 0 || record->group_size != size)
-            return false;
-    }
-    return group->members == size;
-}
-
-static strl_status add_active(context *c, strl__node *node)
+static strl_status add_active(strl__descent *c, strl__node *node)
 {
     strl__front *front = &c->walk->front;
     if (!strl__grow(&front->items, &front->capacity, front->count + 1, sizeof *front->items))
-        return no_memory(c->err);
+        return strl__no_memory(c->err);
     strl__active *active = &front->items[front->count++];
     *active = (strl__active){.node = node, .placement = c->index};
     active->box = strl__world_box(c->tree, c->placement, node->record->box_min, node->record->box_max);
@@ -212,21 +21,21 @@ static strl_status add_active(context *c, strl__node *node)
 }
 
 /* One level below the front is worth having (5.5.1): a split then does not wait. */
-static strl_status prefetch_children(context *c, const strl__group *group, double px)
+static strl_status prefetch_children(strl__descent *c, const strl__group *group, double px)
 {
     strl_walk *walk = c->walk;
-    outlook worst;
+    strl__outlook worst;
     double urgency = PREFETCH_SHARE * px / c->cut->allowed_px;
     bool waits = c->cut->waits; /* no frame waits for what it does not want */
-    strl_status status = find_children(c, group, urgency, &walk->prefetch, &worst);
+    strl_status status = strl__find_children(c, group, urgency, &walk->prefetch, &worst);
     c->cut->waits = waits;
-    for (size_t i = 0; status == STRL_OK && worst == HERE && i < walk->children.count; i++) {
+    for (size_t i = 0; status == STRL_OK && worst == STRL__HERE && i < walk->children.count; i++) {
         strl__node *child = walk->children.items[i];
         if (child->residency == STRL__PENDING)
             child->request->touched_frame = walk->frame;
-        else if (child->residency == STRL__RESIDENT ? !add_node(&walk->ahead, child)
-                                                    : !add_candidate(&walk->prefetch, child, STRL_NONE, urgency))
-            status = no_memory(c->err);
+        else if (child->residency == STRL__RESIDENT ? !strl__add_node(&walk->ahead, child)
+                                                    : !strl__add_candidate(&walk->prefetch, child, STRL_NONE, urgency))
+            status = strl__no_memory(c->err);
     }
     return status;
 }
@@ -241,7 +50,7 @@ static uint32_t count_inactive(const strl_walk *walk, const strl__group *group)
 
 /* The group is not split: those of its members that are active are the front. `missing` of the
  * wanted nodes are not there. */
-static strl_status stay(context *c, const strl__group *group, uint32_t missing)
+static strl_status stay(strl__descent *c, const strl__group *group, uint32_t missing)
 {
     strl_walk *walk = c->walk;
     c->cut->missing += missing;
@@ -278,76 +87,76 @@ static bool is_ready(const strl_walk *walk, const strl__group *group)
 }
 
 /* What the cut does with a child besides descending into it. */
-static bool want_child(context *c, strl__node *child, double px)
+static bool want_child(strl__descent *c, strl__node *child, double px)
 {
     strl_walk *walk = c->walk;
     bool front = c->cut->kind == STRL__CUT_FRONT;
     if (c->cut->kind == STRL__CUT_PROBE)
         return true;
-    if (front && !add_node(&walk->wanted, child))
+    if (front && !strl__add_node(&walk->wanted, child))
         return false;
     if (child->residency == STRL__RESIDENT)
-        return front || add_node(&walk->ahead, child);
+        return front || strl__add_node(&walk->ahead, child);
     c->cut->waits = true;
     if (child->residency == STRL__PENDING) {
         child->request->touched_frame = walk->frame;
         return true;
     }
-    return front ? add_candidate(&walk->missing, child, STRL_NONE, px)
-                 : add_candidate(&walk->prefetch, child, STRL_NONE, PREFETCH_SHARE * px / c->cut->allowed_px);
+    return front ? strl__add_candidate(&walk->missing, child, STRL_NONE, px)
+                 : strl__add_candidate(&walk->prefetch, child, STRL_NONE, PREFETCH_SHARE * px / c->cut->allowed_px);
 }
 
-static strl_status note_split(context *c, const strl__group *group)
+static strl_status note_split(strl__descent *c, const strl__group *group)
 {
     strl__splits *split = &c->walk->split;
     if (c->cut->kind != STRL__CUT_FRONT)
         return STRL_OK;
     if (!strl__grow(&split->items, &split->capacity, split->count + group->members, sizeof *split->items))
-        return no_memory(c->err);
+        return strl__no_memory(c->err);
     for (uint32_t i = group->first; i != STRL_NONE; i = c->walk->level.items[i].next) {
         strl__node *node = c->walk->level.items[i].node;
-        bool by_group = group->members > 1 && !asks_itself(c, node->record);
+        bool by_group = group->members > 1 && !strl__asks_itself(c, node->record);
         split->items[split->count++] = (strl__split){node, by_group};
     }
     return STRL_OK;
 }
 
 /* The group is to split, and its children's records are in walk->children. */
-static strl_status descend(context *c, const strl__group *group, double px)
+static strl_status descend(strl__descent *c, const strl__group *group, double px)
 {
     strl_walk *walk = c->walk;
     bool ready = is_ready(walk, group);
     for (size_t i = 0; i < walk->children.count; i++) {
         strl__node *child = walk->children.items[i];
         child->counted_pass = walk->pass;
-        if (!want_child(c, child, px) || !add_visit(&walk->below, child, ready))
-            return no_memory(c->err);
+        if (!want_child(c, child, px) || !strl__add_visit(&walk->below, child, ready))
+            return strl__no_memory(c->err);
     }
     return ready ? note_split(c, group) : stay(c, group, 0);
 }
 
-static strl_status keep(context *c, const strl__group *group, bool complete, double px)
+static strl_status keep(strl__descent *c, const strl__group *group, bool complete, double px)
 {
     bool ahead = complete && px > 0 && c->cut->kind == STRL__CUT_FRONT;
     strl_status status = ahead ? prefetch_children(c, group, px) : STRL_OK;
     return status == STRL_OK ? stay(c, group, count_inactive(c->walk, group)) : status;
 }
 
-static strl_status visit_group(context *c, const strl__group *group)
+static strl_status visit_group(strl__descent *c, const strl__group *group)
 {
     strl_walk *walk = c->walk;
     strl__cut *cut = c->cut;
-    bool complete = is_complete(walk, group), front = cut->kind == STRL__CUT_FRONT;
-    double px = group_px(c, walk->level.items[group->first].node->record);
-    if (!complete || !(px > cut->allowed_px))
+    bool complete = strl__is_complete(walk, group), front = cut->kind == STRL__CUT_FRONT;
+    double px = strl__group_px(c, walk->level.items[group->first].node->record);
+    if (!complete || !strl__is_asked_for(walk, walk->level.items[group->first].node->record->group))
         return keep(c, group, complete, px);
-    outlook worst;
+    strl__outlook worst;
     strl_status status =
-        find_children(c, group, front ? px : PREFETCH_SHARE * px, front ? &walk->missing : &walk->prefetch, &worst);
+        strl__find_children(c, group, front ? px : PREFETCH_SHARE * px, front ? &walk->missing : &walk->prefetch, &worst);
     if (status != STRL_OK)
         return status;
-    cut->records_missing |= worst == RECORDS_ABSENT;
-    if (worst != HERE)
+    cut->records_missing |= worst == STRL__RECORDS_ABSENT;
+    if (worst != STRL__HERE)
         return stay(c, group, group->members);
     uint64_t bytes = new_bytes(walk);
     if (cut->bytes > cut->capacity_bytes || bytes > cut->capacity_bytes - cut->bytes) {
@@ -360,11 +169,11 @@ static strl_status visit_group(context *c, const strl__group *group)
 
 /* ---- traversal */
 
-static strl_status visit_levels(context *c)
+static strl_status visit_levels(strl__descent *c)
 {
     strl_walk *walk = c->walk;
     while (walk->level.count > 0 && !c->cut->overflow) {
-        strl_status status = gather_groups(walk, c->err);
+        strl_status status = strl__gather_groups(walk, c->err);
         walk->below.count = 0;
         for (size_t i = 0; status == STRL_OK && i < walk->groups.count && !c->cut->overflow; i++)
             status = visit_group(c, &walk->groups.items[i]);
@@ -377,16 +186,18 @@ static strl_status visit_levels(context *c)
     return STRL_OK;
 }
 
-static strl_status visit_placement(context *c)
+static strl_status visit_placement(strl__descent *c)
 {
     strl_walk *walk = c->walk;
     strl__node *root = walk->trees[c->placement->tree].root;
     root->treelet->touched_frame = walk->frame;
-    walk->level.count = 0;
-    if (c->cut->kind == STRL__CUT_FRONT && !add_node(&walk->wanted, root))
-        return no_memory(c->err);
-    if (!add_visit(&walk->level, root, true))
-        return no_memory(c->err);
+    strl_status status = strl__find_demands(c, root);
+    if (status != STRL_OK)
+        return status;
+    if (c->cut->kind == STRL__CUT_FRONT && !strl__add_node(&walk->wanted, root))
+        return strl__no_memory(c->err);
+    if (!strl__add_visit(&walk->level, root, true))
+        return strl__no_memory(c->err);
     return visit_levels(c);
 }
 
@@ -401,7 +212,7 @@ strl_status strl__cut_run(strl_walk *walk, strl__cut *cut, strl_error *err)
     strl_status status = STRL_OK;
     for (uint32_t i = 0; status == STRL_OK && i < walk->placement_count && !cut->overflow; i++) {
         const strl__placement *placement = &walk->placements[i];
-        context c = {walk, cut, i, placement, walk->trees[placement->tree].tree, err};
+        strl__descent c = {walk, cut, i, placement, walk->trees[placement->tree].tree, err};
         status = visit_placement(&c);
     }
     return status;

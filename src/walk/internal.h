@@ -1,7 +1,7 @@
 /* What the files of walk/ share.
  *
- * A frame runs: answers and finished decodes (requests.c) -> the cut that the camera wants and the
- * part of it that residency allows (front.c, under budget.c's allowed error) -> states of the
+ * A frame runs: answers and finished decodes (requests.c) -> the groups that must split for the camera (closure.c) and the part of
+ * that cut that residency allows (front.c, under budget.c's allowed error) -> states of the
  * front's meshes (refine.c) -> reads for what is missing (requests.c over residency.c) -> draw list
  * (draw.c).
  *
@@ -161,8 +161,9 @@ typedef struct strl__splits {
 /* A node at the level in work. */
 typedef struct strl__visit {
     strl__node *node;
-    uint32_t next; /* next member of its group, STRL_NONE at the end */
-    bool active;   /* false: wanted, but its parents could not split yet */
+    uint32_t next;  /* next member of its group, STRL_NONE at the end */
+    uint32_t above; /* demand of its parent's group, STRL_NONE for a root; while demands are looked for */
+    bool active;    /* false: wanted, but its parents could not split yet */
 } strl__visit;
 
 typedef struct strl__visits {
@@ -180,6 +181,27 @@ typedef struct strl__groups {
     uint32_t *table; /* index of a group + 1, by hash of its id */
     size_t table_capacity;
 } strl__groups;
+
+typedef struct strl__demand {
+    uint32_t group;
+    bool asked; /* to split */
+} strl__demand;
+
+/* `below` can split only where `above` does; indices of demands, above < below. */
+typedef struct strl__need {
+    uint32_t above, below;
+} strl__need;
+
+/* Groups of one placement that a frame may have to split. */
+typedef struct strl__demands {
+    strl__demand *items;
+    uint32_t count;
+    size_t capacity;
+    strl__need *needs;
+    size_t need_count, need_capacity;
+    uint32_t *table; /* index of a demand + 1, by hash of its group */
+    size_t table_mask, table_capacity;
+} strl__demands;
 
 typedef struct strl__active {
     strl__node *node;
@@ -244,6 +266,7 @@ struct strl_walk {
 
     strl__visits level, below; /* scratch of a traversal */
     strl__groups groups;
+    strl__demands demands;
     strl__nodes children;             /* of the group in work */
     strl__nodes wanted;               /* the wanted cut and all above it */
     strl__nodes ahead;                /* resident, likely to be wanted soon */

@@ -1,0 +1,183 @@
+#include "walk/descent.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/hash.h"
+
+/* Urgencies: records come before the nodes that they describe. */
+#define RECORDS_FIRST 4.0
+#define MOST_URGENT 1e30
+
+strl_status strl__no_memory(strl_error *err)
+{
+    return strl__fail(err, STRL_ERR_MEMORY, "no memory to refine the front");
+}
+
+/* ---- projected errors */
+
+strl_box strl__world_box(const strl_tree *tree, const strl__placement *placement, const int64_t min[3],
+                         const int64_t max[3])
+{
+    strl_box box;
+    for (int row = 0; row < 3; row++) {
+        const double *m = placement->transform + 4 * row;
+        box.min[row] = box.max[row] = m[3];
+        for (int i = 0; i < 3; i++) {
+            double a = m[i] * (tree->origin[i] + tree->step * (double)min[i]);
+            double b = m[i] * (tree->origin[i] + tree->step * (double)max[i]);
+            box.min[row] += a < b ? a : b;
+            box.max[row] += a < b ? b : a;
+        }
+    }
+    return box;
+}
+
+double strl__group_px(const strl__descent *c, const strl_node *record)
+{
+    strl_box box = strl__world_box(c->tree, c->placement, record->group_box_min, record->group_box_max);
+    double error = fmaxf(record->group_geometric, record->group_appearance);
+    return strl_view_error_px(c->cut->view, &box, error * c->placement->length_scale);
+}
+
+bool strl__asks_itself(const strl__descent *c, const strl_node *record)
+{
+    strl_box box = strl__world_box(c->tree, c->placement, record->box_min, record->box_max);
+    double error = fmaxf(record->geometric_min, record->appearance_min);
+    return strl_view_error_px(c->cut->view, &box, error * c->placement->length_scale) > c->cut->allowed_px;
+}
+
+/* ---- lists */
+
+bool strl__add_visit(strl__visits *visits, strl__node *node, bool active)
+{
+    if (!strl__grow(&visits->items, &visits->capacity, visits->count + 1, sizeof *visits->items))
+        return false;
+    visits->items[visits->count++] = (strl__visit){node, STRL_NONE, STRL_NONE, active};
+    return true;
+}
+
+bool strl__add_node(strl__nodes *nodes, strl__node *node)
+{
+    if (!strl__grow(&nodes->items, &nodes->capacity, nodes->count + 1, sizeof *nodes->items))
+        return false;
+    nodes->items[nodes->count++] = node;
+    return true;
+}
+
+bool strl__add_candidate(strl__candidates *candidates, strl__node *node, uint32_t treelet, double urgency)
+{
+    if (!strl__grow(&candidates->items, &candidates->capacity, candidates->count + 1, sizeof *candidates->items))
+        return false;
+    candidates->items[candidates->count++] = (strl__candidate){(float)fmin(urgency, MOST_URGENT), treelet, node};
+    return true;
+}
+
+/* ---- children */
+
+/* True where a file's records contradict each other: the child is another node's. */
+static bool is_foreign(const strl_node *parent, uint32_t parent_id, const strl_node *child)
+{
+    return child->parent != parent_id || child->level + 1 != parent->level;
+}
+
+static uint32_t id_of(const strl__node *node)
+{
+    return node->treelet->data.first_node + (uint32_t)(node - node->treelet->nodes);
+}
+
+static void check_child(strl_walk *walk, const strl__node *parent, strl__node *child)
+{
+    if (!is_foreign(parent->record, id_of(parent), child->record) || child->retry.frame > walk->frame)
+        return;
+    strl_error error = {0};
+    strl__fail(&error, STRL_ERR_FORMAT, "tree %u: node %u is not the child of node %u that it is said to be",
+               parent->treelet->tree, id_of(child), id_of(parent));
+    strl__back_off(walk, &child->retry);
+    strl__note_fault(walk, &error);
+}
+
+/* The records of one child, or a candidate for the treelet that has them. */
+static strl__outlook find_child(strl__descent *c, strl__node *parent, uint32_t id, double urgency, strl__candidates *to,
+                          strl__node **child)
+{
+    strl_walk *walk = c->walk;
+    *child = strl__node_find(walk, parent->treelet->tree, id);
+    if (*child) {
+        check_child(walk, parent, *child);
+        bool waiting = (*child)->residency == STRL__ABSENT && (*child)->retry.frame > walk->frame;
+        if (waiting && (*child)->retry.failures < STRL__GIVE_UP_FAILURES)
+            c->cut->waits = true;
+        return waiting ? STRL__BACKING_OFF : STRL__HERE;
+    }
+    const strl__treelet *treelet = strl__treelets_find(&walk->treelets, parent->treelet->tree, id / STRL_TREELET_NODES);
+    if (treelet && treelet->residency == STRL__ABSENT && treelet->retry.frame > walk->frame) {
+        c->cut->waits |= treelet->retry.failures < STRL__GIVE_UP_FAILURES;
+        return STRL__BACKING_OFF;
+    }
+    c->cut->waits = true;
+    strl__add_candidate(to, parent, id / STRL_TREELET_NODES, urgency); /* without memory it is asked for in a later frame */
+    return STRL__RECORDS_ABSENT;
+}
+
+/* Collects the children of all members in walk->children. The worst strl__outlook of any. */
+strl_status strl__find_children(strl__descent *c, const strl__group *group, double urgency, strl__candidates *to,
+                                 strl__outlook *worst)
+{
+    strl_walk *walk = c->walk;
+    walk->children.count = 0;
+    *worst = STRL__HERE;
+    for (uint32_t i = group->first; i != STRL_NONE; i = walk->level.items[i].next) {
+        strl__node *parent = walk->level.items[i].node;
+        for (uint32_t k = 0; k < parent->record->child_count; k++) {
+            strl__node *child;
+            strl__outlook found = find_child(c, parent, parent->record->first_child + k, urgency * RECORDS_FIRST, to, &child);
+            *worst = found > *worst ? found : *worst;
+            if (child && !strl__add_node(&walk->children, child))
+                return strl__no_memory(c->err);
+        }
+    }
+    return STRL_OK;
+}
+
+/* ---- groups */
+
+strl_status strl__gather_groups(strl_walk *walk, strl_error *err)
+{
+    strl__groups *groups = &walk->groups;
+    size_t size = 16;
+    while (size < 2 * walk->level.count)
+        size *= 2;
+    if (!strl__grow(&groups->table, &groups->table_capacity, size, sizeof *groups->table) ||
+        !strl__grow(&groups->items, &groups->capacity, walk->level.count, sizeof *groups->items))
+        return strl__no_memory(err);
+    memset(groups->table, 0, size * sizeof *groups->table);
+    groups->count = 0;
+    for (uint32_t i = 0; i < walk->level.count; i++) {
+        uint32_t id = walk->level.items[i].node->record->group;
+        size_t slot = (size_t)strl__mix64(id) & (size - 1);
+        while (groups->table[slot] && groups->items[groups->table[slot] - 1].id != id)
+            slot = (slot + 1) & (size - 1);
+        if (!groups->table[slot]) {
+            groups->items[groups->count++] = (strl__group){id, i, i, 1};
+            groups->table[slot] = (uint32_t)groups->count;
+            continue;
+        }
+        strl__group *group = &groups->items[groups->table[slot] - 1];
+        walk->level.items[group->last].next = i;
+        group->last = i;
+        group->members++;
+    }
+    return STRL_OK;
+}
+
+bool strl__is_complete(const strl_walk *walk, const strl__group *group)
+{
+    uint32_t size = walk->level.items[group->first].node->record->group_size;
+    for (uint32_t i = group->first; i != STRL_NONE; i = walk->level.items[i].next) {
+        const strl_node *record = walk->level.items[i].node->record;
+        if (record->child_count == 0 || record->group_size != size)
+            return false;
+    }
+    return group->members == size;
+}
