@@ -12,7 +12,7 @@
 
 #define DEFAULT_BUFFER_BYTES ((size_t)256 << 10)
 /* A multiple of every common block size, and large enough to keep punching off the profile. */
-#define DROP_STEP_BYTES ((uint64_t)64 << 10)
+#define DROP_STEP_BYTES ((uint64_t)16 << 10)
 
 struct strl_spill_set {
     char *directory; /* owned */
@@ -34,8 +34,10 @@ struct strl_spill {
     size_t buffer_bytes;
     size_t buffered;
     _Atomic uint64_t flushed; /* bytes that may be read */
-    _Atomic uint64_t dropped; /* bytes that may not be read any more */
-    uint64_t given_back;      /* of the dropped bytes, those off the count; under the set's mutex */
+    /* under the set's mutex: */
+    uint16_t *dropped; /* [dropped_capacity] of each step, bytes that will not be read any more; owned */
+    size_t dropped_capacity;
+    uint64_t given_back; /* of the dropped bytes, those off the count */
 };
 
 strl_status strl_spill_set_create(const char *directory, uint64_t limit_bytes, strl_spill_set **set, strl_error *err)
@@ -65,6 +67,7 @@ static void release(strl_spill *spill)
 {
     strl_file_close(spill->file, NULL); /* a late write error concerns bytes nobody will read */
     strl__free(spill->buffer);
+    strl__free(spill->dropped);
     strl__free(spill->name);
     strl__free(spill);
 }
@@ -309,31 +312,61 @@ uint64_t strl_spill_bytes(const strl_spill *spill)
     return atomic_load(&spill->flushed) + spill->buffered;
 }
 
+/* Whether one of the bytes has been given back. */
+static bool is_gone(strl_spill *spill, uint64_t offset, size_t size)
+{
+    bool gone = false;
+    strl_mutex_lock(&spill->set->mutex);
+    for (uint64_t step = offset / DROP_STEP_BYTES; size > 0 && step <= (offset + size - 1) / DROP_STEP_BYTES; step++)
+        gone |= step < spill->dropped_capacity && spill->dropped[step] == DROP_STEP_BYTES;
+    strl_mutex_unlock(&spill->set->mutex);
+    return gone;
+}
+
 strl_status strl_spill_read(strl_spill *spill, uint64_t offset, void *data, size_t size, strl_error *err)
 {
-    uint64_t first = atomic_load(&spill->dropped), end = atomic_load(&spill->flushed);
-    if (offset < first || offset > end || size > end - offset)
+    uint64_t end = atomic_load(&spill->flushed);
+    if (offset > end || size > end - offset)
         return strl__fail(err, STRL_ERR_ARGUMENT,
-                          "read of %zu bytes at byte %" PRIu64 " of the scratch file %.200s, which has bytes %" PRIu64
-                          " to %" PRIu64,
-                          size, offset, spill->name, first, end);
+                          "read of %zu bytes at byte %" PRIu64 " of the scratch file %.200s, which has %" PRIu64, size,
+                          offset, spill->name, end);
+    if (is_gone(spill, offset, size))
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "read of %zu bytes at byte %" PRIu64 " of the scratch file %.200s, which were dropped", size,
+                          offset, spill->name);
     return strl_file_read(spill->file, offset, data, size, err);
 }
 
-void strl_spill_drop_before(strl_spill *spill, uint64_t offset)
+/* Zeros up to `steps` items of the table. Without memory nothing more is given back, which costs disk alone. */
+static bool reach_step(strl_spill *spill, uint64_t steps)
 {
-    uint64_t end = atomic_load(&spill->flushed);
-    offset = offset < end ? offset : end;
-    uint64_t before = atomic_load(&spill->dropped);
-    if (offset <= before)
-        return;
-    atomic_store(&spill->dropped, offset);
-    uint64_t from = before - before % DROP_STEP_BYTES, to = offset - offset % DROP_STEP_BYTES;
-    if (to == from || !strl_file_punch(spill->file, from, to - from))
-        return;
+    size_t before = spill->dropped_capacity;
+    if (steps <= before)
+        return true;
+    void *table = spill->dropped;
+    if (steps > SIZE_MAX || !strl__grow(&table, &spill->dropped_capacity, (size_t)steps, sizeof *spill->dropped))
+        return false;
+    spill->dropped = table;
+    memset(spill->dropped + before, 0, (spill->dropped_capacity - before) * sizeof *spill->dropped);
+    return true;
+}
+
+void strl_spill_drop(strl_spill *spill, uint64_t offset, uint64_t size)
+{
     strl_mutex_lock(&spill->set->mutex);
-    spill->given_back += to - from;
-    spill->set->bytes -= to - from;
+    bool good = size > 0 && reach_step(spill, (offset + size - 1) / DROP_STEP_BYTES + 1);
+    while (good && size > 0) {
+        uint64_t step = offset / DROP_STEP_BYTES, here = DROP_STEP_BYTES - offset % DROP_STEP_BYTES;
+        here = here < size ? here : size;
+        spill->dropped[step] = (uint16_t)(spill->dropped[step] + here);
+        if (spill->dropped[step] == DROP_STEP_BYTES &&
+            strl_file_punch(spill->file, step * DROP_STEP_BYTES, DROP_STEP_BYTES)) {
+            spill->given_back += DROP_STEP_BYTES;
+            spill->set->bytes -= DROP_STEP_BYTES;
+        }
+        offset += here;
+        size -= here;
+    }
     strl_mutex_unlock(&spill->set->mutex);
 }
 

@@ -41,10 +41,10 @@ uint64_t strl_spill_bytes(
 
 /* Exactly size bytes at offset, all of them flushed and not dropped, or failure. */
 strl_status strl_spill_read(strl_spill *spill, uint64_t offset, void *data, size_t size, strl_error *err);
-/* Promises that no byte before offset will be read again: whole 64 KiB steps of them are given back to the disk, and
- * to the count, where the file system can do that. An offset behind an earlier one changes nothing. One thread at a
- * time. */
-void strl_spill_drop_before(strl_spill *spill, uint64_t offset);
+/* Promises that these bytes, flushed ones, will not be read again; to be said once of a byte. Whole 16 KiB steps of such bytes are
+ * given back to the disk, and to the count, where the file system can do that. One thread at a time; others may read
+ * other bytes meanwhile. */
+void strl_spill_drop(strl_spill *spill, uint64_t offset, uint64_t size);
 
 /* The stream is closed in any case; failure means that its file is still there, and counted. NULL is legal. */
 strl_status strl_spill_close_and_delete(strl_spill *spill, strl_error *err);

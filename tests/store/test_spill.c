@@ -114,7 +114,7 @@ static void what_was_appended_in_any_sizes_is_read_at_any_offset(void **state)
     }
 }
 
-static void only_flushed_and_kept_bytes_can_be_read(void **state)
+static void only_flushed_bytes_can_be_read(void **state)
 {
     (void)state;
     strl_spill_set *set = make_set(0);
@@ -128,10 +128,8 @@ static void only_flushed_and_kept_bytes_can_be_read(void **state)
     assert_int_equal(strl_spill_read(spill, 60, data, 1, &err), STRL_ERR_ARGUMENT);
     assert_int_equal(strl_spill_read(spill, UINT64_MAX, data, 2, &err), STRL_ERR_ARGUMENT);
     assert_int_equal(strl_spill_read(spill, 1, data, SIZE_MAX, &err), STRL_ERR_ARGUMENT);
-    strl_spill_drop_before(spill, 30);
-    assert_int_equal(strl_spill_read(spill, 29, data, 2, &err), STRL_ERR_ARGUMENT);
-    assert_non_null(strstr(err.message, "bytes 30 to 60"));
-    assert_int_equal(check_pattern(spill, 1, 30, 30, NULL), STRL_OK);
+    assert_int_equal(strl_spill_read(spill, 59, data, 2, &err), STRL_ERR_ARGUMENT);
+    assert_non_null(strstr(err.message, "2 bytes at byte 59 of the scratch file a, which has 60"));
     strl_spill_set_destroy(set);
 }
 
@@ -150,16 +148,22 @@ static void the_set_counts_what_is_on_disk_now_and_at_most(void **state)
     assert_int_equal(strl_spill_set_peak_bytes(set), 512 * KIB);
     char *path = strl_path_join(folder, "b");
     struct stat facts;
-    strl_spill_drop_before(b, 130 * KIB);
-    strl_spill_drop_before(b, 100 * KIB); /* behind: nothing changes */
+    strl_spill_drop(b, 90 * KIB, 40 * KIB); /* 96 to 128 KiB are whole steps of it */
+    strl_spill_drop(b, 1 * KIB, 89 * KIB);  /* all but the first */
     uint64_t left = strl_spill_set_bytes(set);
     assert_int_equal(stat(path, &facts), 0);
     if (left != 256 * KIB) { /* a file system that can punch */
-        assert_int_equal(left, 128 * KIB);
-        assert_true((uint64_t)facts.st_blocks * 512 <= 128 * KIB + 64 * KIB);
+        assert_int_equal(left, 144 * KIB);
+        assert_true((uint64_t)facts.st_blocks * 512 <= 144 * KIB + 64 * KIB);
     }
+    uint8_t byte;
+    strl_error err = {0};
+    assert_int_equal(strl_spill_read(b, 128 * KIB - 1, &byte, 1, &err), STRL_ERR_ARGUMENT);
+    assert_non_null(strstr(err.message, "1 bytes at byte 131071 of the scratch file b, which were dropped"));
+    assert_int_equal(check_pattern(b, 2, 0, 1 * KIB, NULL), STRL_OK);
     assert_int_equal(check_pattern(b, 2, 130 * KIB, 4096, NULL), STRL_OK);
-    strl_spill_drop_before(b, UINT64_MAX);
+    strl_spill_drop(b, 0, 1 * KIB);
+    strl_spill_drop(b, 130 * KIB, 126 * KIB);
     assert_true(left == 256 * KIB || strl_spill_set_bytes(set) == 0);
     assert_int_equal(append_pattern(b, 2, 100, NULL), STRL_OK); /* it still grows */
     assert_int_equal(check_pattern(b, 2, 256 * KIB, 100, NULL), STRL_OK);
@@ -347,7 +351,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_was_appended_in_any_sizes_is_read_at_any_offset),
-        cmocka_unit_test(only_flushed_and_kept_bytes_can_be_read),
+        cmocka_unit_test(only_flushed_bytes_can_be_read),
         cmocka_unit_test(the_set_counts_what_is_on_disk_now_and_at_most),
         cmocka_unit_test(the_limit_holds_over_all_streams_and_frees_with_them),
         cmocka_unit_test(a_full_disk_loses_nothing_and_the_stream_goes_on),

@@ -105,6 +105,7 @@ typedef struct strl_leaf_shares {
     uint32_t bucket_count;
     uint32_t *bucket_first; /* [bucket_count + 1] clusters */
     strl_spill **spill;     /* words: cluster x y z clusters n cluster[n] m cell[m] */
+    uint32_t *last_reader;  /* [cell_count] the last cluster that needs the cell: its own, or one that computes normals */
 } strl_leaf_shares;
 
 strl_status strl_leaf_shares_create(const strl_hierarchy *hierarchy, strl_leaf_shares *shares, strl_error *err);

@@ -20,6 +20,7 @@ typedef struct leaf_stage {
     shared_ref *refs;      /* sorted by (cluster, at) */
     size_t ref_count;
     uint32_t first_cluster;
+    uint32_t *last_reader; /* [cell_count] as in strl_leaf_shares; NO_READER = dropped */
     strl_made_node *slots;
     strl_arena *arenas;    /* per worker */
 } leaf_stage;
@@ -27,6 +28,7 @@ typedef struct leaf_stage {
 /* A position in more cells than this has no sensible normal anyway. */
 #define HALO_CELLS 64u
 #define SAMPLE_LEAVES 16u
+#define NO_READER UINT32_MAX
 
 static int compare_refs(const void *a, const void *b)
 {
@@ -292,6 +294,29 @@ static strl_status make_leaf(void *context, uint64_t index, unsigned slot, unsig
     return make_one(stage, (uint32_t)index, worker, &stage->slots[slot], err);
 }
 
+static void drop_cells(leaf_stage *stage, uint32_t cluster, const uint32_t *cells, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++)
+        if (stage->last_reader[cells[i]] == cluster) {
+            strl_ingest_drop_cell(stage->hierarchy->ingest, cells[i]);
+            stage->last_reader[cells[i]] = NO_READER;
+        }
+}
+
+/* Gives back the disk of cells that no later cluster needs: the cluster's own, and those of others that waited for it. */
+static void drop_what_was_read(leaf_stage *stage, uint32_t cluster)
+{
+    const strl_partition *partition = stage->hierarchy->partition;
+    size_t ref_count;
+    const shared_ref *refs = refs_of(stage, cluster, &ref_count);
+    uint32_t first = partition->cluster_first[cluster], count = partition->cluster_first[cluster + 1] - first;
+    drop_cells(stage, cluster, partition->cell + first, count);
+    for (size_t i = 0; i < ref_count; i++) {
+        const uint32_t *cells = cells_of_ref(stage, &refs[i], &count);
+        drop_cells(stage, cluster, cells, count);
+    }
+}
+
 static strl_status take_leaf(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
 {
     leaf_stage *stage = context;
@@ -299,6 +324,8 @@ static strl_status take_leaf(void *context, uint64_t index, unsigned slot, unsig
     (void)worker;
     strl_status status = strl_take_node(stage->hierarchy, stage->level, cluster, &stage->slots[slot], err);
     strl_made_node_deinit(&stage->slots[slot]);
+    if (!status)
+        drop_what_was_read(stage, cluster);
     return status ? status : strl__build_report(stage->hierarchy->context, cluster + 1, stage->level->count, err);
 }
 
@@ -362,6 +389,7 @@ strl_status strl_make_leaves(strl_hierarchy *hierarchy, strl_error *err)
     strl_status status = strl_leaf_shares_create(hierarchy, &shares, err);
     if (!status)
         status = strl_ingest_drop(&hierarchy->ingest->shared, err);
+    stage.last_reader = shares.last_reader;
     stage.slots = strl__alloc_zero(strl_pool_window(pool, 0), sizeof *stage.slots);
     stage.arenas = strl__alloc_zero(workers, sizeof *stage.arenas);
     if (!status && (!stage.slots || !stage.arenas))

@@ -71,6 +71,15 @@ static bool list_clusters(distributor *d, uint32_t cell_count)
     return true;
 }
 
+/* Where normals are computed, a cluster reads the cells of others round its positions. */
+static void note_readers(distributor *d, uint32_t cell_count)
+{
+    uint32_t last = d->clusters[d->cluster_count - 1], *last_reader = d->shares->last_reader;
+    for (uint32_t i = 0; i < cell_count && d->hierarchy->ingest->lacks_normals; i++)
+        if (last_reader[d->cells[i]] < last)
+            last_reader[d->cells[i]] = last;
+}
+
 static strl_status hand_out(distributor *d, const uint32_t position[3], uint32_t cell_count, strl_error *err)
 {
     strl_status status = STRL_OK;
@@ -124,8 +133,13 @@ strl_status strl_leaf_shares_create(const strl_hierarchy *hierarchy, strl_leaf_s
     word_reader reader = {.spill = hierarchy->ingest->shared, .end = strl_spill_bytes(hierarchy->ingest->shared) / 4};
     *shares = (strl_leaf_shares){0};
     reader.buffer = strl__alloc(CHUNK_WORDS, sizeof *reader.buffer);
-    strl_status status = reader.buffer ? open_buckets(hierarchy, shares, err)
-                                       : strl__fail(err, STRL_ERR_MEMORY, "no memory to read shared positions");
+    shares->last_reader = strl__alloc(hierarchy->ingest->cell_count, sizeof *shares->last_reader);
+    strl_status status = reader.buffer && shares->last_reader
+                             ? open_buckets(hierarchy, shares, err)
+                             : strl__fail(err, STRL_ERR_MEMORY, "no memory to read shared positions");
+    if (!status)
+        memcpy(shares->last_reader, hierarchy->partition->cluster,
+               hierarchy->ingest->cell_count * sizeof *shares->last_reader);
     while (!status && (reader.at < reader.end || reader.used < reader.have)) {
         uint32_t head[4] = {0};
         for (int i = 0; i < 4 && !status; i++)
@@ -136,8 +150,10 @@ strl_status strl_leaf_shares_create(const strl_hierarchy *hierarchy, strl_leaf_s
             status = next_word(&reader, &d.cells[i], err);
         if (!status && !list_clusters(&d, head[3]))
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a position in %u cells", head[3]);
-        if (!status && d.cluster_count > 1)
+        if (!status && d.cluster_count > 1) {
+            note_readers(&d, head[3]);
             status = hand_out(&d, head, head[3], err);
+        }
     }
     for (uint32_t i = 0; i < shares->bucket_count && !status; i++)
         status = strl_spill_flush(shares->spill[i], err);
@@ -154,5 +170,6 @@ void strl_leaf_shares_deinit(strl_leaf_shares *shares)
         strl_spill_close_and_delete(shares->spill[i], NULL);
     strl__free(shares->bucket_first);
     strl__free(shares->spill);
+    strl__free(shares->last_reader);
     *shares = (strl_leaf_shares){0};
 }

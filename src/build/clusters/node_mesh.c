@@ -1,119 +1,11 @@
 #include "build/clusters/node_mesh.h"
 
-#include <math.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/hash.h"
 
 #define NO_INDEX UINT32_MAX
-#define DRIFT_STEPS 250.f /* below 255: quotients may round up by one */
-
-static void write_triangles(const strl_mesh *mesh, strl_writer *writer)
-{
-    unsigned bytes = mesh->wedge_count <= 65536 ? 2 : 4;
-    for (uint32_t t = 0; t < mesh->triangle_count; t++)
-        for (int c = 0; c < 3; c++)
-            strl_writer_le(writer, bytes, mesh->triangle[t][c]);
-}
-
-static bool read_triangles(strl_cursor *cursor, strl_mesh *mesh)
-{
-    unsigned bytes = mesh->wedge_count <= 65536 ? 2 : 4;
-    const uint8_t *from = strl_cursor_take(cursor, (size_t)mesh->triangle_count * 3 * bytes);
-    for (uint32_t i = 0; from && i < 3 * mesh->triangle_count; i++)
-        mesh->triangle[i / 3][i % 3] = (uint32_t)strl__load_le(from + (size_t)i * bytes, bytes);
-    return from != NULL;
-}
-
-/* Drifts are rounded outward to steps of a 250th of the largest: six bytes instead of 24, and still boxes that hold them. */
-static void write_drifts(const strl_mesh *mesh, strl_writer *writer)
-{
-    float largest = 0;
-    for (uint32_t t = 0; t < mesh->triangle_count; t++)
-        for (int k = 0; k < 3; k++)
-            largest = fmaxf(largest, fmaxf(-mesh->drift[t].least[k], mesh->drift[t].most[k]));
-    float step = nextafterf(largest / DRIFT_STEPS, INFINITY);
-    strl_writer_f32(writer, step);
-    for (uint32_t t = 0; t < mesh->triangle_count; t++)
-        for (int k = 0; k < 3; k++) {
-            float least = ceilf(-mesh->drift[t].least[k] / step), most = ceilf(mesh->drift[t].most[k] / step);
-            strl_writer_u8(writer, (uint8_t)least);
-            strl_writer_u8(writer, (uint8_t)most);
-        }
-}
-
-static bool read_drifts(strl_cursor *cursor, strl_mesh *mesh)
-{
-    float step = strl_cursor_f32(cursor);
-    const uint8_t *from = strl_cursor_take(cursor, (size_t)mesh->triangle_count * 6);
-    for (uint32_t t = 0; from && t < mesh->triangle_count; t++)
-        for (int k = 0; k < 3; k++) {
-            mesh->drift[t].least[k] = -step * *from++;
-            mesh->drift[t].most[k] = step * *from++;
-        }
-    return from != NULL;
-}
-
-void strl_node_mesh_write(const strl_node_mesh *node, strl_writer *writer)
-{
-    const strl_mesh *mesh = &node->mesh;
-    uint32_t shares = node->share_first ? node->share_first[mesh->point_count] : 0;
-    strl_writer_u32(writer, mesh->point_count);
-    strl_writer_u32(writer, mesh->wedge_count);
-    strl_writer_u32(writer, mesh->triangle_count);
-    strl_writer_u32(writer, node->share_first ? shares : NO_INDEX);
-    strl_writer_bytes(writer, node->anchor, sizeof node->anchor);
-    strl_writer_bytes(writer, mesh->position, mesh->point_count * sizeof *mesh->position);
-    strl_writer_bytes(writer, mesh->wedge, mesh->wedge_count * sizeof *mesh->wedge);
-    write_triangles(mesh, writer);
-    strl_writer_f32(writer, mesh->start_error);
-    write_drifts(mesh, writer);
-    strl_writer_bytes(writer, mesh->deviation, mesh->triangle_count * sizeof *mesh->deviation);
-    strl_writer_bytes(writer, mesh->shift, mesh->triangle_count * sizeof *mesh->shift);
-    if (node->share_first) {
-        strl_writer_bytes(writer, node->share_first, (mesh->point_count + 1) * sizeof *node->share_first);
-        strl_writer_bytes(writer, node->share, shares * sizeof *node->share);
-    }
-}
-
-static bool copy_out(strl_cursor *cursor, void *to, size_t count, size_t size)
-{
-    const uint8_t *from = strl_cursor_take(cursor, count * size);
-    if (from && count)
-        memcpy(to, from, count * size);
-    return from != NULL;
-}
-
-strl_status strl_node_mesh_read(const void *data, size_t size, strl_arena *arena, strl_node_mesh *node, strl_error *err)
-{
-    strl_cursor cursor = strl_cursor_make(data, size);
-    uint32_t points = strl_cursor_u32(&cursor), wedges = strl_cursor_u32(&cursor);
-    uint32_t triangles = strl_cursor_u32(&cursor), shares = strl_cursor_u32(&cursor);
-    strl_mesh *mesh = &node->mesh;
-    *node = (strl_node_mesh){0};
-    if (cursor.failed || points > size / 12 || wedges > size / sizeof(strl_wedge) || triangles > size / 20)
-        return strl__fail(err, STRL_ERR_INTERNAL, "a node's mesh in scratch is damaged");
-    if (!strl_mesh_create(mesh, points, wedges, triangles, arena))
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", triangles);
-    bool good = copy_out(&cursor, node->anchor, 1, sizeof node->anchor) &&
-                copy_out(&cursor, mesh->position, points, sizeof *mesh->position) &&
-                copy_out(&cursor, mesh->wedge, wedges, sizeof *mesh->wedge) &&
-                read_triangles(&cursor, mesh) &&
-                copy_out(&cursor, &mesh->start_error, 1, sizeof mesh->start_error) &&
-                read_drifts(&cursor, mesh) &&
-                copy_out(&cursor, mesh->deviation, triangles, sizeof *mesh->deviation) &&
-                copy_out(&cursor, mesh->shift, triangles, sizeof *mesh->shift);
-    if (good && shares != NO_INDEX) {
-        node->share_first = strl_arena_alloc(arena, (size_t)points + 1, sizeof *node->share_first);
-        node->share = strl_arena_alloc(arena, shares, sizeof *node->share);
-        if (!node->share_first || !node->share)
-            return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", triangles);
-        good = copy_out(&cursor, node->share_first, (size_t)points + 1, sizeof *node->share_first) &&
-               copy_out(&cursor, node->share, shares, sizeof *node->share);
-    }
-    return good ? STRL_OK : strl__fail(err, STRL_ERR_INTERNAL, "a node's mesh in scratch is cut off");
-}
 
 /* Open addressing from content to index; slot value index + 1. */
 typedef struct index_table {

@@ -10,11 +10,6 @@
 #define SHARED_WEIGHT 4u /* of one shared position, against 1 of a neighbour on the curve */
 #define CURVE_REACH 2u
 
-typedef struct pair {
-    uint32_t position[3];
-    uint32_t cell;
-} pair;
-
 typedef struct connected {
     uint64_t *edges; /* a << 32 | b, one for each position that both have */
     size_t edge_count, edge_capacity;
@@ -66,15 +61,15 @@ static strl_status connect_spill(void *context, uint64_t index, unsigned slot, u
 {
     connecting *c = context;
     connected *out = &c->slots[slot];
-    strl_spill *spill = c->pairs->spill[index];
-    size_t count = (size_t)(strl_spill_bytes(spill) / sizeof(pair));
-    pair *pairs = strl__alloc(count, sizeof *pairs);
+    pair *pairs;
+    size_t count;
+    bool good = true;
     (void)worker;
     *out = (connected){0};
-    strl_status status = pairs ? strl_spill_read(spill, 0, pairs, count * sizeof *pairs, err) : STRL_ERR_MEMORY;
-    if (!status)
-        qsort(pairs, count, sizeof *pairs, compare_pairs);
-    bool good = status == STRL_OK;
+    strl_status status = strl__pair_spills_read(c->pairs, (uint32_t)index, &pairs, &count, err);
+    if (status)
+        return status;
+    qsort(pairs, count, sizeof *pairs, compare_pairs);
     for (size_t i = 0, end; i < count && good; i = end) {
         for (end = i + 1; end < count && !memcmp(pairs[i].position, pairs[end].position, 12);)
             end++;
@@ -82,9 +77,7 @@ static strl_status connect_spill(void *context, uint64_t index, unsigned slot, u
             good = add_position(out, pairs + i, end - i);
     }
     strl__free(pairs);
-    if (!good && (status == STRL_OK || status == STRL_ERR_MEMORY))
-        status = strl__fail(err, STRL_ERR_MEMORY, "no memory to connect %zu positions", count);
-    return status;
+    return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory to connect %zu positions", count);
 }
 
 static bool count_edge(connecting *c, uint64_t key, uint32_t weight)
@@ -132,10 +125,8 @@ static strl_status take_connected(void *context, uint64_t index, unsigned slot, 
         if (!count_edge(c, out->edges[i], SHARED_WEIGHT))
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the graph of %u cells", c->ingest->cell_count);
     release(out);
-    if (!status) {
-        status = strl_spill_close_and_delete(c->pairs->spill[index], err);
-        c->pairs->spill[index] = NULL; /* closed in any case */
-    }
+    if (!status)
+        status = strl__pair_spills_delete(c->pairs, (uint32_t)index, err);
     return status ? status : strl__build_report(c->context, index + 1, c->pairs->count, err);
 }
 

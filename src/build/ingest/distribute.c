@@ -148,7 +148,7 @@ static bool same_cell(const uint32_t a[3], const uint32_t b[3])
 }
 
 /* False where two corners fall into one lattice cell. */
-static bool to_lattice(const strl_ingest *ingest, const strl_triangle *in, strl_soup_triangle *out)
+static bool to_lattice(const strl_ingest *ingest, const strl_triangle *in, strl_soup_triangle *out, bool *lacks_normals)
 {
     for (int c = 0; c < 3; c++) {
         strl_soup_corner *corner = &out->corner[c];
@@ -159,6 +159,8 @@ static bool to_lattice(const strl_ingest *ingest, const strl_triangle *in, strl_
         float length2 = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
         if ((in->flags & STRL_TRIANGLE_HAS_NORMAL) && length2 > 0 && length2 < INFINITY)
             strl_oct_encode(n, corner->normal);
+        else
+            *lacks_normals = true;
     }
     return !same_cell(out->corner[0].position, out->corner[1].position) &&
            !same_cell(out->corner[1].position, out->corner[2].position) &&
@@ -190,7 +192,7 @@ static strl_status take_batch(distribution *d, size_t count, strl_error *err)
     for (size_t i = 0; i < count; i++) {
         strl_soup_triangle triangle;
         uint8_t bytes[64];
-        if (!to_lattice(ingest, &d->batch[i], &triangle)) {
+        if (!to_lattice(ingest, &d->batch[i], &triangle, &ingest->lacks_normals)) {
             d->context->result->dropped_degenerate++;
             continue;
         }

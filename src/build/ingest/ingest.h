@@ -51,6 +51,7 @@ typedef struct strl_ingest {
     float leaf_error;         /* lattice units: what quantisation moves a point at most */
     strl_axis up;
     bool has_normals, has_colours;
+    bool lacks_normals;       /* some corner has none */
     uint64_t triangle_count;  /* kept */
     strl_spill *soup;         /* triangle_count records, packed (see soup.h) */
     strl_cell *cells;         /* [cell_count] in order of the curve */
@@ -71,6 +72,8 @@ strl_status strl_ingest_drop(strl_spill **stream, strl_error *err);
 /* Reads `count` triangles from index `first`. scratch: count * strl_soup_bytes() bytes of the caller's. */
 strl_status strl_ingest_read(const strl_ingest *ingest, uint64_t first, uint32_t count, void *scratch,
                              strl_soup_triangle *triangles, strl_error *err);
+/* A cell whose triangles will not be read again. */
+void strl_ingest_drop_cell(const strl_ingest *ingest, uint32_t cell);
 /* Bytes of one packed record. */
 size_t strl_soup_bytes(const strl_ingest *ingest);
 

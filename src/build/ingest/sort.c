@@ -1,5 +1,4 @@
 /* Buckets are sorted along the curve, one a worker, and cut into cells. */
-#include <stdio.h>
 #include <string.h>
 
 #include "base/fail.h"
@@ -12,12 +11,6 @@
 
 #define BLOCK 512u        /* triangles within which sheets are told apart */
 #define BLOCK_TABLE 4096u /* a power of two above 3 * BLOCK * 2 */
-
-/* A lattice position and the cell that has it: one record of a pair spill. */
-typedef struct pair {
-    uint32_t position[3];
-    uint32_t cell;
-} pair;
 
 typedef struct sorted_bucket {
     uint8_t *records;  /* sorted */
@@ -281,13 +274,6 @@ static void release(sorted_bucket *out)
     *out = (sorted_bucket){0};
 }
 
-/* Which pair spill a position goes to. */
-static uint32_t pair_spill_of(const pair_spills *pairs, const uint32_t position[3])
-{
-    uint64_t hash = strl__mix64(((uint64_t)position[0] << 32 | position[1]) ^ strl__mix64(position[2] + 1));
-    return (uint32_t)(hash >> 40) & (pairs->count - 1);
-}
-
 static strl_status append_bucket(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
 {
     sorting *s = context;
@@ -309,36 +295,10 @@ static strl_status append_bucket(void *context, uint64_t index, unsigned slot, u
     }
     for (size_t i = 0; i < out->pair_count && !status; i++) {
         out->pairs[i].cell += base;
-        uint32_t to = pair_spill_of(s->pairs, out->pairs[i].position);
-        status = strl_spill_append(s->pairs->spill[to], &out->pairs[i], sizeof *out->pairs, err);
+        status = strl__pair_spills_append(s->pairs, &out->pairs[i], err);
     }
     release(out);
     return status ? status : strl__build_report(s->context, first, ingest->triangle_count, err);
-}
-
-static strl_status open_pair_spills(const sorting *s, strl_error *err)
-{
-    uint64_t bytes = s->ingest->triangle_count * 14, each = strl__bucket_bytes(s->context) / 4;
-    s->pairs->count = 1;
-    while (s->pairs->count < 256 && bytes / s->pairs->count > each)
-        s->pairs->count *= 2;
-    s->pairs->spill = strl__alloc_zero(s->pairs->count, sizeof(strl_spill *));
-    strl_status status = s->pairs->spill ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u spills",
-                                                                s->pairs->count);
-    for (uint32_t i = 0; i < s->pairs->count && !status; i++) {
-        char name[32];
-        snprintf(name, sizeof name, "pairs-%03u", i);
-        status = strl_spill_open(s->context->spills, name, 32u << 10, &s->pairs->spill[i], err);
-    }
-    return status;
-}
-
-void strl__pair_spills_deinit(pair_spills *pairs)
-{
-    for (uint32_t i = 0; pairs->spill && i < pairs->count; i++)
-        strl_spill_close_and_delete(pairs->spill[i], NULL);
-    strl__free(pairs->spill);
-    *pairs = (pair_spills){0};
 }
 
 strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest, bucket_set *buckets, pair_spills *pairs,
@@ -353,15 +313,15 @@ strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest,
     strl_status status = s.slots ? strl_spill_open(context->spills, "soup", 0, &ingest->soup, err)
                                  : strl__fail(err, STRL_ERR_MEMORY, "no memory to sort");
     if (!status)
-        status = open_pair_spills(&s, err);
+        status = strl__pair_spills_open(context, ingest->triangle_count, pairs, err);
     for (uint32_t i = 0; i < buckets->count && !status; i++)
         status = strl_spill_flush(buckets->spill[i], err);
     if (!status)
         status = strl_pool_ordered(context->pool, buckets->count, window, sort_bucket, append_bucket, &s, NULL, err);
     if (!status)
         status = strl_spill_flush(ingest->soup, err);
-    for (uint32_t i = 0; i < pairs->count && !status; i++)
-        status = strl_spill_flush(pairs->spill[i], err);
+    if (!status)
+        status = strl__pair_spills_flush(pairs, err);
     for (unsigned i = 0; s.slots && i < strl_pool_window(context->pool, window); i++)
         release(&s.slots[i]);
     strl__free(s.slots);

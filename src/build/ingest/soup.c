@@ -89,6 +89,12 @@ strl_status strl_ingest_read(const strl_ingest *ingest, uint64_t first, uint32_t
     return status;
 }
 
+void strl_ingest_drop_cell(const strl_ingest *ingest, uint32_t cell)
+{
+    size_t bytes = strl_soup_bytes(ingest);
+    strl_spill_drop(ingest->soup, ingest->cells[cell].first * bytes, ingest->cells[cell].count * bytes);
+}
+
 /* Spreads the low 21 bits so that two zeros stand between any two. */
 static uint64_t spread(uint64_t v)
 {

@@ -1,0 +1,269 @@
+/* Node meshes in scratch: what repeats from element to element is told by one bit, the rest as differences. */
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "build/clusters/node_mesh.h"
+#include "store/pack.h"
+
+#define NO_SHARES UINT32_MAX
+#define DRIFT_STEPS 250.f /* below 255: quotients may round up by one */
+
+typedef struct models {
+    strl_pack_points position;
+    strl_pack_model point, normal[2][STRL_PACK_LENGTHS], colour_repeats, colour[4], palette;
+    strl_pack_model corner[3];
+    strl_pack_model drift_repeats, drift[6], deviation_repeats, deviation, shift_repeats, shift;
+    strl_pack_model share_count, share;
+} models;
+
+static void write_positions(const strl_mesh *mesh, models *m, strl_packer *packer)
+{
+    strl_pack_points_init(&m->position);
+    for (uint32_t p = 0; p < mesh->point_count; p++) {
+        uint32_t position[3];
+        memcpy(position, mesh->position[p], sizeof position);
+        strl_pack_point(packer, &m->position, position);
+    }
+}
+
+static void read_positions(strl_mesh *mesh, models *m, strl_unpacker *unpacker)
+{
+    strl_pack_points_init(&m->position);
+    for (uint32_t p = 0; p < mesh->point_count; p++) {
+        uint32_t position[3];
+        strl_unpack_point(unpacker, &m->position, position);
+        memcpy(mesh->position[p], position, sizeof position);
+    }
+}
+
+static void write_wedges(const strl_mesh *mesh, models *m, strl_packer *packer)
+{
+    strl_wedge last = {.point = UINT32_MAX};
+    unsigned turn[2] = {0};
+    for (uint32_t w = 0; w < mesh->wedge_count; w++) {
+        const strl_wedge *wedge = &mesh->wedge[w];
+        strl_pack(packer, &m->point, strl_pack_zigzag(wedge->point - last.point - 1));
+        for (int k = 0; k < 2; k++) {
+            uint32_t step = strl_pack_zigzag((uint32_t)wedge->normal[k] - last.normal[k]);
+            strl_pack(packer, &m->normal[k][turn[k]], step);
+            turn[k] = strl_pack_length(step);
+        }
+        strl_pack(packer, &m->colour_repeats, wedge->colour != last.colour);
+        for (unsigned c = 0; c < 32 && wedge->colour != last.colour; c += 8)
+            strl_pack(packer, &m->colour[c / 8],
+                      strl_pack_zigzag((wedge->colour >> c & 255) - (last.colour >> c & 255)));
+        strl_pack(packer, &m->palette, strl_pack_zigzag(wedge->palette - last.palette));
+        last = *wedge;
+    }
+}
+
+static bool read_wedges(strl_mesh *mesh, models *m, strl_unpacker *unpacker)
+{
+    strl_wedge last = {.point = UINT32_MAX};
+    unsigned turn[2] = {0};
+    bool good = true;
+    for (uint32_t w = 0; w < mesh->wedge_count; w++) {
+        last.point += 1 + strl_unpack_zigzag(strl_unpack(unpacker, &m->point));
+        for (int k = 0; k < 2; k++) {
+            uint32_t step = strl_unpack(unpacker, &m->normal[k][turn[k]]);
+            last.normal[k] = (uint16_t)(last.normal[k] + strl_unpack_zigzag(step));
+            turn[k] = strl_pack_length(step);
+        }
+        if (strl_unpack(unpacker, &m->colour_repeats)) {
+            uint32_t colour = 0;
+            for (unsigned c = 0; c < 32; c += 8)
+                colour |= (((last.colour >> c) + strl_unpack_zigzag(strl_unpack(unpacker, &m->colour[c / 8]))) & 255)
+                          << c;
+            last.colour = colour;
+        }
+        last.palette += strl_unpack_zigzag(strl_unpack(unpacker, &m->palette));
+        good &= last.point < mesh->point_count;
+        mesh->wedge[w] = last;
+    }
+    return good;
+}
+
+/* A corner is most often the first wedge not named yet, or one named lately. */
+static void write_triangles(const strl_mesh *mesh, models *m, strl_packer *packer)
+{
+    uint32_t next = 0;
+    for (uint32_t t = 0; t < mesh->triangle_count; t++)
+        for (int c = 0; c < 3; c++) {
+            uint32_t wedge = mesh->triangle[t][c];
+            strl_pack(packer, &m->corner[c], strl_pack_zigzag(next - wedge));
+            next = wedge >= next ? wedge + 1 : next;
+        }
+}
+
+static bool read_triangles(strl_mesh *mesh, models *m, strl_unpacker *unpacker)
+{
+    uint32_t next = 0;
+    bool good = true;
+    for (uint32_t t = 0; t < mesh->triangle_count; t++)
+        for (int c = 0; c < 3; c++) {
+            uint32_t wedge = next - strl_unpack_zigzag(strl_unpack(unpacker, &m->corner[c]));
+            next = wedge >= next ? wedge + 1 : next;
+            mesh->triangle[t][c] = wedge;
+            good &= wedge < mesh->wedge_count;
+        }
+    return good;
+}
+
+/* Drifts are rounded outward to steps of a 250th of the largest: six bytes instead of 24, and still boxes that hold them. */
+static float drift_step(const strl_mesh *mesh)
+{
+    float largest = 0;
+    for (uint32_t t = 0; t < mesh->triangle_count; t++)
+        for (int k = 0; k < 3; k++)
+            largest = fmaxf(largest, fmaxf(-mesh->drift[t].least[k], mesh->drift[t].most[k]));
+    return nextafterf(largest / DRIFT_STEPS, INFINITY);
+}
+
+static void write_drifts(const strl_mesh *mesh, float step, models *m, strl_packer *packer)
+{
+    uint8_t last[6] = {0};
+    for (uint32_t t = 0; t < mesh->triangle_count; t++) {
+        uint8_t drift[6];
+        for (int k = 0; k < 3; k++) {
+            drift[k] = (uint8_t)ceilf(-mesh->drift[t].least[k] / step);
+            drift[3 + k] = (uint8_t)ceilf(mesh->drift[t].most[k] / step);
+        }
+        bool differs = memcmp(drift, last, sizeof drift) != 0;
+        strl_pack(packer, &m->drift_repeats, differs);
+        for (int k = 0; k < 6 && differs; k++)
+            strl_pack(packer, &m->drift[k], drift[k]);
+        memcpy(last, drift, sizeof drift);
+    }
+}
+
+static void read_drifts(strl_mesh *mesh, float step, models *m, strl_unpacker *unpacker)
+{
+    uint32_t drift[6] = {0};
+    for (uint32_t t = 0; t < mesh->triangle_count; t++) {
+        bool differs = strl_unpack(unpacker, &m->drift_repeats) != 0;
+        for (int k = 0; k < 6 && differs; k++)
+            drift[k] = strl_unpack(unpacker, &m->drift[k]);
+        for (int k = 0; k < 3; k++) {
+            mesh->drift[t].least[k] = -step * (float)drift[k];
+            mesh->drift[t].most[k] = step * (float)drift[3 + k];
+        }
+    }
+}
+
+static void write_floats(const float *values, uint32_t count, strl_pack_model *repeats, strl_pack_model *model,
+                         strl_packer *packer)
+{
+    uint32_t last = 0, bits;
+    for (uint32_t i = 0; i < count; i++, last = bits) {
+        memcpy(&bits, &values[i], sizeof bits);
+        strl_pack(packer, repeats, bits != last);
+        if (bits != last)
+            strl_pack(packer, model, strl_pack_zigzag(bits - last));
+    }
+}
+
+static void read_floats(float *values, uint32_t count, strl_pack_model *repeats, strl_pack_model *model,
+                        strl_unpacker *unpacker)
+{
+    uint32_t bits = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        if (strl_unpack(unpacker, repeats))
+            bits += strl_unpack_zigzag(strl_unpack(unpacker, model));
+        memcpy(&values[i], &bits, sizeof bits);
+    }
+}
+
+static void write_shares(const strl_node_mesh *node, models *m, strl_packer *packer)
+{
+    uint32_t last = 0;
+    for (uint32_t p = 0; p < node->mesh.point_count; p++) {
+        strl_pack(packer, &m->share_count, node->share_first[p + 1] - node->share_first[p]);
+        for (uint32_t i = node->share_first[p]; i < node->share_first[p + 1]; i++) {
+            strl_pack(packer, &m->share, strl_pack_zigzag(node->share[i] - last));
+            last = node->share[i];
+        }
+    }
+}
+
+static bool read_shares(strl_node_mesh *node, uint32_t shares, models *m, strl_unpacker *unpacker)
+{
+    uint32_t last = 0, at = 0;
+    for (uint32_t p = 0; p < node->mesh.point_count; p++) {
+        uint32_t count = strl_unpack(unpacker, &m->share_count);
+        if (count > shares - at)
+            return false;
+        node->share_first[p] = at;
+        for (; count > 0; count--)
+            node->share[at++] = last += strl_unpack_zigzag(strl_unpack(unpacker, &m->share));
+    }
+    node->share_first[node->mesh.point_count] = at;
+    return at == shares;
+}
+
+void strl_node_mesh_write(const strl_node_mesh *node, strl_writer *writer)
+{
+    const strl_mesh *mesh = &node->mesh;
+    strl_packer packer = {.out = writer};
+    float step = drift_step(mesh);
+    models m = {0};
+    strl_writer_u32(writer, mesh->point_count);
+    strl_writer_u32(writer, mesh->wedge_count);
+    strl_writer_u32(writer, mesh->triangle_count);
+    strl_writer_u32(writer, node->share_first ? node->share_first[mesh->point_count] : NO_SHARES);
+    strl_writer_bytes(writer, node->anchor, sizeof node->anchor);
+    strl_writer_f32(writer, mesh->start_error);
+    strl_writer_f32(writer, step);
+    write_positions(mesh, &m, &packer);
+    write_wedges(mesh, &m, &packer);
+    write_triangles(mesh, &m, &packer);
+    write_drifts(mesh, step, &m, &packer);
+    write_floats(mesh->deviation, mesh->triangle_count, &m.deviation_repeats, &m.deviation, &packer);
+    write_floats(mesh->shift, mesh->triangle_count, &m.shift_repeats, &m.shift, &packer);
+    if (node->share_first)
+        write_shares(node, &m, &packer);
+    strl_pack_finish(&packer);
+}
+
+static bool read_arrays(strl_node_mesh *node, uint32_t shares, float step, strl_unpacker *unpacker)
+{
+    strl_mesh *mesh = &node->mesh;
+    models m = {0};
+    read_positions(mesh, &m, unpacker);
+    bool good = read_wedges(mesh, &m, unpacker);
+    good = read_triangles(mesh, &m, unpacker) && good;
+    read_drifts(mesh, step, &m, unpacker);
+    read_floats(mesh->deviation, mesh->triangle_count, &m.deviation_repeats, &m.deviation, unpacker);
+    read_floats(mesh->shift, mesh->triangle_count, &m.shift_repeats, &m.shift, unpacker);
+    if (node->share_first)
+        good = read_shares(node, shares, &m, unpacker) && good;
+    return good && !unpacker->failed;
+}
+
+strl_status strl_node_mesh_read(const void *data, size_t size, strl_arena *arena, strl_node_mesh *node, strl_error *err)
+{
+    strl_cursor cursor = strl_cursor_make(data, size);
+    uint32_t points = strl_cursor_u32(&cursor), wedges = strl_cursor_u32(&cursor);
+    uint32_t triangles = strl_cursor_u32(&cursor), shares = strl_cursor_u32(&cursor);
+    const uint8_t *anchor = strl_cursor_take(&cursor, sizeof node->anchor);
+    float start_error = strl_cursor_f32(&cursor), step = strl_cursor_f32(&cursor);
+    uint64_t bits = strl_cursor_left(&cursor) * 8;
+    *node = (strl_node_mesh){0};
+    /* every number takes a bit at least, so a damaged count costs no more memory than some times the bytes read */
+    if (cursor.failed || points > bits || wedges > bits || triangles > bits || (shares != NO_SHARES && shares > bits))
+        return strl__fail(err, STRL_ERR_INTERNAL, "a node's mesh in scratch is damaged");
+    bool good = strl_mesh_create(&node->mesh, points, wedges, triangles, arena);
+    if (good && shares != NO_SHARES) {
+        node->share_first = strl_arena_alloc(arena, (size_t)points + 1, sizeof *node->share_first);
+        node->share = strl_arena_alloc(arena, shares, sizeof *node->share);
+        good = node->share_first && node->share;
+    }
+    if (!good)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", triangles);
+    memcpy(node->anchor, anchor, sizeof node->anchor);
+    node->mesh.start_error = start_error;
+    strl_unpacker unpacker = strl_unpacker_make((const uint8_t *)data + cursor.at, size - cursor.at);
+    return read_arrays(node, shares, step, &unpacker)
+               ? STRL_OK
+               : strl__fail(err, STRL_ERR_INTERNAL, "a node's mesh in scratch is cut off or damaged");
+}
