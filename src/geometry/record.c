@@ -199,6 +199,7 @@ strl_status strl_mesh_after(const strl_mesh *mesh, const strl_simplified *simpli
         if (wedges[w] != NO_INDEX) {
             base->wedge[wedges[w]] = mesh->wedge[w];
             base->wedge[wedges[w]].point = points[mesh->wedge[w].point];
+            memcpy(base->wedge[wedges[w]].normal, simplified->normal[w], sizeof simplified->normal[w]);
         }
     uint32_t to = 0;
     for (uint32_t t = 0; t < mesh->triangle_count; t++) {

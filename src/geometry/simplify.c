@@ -10,6 +10,7 @@
 /* Stands for "more than one wedge" while wedges are counted. */
 #define SEVERAL (UINT32_MAX - 1)
 
+#define ESTIMATE_SHARE 0.8f /* of what is likely: too little costs time, too much spoils the order */
 #define FREE_DIVISOR 8   /* collapses that add no error go on below the target, down to this part of it */
 #define LADDER_RATIO 4.f /* the first rung gives up where its next collapse costs so many times its middle one */
 #define SMALL_SHARE 5e-4 /* of a piece's diagonal: errors below are never out of proportion */
@@ -95,6 +96,9 @@ static void add_triangle_quadrics(simplifier *s, uint32_t t)
         n[k] /= length;
     for (unsigned c = 0; c < 3; c++)
         strl__quadric_add_plane(&s->quadrics[point[c]], n, s->position[point[c]], length * 0.5);
+    for (unsigned c = 0; c < 3; c++)
+        for (int k = 0; k < 3; k++)
+            s->normal_sum[s->corner[t][c]][k] += (float)length * s->normal[s->corner[t][c]][k];
 }
 
 static void add_rim_quadrics(simplifier *s, uint32_t point)
@@ -133,7 +137,9 @@ static bool allocate(simplifier *s, const strl_mesh *mesh, strl_arena *arena)
     s->position = strl_arena_alloc(arena, points, sizeof *s->position);
     s->normal = strl_arena_alloc(arena, mesh->wedge_count, sizeof *s->normal);
     s->colour = strl_arena_alloc(arena, mesh->wedge_count, sizeof *s->colour);
+    s->normal_sum = strl_arena_alloc_zero(arena, mesh->wedge_count, sizeof *s->normal_sum);
     s->quadrics = strl_arena_alloc_zero(arena, points, sizeof *s->quadrics);
+    s->point = strl_arena_alloc(arena, triangles, sizeof *s->point);
     s->corner_next = strl_arena_alloc(arena, (size_t)triangles * 3, sizeof *s->corner_next);
     s->head = strl_arena_alloc(arena, points, sizeof *s->head);
     s->tail = strl_arena_alloc(arena, points, sizeof *s->tail);
@@ -149,7 +155,7 @@ static bool allocate(simplifier *s, const strl_mesh *mesh, strl_arena *arena)
     s->holders = mesh->holders ? strl_arena_alloc(arena, points, 1) : NULL;
     if (mesh->holders && s->holders)
         memcpy(s->holders, mesh->holders, points);
-    return (s->holders || !mesh->holders) && s->position && s->normal && s->colour && s->quadrics && s->corner_next && s->head && s->tail && s->dead &&
+    return (s->holders || !mesh->holders) && s->position && s->point && s->normal && s->normal_sum && s->colour && s->quadrics && s->corner_next && s->head && s->tail && s->dead &&
            s->stamp && s->heap && s->heap_at && s->key && s->plan && s->own_cost && s->only_wedge && s->stale;
 }
 
@@ -159,12 +165,13 @@ static bool allocate_result(simplifier *s, strl_simplified *result, strl_arena *
     uint32_t triangles = mesh->triangle_count;
     result->collapses = strl_arena_alloc(arena, mesh->point_count, sizeof *result->collapses);
     result->wedge_parent = strl_arena_alloc(arena, mesh->wedge_count, sizeof *result->wedge_parent);
+    result->normal = strl_arena_alloc(arena, mesh->wedge_count, sizeof *result->normal);
     result->removed_at = strl_arena_alloc(arena, triangles, sizeof *result->removed_at);
     result->corner = s->corner = strl_arena_alloc(arena, triangles, sizeof *s->corner);
     result->drift = s->drift = strl_arena_alloc(arena, triangles, sizeof *s->drift);
     result->deviation = s->deviation = strl_arena_alloc(arena, triangles, sizeof *s->deviation);
     result->shift = s->shift = strl_arena_alloc(arena, triangles, sizeof *s->shift);
-    return result->collapses && result->wedge_parent && result->removed_at && s->corner && s->drift && s->deviation &&
+    return result->collapses && result->wedge_parent && result->normal && result->removed_at && s->corner && s->drift && s->deviation &&
            s->shift;
 }
 
@@ -188,6 +195,7 @@ static void load(simplifier *s, strl_simplified *result)
         for (unsigned c = 0; c < 3; c++) {
             s->corner[t][c] = mesh->triangle[t][c];
             uint32_t p = mesh->wedge[mesh->triangle[t][c]].point, corner = 3 * t + c;
+            s->point[t][c] = p;
             s->corner_next[corner] = NO_INDEX;
             if (s->head[p] == NO_INDEX)
                 s->head[p] = corner;
@@ -219,8 +227,12 @@ static void map_wedges(simplifier *s, const strl_star *star, uint32_t to, strl_s
     for (uint32_t i = 0; i < star->count; i++) {
         uint32_t wedge = s->corner[star->triangle[i]][star->corner[i]];
         bool exact;
-        if (result->wedge_parent[wedge] == wedge)
-            result->wedge_parent[wedge] = strl__wedge_target(s, star, to, wedge, &exact);
+        if (result->wedge_parent[wedge] != wedge)
+            continue;
+        uint32_t target = strl__wedge_target(s, star, to, wedge, &exact);
+        result->wedge_parent[wedge] = target;
+        for (int k = 0; k < 3; k++)
+            s->normal_sum[target][k] += s->normal_sum[wedge][k];
     }
 }
 
@@ -239,6 +251,7 @@ void strl__apply_collapse(simplifier *s, const strl_star *star, const collapse_p
             continue;
         }
         s->corner[t][star->corner[i]] = result->wedge_parent[s->corner[t][star->corner[i]]];
+        s->point[t][star->corner[i]] = v;
         s->drift[t] = drift.of[i];
         s->deviation[t] = plan->deviation;
         s->shift[t] = plan->shift;
@@ -284,6 +297,27 @@ static void plan_and_push(simplifier *s, uint32_t point)
     heap_push(s, point, plan.key);
 }
 
+/* What a collapse of the point will cost at least, roughly, without a plan: its triangles have drifted so far already, and the
+ * nearest of its neighbours is so far off their planes. Most points of a mesh are never planned for this. */
+static float estimate_key(const simplifier *s, uint32_t point)
+{
+    double off_planes = INFINITY, weight = 0;
+    float shift = 0, drift = 0;
+    for (uint32_t corner = s->head[point]; corner != NO_INDEX; corner = s->corner_next[corner]) {
+        uint32_t t = corner / 3, c = corner % 3;
+        if (s->dead[t])
+            continue;
+        double off = strl__quadric_at(&s->quadrics[point], s->position[s->point[t][c == 2 ? 0 : c + 1]]);
+        off_planes = off < off_planes ? off : off_planes;
+        shift = strl__larger(shift, s->shift[t]);
+        drift = strl__larger(drift, strl_drift_length(&s->drift[t]));
+    }
+    weight = s->quadrics[point].xx + s->quadrics[point].yy + s->quadrics[point].zz; /* of unit normals */
+    if (weight > 0 && off_planes < INFINITY)
+        drift += ESTIMATE_SHARE * (float)sqrt(off_planes / weight);
+    return strl__larger(shift, s->mesh->start_error + drift);
+}
+
 static float smaller(float a, float b)
 {
     return a < b ? a : b;
@@ -325,7 +359,10 @@ static float run_rung(simplifier *s, float limit, bool adaptive, float *middle, 
     float reached = 0;
     for (uint32_t p = 0; p < s->mesh->point_count; p++)
         if (!(s->mesh->flags[p] & STRL_POINT_KEPT) && s->head[p] != NO_INDEX && s->heap_at[p] == NO_INDEX)
-            plan_and_push(s, p);
+        {
+            s->stale[p] = true;
+            heap_push(s, p, estimate_key(s, p));
+        }
     while (s->heap_count && wants_more(s, s->key[s->heap[0]])) {
         uint32_t point = s->heap[0];
         if (s->key[point] > limit || (adaptive && *middle > 0 && s->key[point] > LADDER_RATIO * *middle))
@@ -377,6 +414,20 @@ static bool climb_ladder(simplifier *s, float start, strl_arena *arena, strl_sim
     return true;
 }
 
+/* A vertex of the mesh after stands for a region; with its own normal alone it would show the noise of one place. */
+static void mean_normals(const simplifier *s, strl_simplified *result)
+{
+    for (uint32_t w = 0; w < s->mesh->wedge_count; w++) {
+        const strl_wedge *wedge = &s->mesh->wedge[w];
+        const float *sum = s->normal_sum[w], *own = s->normal[w];
+        bool others_look = s->mesh->flags[wedge->point] & STRL_POINT_OUTSIDE;
+        if (!others_look && sum[0] * own[0] + sum[1] * own[1] + sum[2] * own[2] > 0)
+            strl_oct_encode(sum, result->normal[w]);
+        else
+            memcpy(result->normal[w], wedge->normal, sizeof wedge->normal);
+    }
+}
+
 strl_status strl_simplify(const strl_mesh *mesh, const strl_simplify_desc *desc, strl_arena *arena,
                           strl_simplified *result, strl_error *err)
 {
@@ -389,9 +440,15 @@ strl_status strl_simplify(const strl_mesh *mesh, const strl_simplify_desc *desc,
     float middle = 0, reached = strl__larger(result->geometric, LEAST_ERROR);
     if (s.triangles_left > desc->target_triangles / FREE_DIVISOR)
         reached = strl__larger(reached, run_rung(&s, desc->error_limit, true, &middle, result));
+    if (desc->even_error > 0 && desc->last_rung >= STRL_SIMPLIFY_SEAMS && s.triangles_left > desc->least_triangles) {
+        s.rung = STRL_SIMPLIFY_SEAMS; /* for the error that the node ends at anyway */
+        reached = strl__larger(reached, run_rung(&s, smaller(desc->even_error, desc->error_limit), false, &middle, result));
+        s.rung = STRL_SIMPLIFY_TOPOLOGY;
+    }
     uint32_t enough = desc->even_error > 0 ? desc->most_triangles : desc->target_triangles;
     if (s.triangles_left > enough && !climb_ladder(&s, reached, arena, result))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to simplify %u triangles", mesh->triangle_count);
     result->triangles_left = s.triangles_left;
+    mean_normals(&s, result);
     return STRL_OK;
 }

@@ -45,6 +45,8 @@ typedef struct strl_simplified {
     uint32_t collapse_count;
     strl_collapse *collapses;    /* [collapse_count] in order */
     uint32_t *wedge_parent;      /* [wedge_count] the wedge that a removed one fell onto; itself where it was kept */
+    uint16_t (*normal)[2];       /* [wedge_count] octahedral: the mean over what fell onto the wedge, for the mesh after; the wedge's own
+                                  * where its point is STRL_POINT_OUTSIDE, because others look at it too */
     uint32_t *removed_at;        /* [triangle_count] index of the collapse that removed it; UINT32_MAX = still there */
     uint32_t (*corner)[3];       /* [triangle_count] current wedges of the triangles still there */
     strl_drift *drift;           /* [triangle_count] of the triangles still there, as in strl_mesh */

@@ -6,7 +6,7 @@
 #define RIM_WEIGHT 2.f
 
 /* The second target in quadric order is planned too where its quadric is not so many times worse. */
-#define SECOND_CHOICE 3
+#define SECOND_CHOICE 1.5
 
 double strl__quadric_at(const quadric *q, const double p[3])
 {

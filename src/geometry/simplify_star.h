@@ -43,10 +43,12 @@ typedef struct simplifier {
     double (*position)[3];
     float (*normal)[3];     /* per wedge, decoded */
     float (*colour)[3];     /* per wedge, 0..1 */
+    float (*normal_sum)[3]; /* per wedge, weighted by area, of it and all that fell onto it */
     quadric *quadrics;      /* per point */
     double *own_cost;       /* per point: its quadric at its own position */
     uint32_t *only_wedge;   /* per point: its wedge where it has just one; else NO_INDEX */
     uint32_t (*corner)[3];  /* current wedges */
+    uint32_t (*point)[3];   /* their points */
     uint32_t *corner_next;  /* [3 * triangle_count] next corner at the same point */
     uint32_t *head, *tail;  /* per point, corners */
     bool *dead;             /* per triangle */
@@ -73,7 +75,7 @@ static inline float strl__larger(float a, float b)
 
 static inline uint32_t strl__corner_point(const simplifier *s, uint32_t triangle, unsigned corner)
 {
-    return s->mesh->wedge[s->corner[triangle][corner]].point;
+    return s->point[triangle][corner];
 }
 
 /* Gathers the star of a point; dead corners met on the way are unlinked. False where it has more than STAR_MAX triangles. */

@@ -2,7 +2,8 @@
 add_library(strl_flags INTERFACE)
 target_include_directories(strl_flags INTERFACE ${CMAKE_SOURCE_DIR}/include ${CMAKE_SOURCE_DIR}/src)
 target_compile_options(strl_flags INTERFACE -Wall -Wextra -Wshadow -Wpointer-arith -Wvla
-  $<$<COMPILE_LANGUAGE:C>:-Wstrict-prototypes -Wmissing-prototypes> -ffp-contract=off)
+  $<$<COMPILE_LANGUAGE:C>:-Wstrict-prototypes -Wmissing-prototypes>
+  -ffp-contract=off -fno-math-errno -fno-trapping-math)
 target_compile_definitions(strl_flags INTERFACE _GNU_SOURCE _FILE_OFFSET_BITS=64)
 if(STRL_WERROR)
   target_compile_options(strl_flags INTERFACE -Werror)

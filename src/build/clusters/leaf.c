@@ -247,7 +247,7 @@ static strl_status mark_shared(const leaf_stage *stage, const shared_ref *refs, 
         if (!ref_of[p])
             continue;
         const uint32_t *list = stage->words + ref_of[p] - 1 + 3;
-        mesh->flags[p] |= STRL_POINT_KEPT;
+        mesh->flags[p] |= STRL_POINT_KEPT | STRL_POINT_OUTSIDE;
         memcpy(node->share + at, list + 1, list[0] * sizeof *list);
         at += list[0];
     }

@@ -236,7 +236,7 @@ static strl_status extract_member(const group_work *work, uint32_t which, strl_a
                 node->share[k] = node->share[k - 1];
                 node->share[k - 1] = swap;
             }
-        node->mesh.flags[next++] = at > begin ? STRL_POINT_KEPT : 0;
+        node->mesh.flags[next++] = at > begin ? STRL_POINT_KEPT | STRL_POINT_OUTSIDE : 0;
     }
     node->share_first[next] = at;
     return STRL_OK;
