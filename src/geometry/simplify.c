@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/hash.h"
 #include "geometry/octahedral.h"
 #include "geometry/simplify_plan.h"
 
@@ -16,64 +17,60 @@
 #define SMALL_SHARE 5e-4 /* of a piece's diagonal: errors below are never out of proportion */
 #define LEAST_ERROR 1.f  /* lattice units: below, all errors count as equal */
 
-static void heap_place(simplifier *s, uint32_t at, uint32_t point)
+static void heap_place(simplifier *s, uint32_t at, candidate c)
 {
-    s->heap[at] = point;
-    s->heap_at[point] = at;
+    s->heap[at] = c;
+    s->heap_at[c.point] = at;
 }
 
 /* Ties are broken by index, so that the order does not depend on the heap's history. */
-static bool before(const simplifier *s, uint32_t a, uint32_t b)
+static bool before(candidate a, candidate b)
 {
-    return s->key[a] < s->key[b] || (s->key[a] == s->key[b] && a < b);
+    return a.key < b.key || (a.key == b.key && a.point < b.point);
 }
 
 static void heap_up(simplifier *s, uint32_t at)
 {
-    uint32_t point = s->heap[at];
-    while (at > 0 && before(s, point, s->heap[(at - 1) / 2])) {
+    candidate c = s->heap[at];
+    while (at > 0 && before(c, s->heap[(at - 1) / 2])) {
         heap_place(s, at, s->heap[(at - 1) / 2]);
         at = (at - 1) / 2;
     }
-    heap_place(s, at, point);
+    heap_place(s, at, c);
 }
 
 static void heap_down(simplifier *s, uint32_t at)
 {
-    uint32_t point = s->heap[at];
+    candidate c = s->heap[at];
     for (;;) {
         uint32_t child = 2 * at + 1;
         if (child >= s->heap_count)
             break;
-        if (child + 1 < s->heap_count && before(s, s->heap[child + 1], s->heap[child]))
+        if (child + 1 < s->heap_count && before(s->heap[child + 1], s->heap[child]))
             child++;
-        if (!before(s, s->heap[child], point))
+        if (!before(s->heap[child], c))
             break;
         heap_place(s, at, s->heap[child]);
         at = child;
     }
-    heap_place(s, at, point);
+    heap_place(s, at, c);
 }
 
 static void heap_push(simplifier *s, uint32_t point, float key)
 {
-    s->key[point] = key;
-    s->heap[s->heap_count] = point;
+    s->heap[s->heap_count] = (candidate){key, point};
     heap_up(s, s->heap_count++);
 }
 
-static void heap_remove(simplifier *s, uint32_t point)
+static candidate heap_pop(simplifier *s)
 {
-    uint32_t at = s->heap_at[point];
-    if (at == NO_INDEX)
-        return;
-    s->heap_at[point] = NO_INDEX;
-    uint32_t last = s->heap[--s->heap_count];
-    if (last == point)
-        return;
-    heap_place(s, at, last);
-    heap_up(s, at);
-    heap_down(s, s->heap_at[last]);
+    candidate first = s->heap[0];
+    s->heap_at[first.point] = NO_INDEX;
+    if (--s->heap_count > 0) {
+        heap_place(s, 0, s->heap[s->heap_count]);
+        heap_down(s, 0);
+    }
+    return first;
 }
 
 /* Face planes weighted by area, and for every edge of odd use a plane across it, so that rims keep their shape. */
@@ -101,10 +98,22 @@ static void add_triangle_quadrics(simplifier *s, uint32_t t)
             s->normal_sum[s->corner[t][c]][k] += (float)length * s->normal[s->corner[t][c]][k];
 }
 
+/* True where every neighbour comes as often before the point as after it: then no edge of the point is of odd use. */
+static bool is_inside(const simplifier *s, uint32_t point)
+{
+    uint64_t balance = 0;
+    for (uint32_t corner = s->head[point]; corner != NO_INDEX; corner = s->corner_next[corner]) {
+        const uint32_t *p = s->point[corner / 3];
+        unsigned c = corner % 3;
+        balance += strl__mix64(p[c == 2 ? 0 : c + 1]) - strl__mix64(p[c == 0 ? 2 : c - 1]);
+    }
+    return balance == 0;
+}
+
 static void add_rim_quadrics(simplifier *s, uint32_t point)
 {
     strl_star star;
-    if ((s->mesh->flags[point] & STRL_POINT_KEPT) || !strl__star_gather(s, point, &star) || !star.on_boundary)
+    if ((s->mesh->flags[point] & STRL_POINT_KEPT) || is_inside(s, point) || !strl__star_gather(s, point, &star) || !star.on_boundary)
         return;
     for (uint32_t i = 0; i < star.count; i++)
         for (int side = 0; side < 2; side++) {
@@ -147,7 +156,6 @@ static bool allocate(simplifier *s, const strl_mesh *mesh, strl_arena *arena)
     s->stamp = strl_arena_alloc_zero(arena, points, sizeof *s->stamp);
     s->heap = strl_arena_alloc(arena, points, sizeof *s->heap);
     s->heap_at = strl_arena_alloc(arena, points, sizeof *s->heap_at);
-    s->key = strl_arena_alloc(arena, points, sizeof *s->key);
     s->plan = strl_arena_alloc(arena, points, sizeof *s->plan);
     s->own_cost = strl_arena_alloc(arena, points, sizeof *s->own_cost);
     s->only_wedge = strl_arena_alloc(arena, points, sizeof *s->only_wedge);
@@ -156,7 +164,7 @@ static bool allocate(simplifier *s, const strl_mesh *mesh, strl_arena *arena)
     if (mesh->holders && s->holders)
         memcpy(s->holders, mesh->holders, points);
     return (s->holders || !mesh->holders) && s->position && s->point && s->normal && s->normal_sum && s->colour && s->quadrics && s->corner_next && s->head && s->tail && s->dead &&
-           s->stamp && s->heap && s->heap_at && s->key && s->plan && s->own_cost && s->only_wedge && s->stale;
+           s->stamp && s->heap && s->heap_at && s->plan && s->own_cost && s->only_wedge && s->stale;
 }
 
 static bool allocate_result(simplifier *s, strl_simplified *result, strl_arena *arena)
@@ -363,11 +371,10 @@ static float run_rung(simplifier *s, float limit, bool adaptive, float *middle, 
             s->stale[p] = true;
             heap_push(s, p, estimate_key(s, p));
         }
-    while (s->heap_count && wants_more(s, s->key[s->heap[0]])) {
-        uint32_t point = s->heap[0];
-        if (s->key[point] > limit || (adaptive && *middle > 0 && s->key[point] > LADDER_RATIO * *middle))
+    while (s->heap_count && wants_more(s, s->heap[0].key)) {
+        if (s->heap[0].key > limit || (adaptive && *middle > 0 && s->heap[0].key > LADDER_RATIO * *middle))
             break;
-        heap_remove(s, point);
+        uint32_t point = heap_pop(s).point;
         if (s->stale[point]) {
             plan_and_push(s, point);
             continue;
@@ -388,7 +395,7 @@ static float run_rung(simplifier *s, float limit, bool adaptive, float *middle, 
             mark_stale(s, star.neighbour[i], plan.key);
     }
     while (s->heap_count)
-        heap_remove(s, s->heap[s->heap_count - 1]);
+        s->heap_at[s->heap[--s->heap_count].point] = NO_INDEX;
     return reached;
 }
 

@@ -240,10 +240,10 @@ bool strl__plan_best(simplifier *s, uint32_t point, collapse_plan *plan)
         uint32_t to = star.neighbour[order[i]];
         if (!strl__may_collapse(s, &star, to))
             continue;
-        collapse_plan candidate;
-        strl__plan_collapse(s, &star, to, &candidate);
-        if (found++ == 0 || candidate.key < plan->key)
-            *plan = candidate;
+        collapse_plan other;
+        strl__plan_collapse(s, &star, to, &other);
+        if (found++ == 0 || other.key < plan->key)
+            *plan = other;
         if (found == 1)
             least = cost[order[i]];
     }

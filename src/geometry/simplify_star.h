@@ -37,6 +37,11 @@ typedef struct collapse_plan {
     float key;
 } collapse_plan;
 
+typedef struct candidate {
+    float key;
+    uint32_t point;
+} candidate;
+
 typedef struct simplifier {
     const strl_mesh *mesh;
     const strl_simplify_desc *desc;
@@ -61,9 +66,9 @@ typedef struct simplifier {
     float free_key;         /* the largest key that was claimed before anything collapsed */
     strl_simplify_rung rung;
     /* candidates: a binary heap of points by key */
-    uint32_t *heap, heap_count;
+    candidate *heap;
+    uint32_t heap_count;
     uint32_t *heap_at;      /* per point, NO_INDEX = not in the heap */
-    float *key;             /* per point */
     collapse_plan *plan;    /* per point: the best collapse, valid where not stale */
     bool *stale;            /* per point: the neighbourhood changed since key was computed */
 } simplifier;
