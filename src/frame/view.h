@@ -1,4 +1,4 @@
-/* Camera arithmetic in double precision: view basis, frustum, and the pixel error of a box (shared/design: "Error"). */
+/* Camera arithmetic in double precision: view basis, frustum, and the pixel error of a box (docs/algorithms/clusters.md, "Errors and boxes of a node"). */
 #ifndef STRL_FRAME_VIEW_H
 #define STRL_FRAME_VIEW_H
 

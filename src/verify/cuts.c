@@ -23,6 +23,7 @@ void strl__v_view_random(const strl__vtree *tree, uint64_t seed, uint32_t number
     view->angle = LEAST_ANGLE * pow(ANGLE_RANGE, strl__random(view->seed, 4, 0));
     view->refusing = number % 4 < 2 ? 0 : 0.4 * strl__random(view->seed, 5, 0);
     view->any_state = number % 8 >= 5;
+    view->by_demand = number % 3 != 0;
 }
 
 double strl__v_view_angle(const strl__vview *view, const int64_t box[2][3], double error)
@@ -53,34 +54,65 @@ uint32_t strl__v_view_state(const strl__vview *view, const strl__vnode *node, ui
 }
 
 /* What is known of a group while its level is visited. */
-#define MEMBERS 0x7fffffffu
+#define MEMBERS 0x3fffffffu
+#define ASKED 0x40000000u
 #define SPLITS 0x80000000u
 
-static bool wants_split(const strl__vtree *tree, const strl__vview *view, uint32_t group)
+/* The end of the level that begins with node `first`. */
+static uint32_t level_end(const strl__vtree *tree, uint32_t first)
+{
+    uint32_t end = first;
+    while (end < tree->node_count && tree->nodes[end].level == tree->nodes[first].level)
+        end++;
+    return end;
+}
+
+static bool node_asks(const strl__vview *view, const strl__vnode *n)
+{
+    return n->child_count && strl__v_view_angle(view, n->box, fmaxf(n->geometric_min, n->appearance_min)) > view->angle;
+}
+
+/* Marks the groups of nodes that are too coarse, and those of all their members' ancestors, from the leaves up. */
+static void mark_asked(const strl__vtree *tree, const strl__vview *view, uint32_t *groups)
+{
+    for (uint32_t end = tree->node_count, first; end > 0; end = first) {
+        for (first = end; first > 0 && tree->nodes[first - 1].level == tree->nodes[end - 1].level; first--)
+            if (node_asks(view, &tree->nodes[first - 1]))
+                groups[tree->nodes[first - 1].group] |= ASKED;
+        for (uint32_t id = first > 0 ? first : 1; id < end; id++)
+            if (groups[tree->nodes[id].group] & ASKED)
+                groups[tree->nodes[tree->nodes[id].parent].group] |= ASKED;
+    }
+}
+
+static bool wants_split(const strl__vtree *tree, const strl__vview *view, uint32_t group, bool asked)
 {
     const strl__vnode *n = &tree->nodes[tree->group_first[group]];
     double error = fmaxf(n->group_geometric, n->group_appearance);
-    return strl__v_view_angle(view, n->group_box, error) > view->angle &&
-           strl__random(view->seed, 7, group) >= view->refusing;
+    bool wants = view->by_demand ? asked : strl__v_view_angle(view, n->group_box, error) > view->angle;
+    return wants && strl__random(view->seed, 7, group) >= view->refusing;
 }
 
 void strl__v_cut_view(const strl__vtree *tree, const strl__vview *view, uint32_t *groups, uint64_t *active)
 {
     memset(groups, 0, (size_t)tree->group_count * sizeof *groups);
     memset(active, 0, strl__bit_words(tree) * sizeof *active);
+    if (view->by_demand)
+        mark_asked(tree, view, groups);
     /* Levels fall with the id: all members of a group are met before the first child of any. */
     for (uint32_t first = 0, end; first < tree->node_count; first = end) {
-        for (end = first; end < tree->node_count && tree->nodes[end].level == tree->nodes[first].level; end++) {
-            const strl__vnode *n = &tree->nodes[end];
-            bool here = end == 0 || groups[tree->nodes[n->parent].group] & SPLITS;
+        end = level_end(tree, first);
+        for (uint32_t id = first; id < end; id++) {
+            const strl__vnode *n = &tree->nodes[id];
+            bool here = id == 0 || groups[tree->nodes[n->parent].group] & SPLITS;
             if (here)
-                strl__bit_set(active, end);
+                strl__bit_set(active, id);
             groups[n->group] += here && n->child_count > 0;
         }
         for (uint32_t id = first; id < end; id++) {
             const strl__vnode *n = &tree->nodes[id];
             if (strl__bit(active, id) && (groups[n->group] & MEMBERS) == n->group_size &&
-                wants_split(tree, view, n->group))
+                wants_split(tree, view, n->group, groups[n->group] & ASKED))
                 groups[n->group] |= SPLITS;
         }
     }

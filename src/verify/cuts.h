@@ -1,6 +1,7 @@
 /* Cuts through a tree. A uniform cut splits the groups whose geometric error is above a length. A view-
- * dependent one splits those whose error, seen from an eye, is above an angle, all of whose members are active
- * and have children, and that do not refuse to split (as a group does whose children have not arrived). */
+ * dependent one splits those whose error, seen from an eye, is above an angle (or only those that some node asks
+ * for), all of whose members are active and have children, and that do not refuse to split (as a group does whose
+ * children have not arrived). */
 #ifndef STRL_VERIFY_CUTS_H
 #define STRL_VERIFY_CUTS_H
 
@@ -11,6 +12,7 @@ typedef struct strl__vview {
     double eye[3];
     double angle;    /* allowed error over distance */
     double refusing; /* share of groups that refuse to split */
+    bool by_demand;  /* groups split that a node too coarse asks for, and those above them; else all whose bounds allow it */
     bool any_state;  /* nodes take any state that is fine enough, not the coarsest */
     uint64_t seed;
 } strl__vview;
