@@ -25,6 +25,7 @@ typedef struct strl_node_state {
     uint32_t payload_bytes;
     uint64_t mesh_at;       /* base mesh, in the mesh spill of its level */
     uint32_t mesh_bytes;
+    bool needs_payload;     /* positions of the base mesh are in the payload alone */
     uint32_t point_count;   /* of the base mesh */
     uint32_t outer_shared;  /* points of the base mesh that a node other than the sibling has too */
     uint32_t group;         /* index within the level */

@@ -5,6 +5,7 @@
 
 #include "base/fail.h"
 #include "build/clusters/hierarchy.h"
+#include "geometry/payload.h"
 #include "geometry/record.h"
 #include "geometry/simplify.h"
 
@@ -46,21 +47,36 @@ typedef struct group_work {
     strl_simplify_rung rung;
 } group_work;
 
+/* A base mesh comes from its spill, and from the node's payload where that has the positions. */
+static strl_status read_child(const strl_level *children, uint32_t index, strl_arena *arena, strl_arena *scratch,
+                              strl_node_mesh *child, strl_error *err)
+{
+    const strl_node_state *state = &children->nodes[index];
+    void *mesh = strl_arena_alloc(scratch, state->mesh_bytes, 1);
+    void *payload = strl_arena_alloc(scratch, state->payload_bytes, 1);
+    strl_pm decoded, *given = state->needs_payload ? &decoded : NULL;
+    if (!mesh || !payload)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u bytes", state->payload_bytes);
+    strl_status status = strl_spill_read(children->meshes, state->mesh_at, mesh, state->mesh_bytes, err);
+    if (!status && given)
+        status = strl_spill_read(children->payloads, state->payload_at, payload, state->payload_bytes, err);
+    if (!status && given)
+        status = strl_payload_decode(payload, state->payload_bytes, scratch, given, err);
+    return status ? status : strl_node_mesh_read(mesh, state->mesh_bytes, given, arena, child, err);
+}
+
 static strl_status read_children(const level_stage *stage, group_work *work, strl_arena *arena, strl_error *err)
 {
-    for (uint32_t i = 0; i < 2 * work->count; i++) {
-        const strl_node_state *state = &stage->children->nodes[2 * work->member[i / 2] + (i & 1)];
-        void *bytes = strl_arena_alloc(arena, state->mesh_bytes, 1);
-        if (!bytes)
-            return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u bytes", state->mesh_bytes);
-        strl_status status = strl_spill_read(stage->children->meshes, state->mesh_at, bytes, state->mesh_bytes, err);
-        if (!status)
-            status = strl_node_mesh_read(bytes, state->mesh_bytes, arena, &work->child[i], err);
-        if (status)
-            return status;
+    strl_arena scratch = {0};
+    strl_arena_mark mark = strl_arena_get_mark(&scratch);
+    strl_status status = STRL_OK;
+    for (uint32_t i = 0; i < 2 * work->count && !status; i++) {
+        status = read_child(stage->children, 2 * work->member[i / 2] + (i & 1), arena, &scratch, &work->child[i], err);
+        strl_arena_rewind(&scratch, mark);
     }
+    strl_arena_deinit(&scratch);
     work->child_count = 2 * work->count;
-    return STRL_OK;
+    return status;
 }
 
 static uint32_t member_index(const group_work *work, uint32_t node)

@@ -127,7 +127,7 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
     const strl_ingest *ingest = hierarchy->ingest;
     strl_arena_mark mark = strl_arena_get_mark(arena);
     strl_simplified simplified;
-    strl_pm pm;
+    strl_pm pm, decoded;
     strl_node_mesh base = {0};
     uint32_t *point_map = strl_arena_alloc(arena, node->mesh.point_count, sizeof *point_map);
     strl_status status = point_map ? simplify(&node->mesh, target, hierarchy->even_error, arena, &simplified, err)
@@ -138,6 +138,10 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
         status = strl_payload_encode(&pm, arena, &made->payload, err);
     if (!status)
         status = strl_mesh_after(&node->mesh, &simplified, point_map, arena, &base.mesh, err);
+    /* where hardly any triangles share points, positions are most of a base mesh: they are not spilled twice */
+    made->state.needs_payload = !status && base.mesh.point_count / 3 > base.mesh.triangle_count / 4;
+    if (made->state.needs_payload) /* it comes back in an order of its own */
+        status = strl_payload_decode(made->payload.data, made->payload.size, arena, &decoded, err);
     if (status)
         goto done;
     memcpy(base.anchor, node->anchor, sizeof base.anchor);
@@ -147,9 +151,7 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
         goto done;
     }
-    strl_node_mesh_write(&base, &made->mesh);
-    if (made->mesh.failed || made->payload.failed)
-        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
+    status = strl_node_mesh_write(&base, made->state.needs_payload ? &decoded : NULL, arena, &made->mesh, err);
 done:
     strl_arena_rewind(arena, mark);
     return status;

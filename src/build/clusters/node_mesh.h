@@ -8,6 +8,7 @@
 
 #include "base/cursor.h"
 #include "geometry/mesh.h"
+#include "geometry/progressive.h"
 #include "stroll/error.h"
 
 typedef struct strl_node_mesh {
@@ -17,10 +18,13 @@ typedef struct strl_node_mesh {
     uint32_t *share;       /* other holders, ascending */
 } strl_node_mesh;
 
-/* Scratch format, not for exchange. Appends to writer. */
-void strl_node_mesh_write(const strl_node_mesh *node, strl_writer *writer);
+/* Scratch format, not for exchange. Appends to writer. payload: the node's payload, decoded: its base state has all points of the
+ * node, so that positions need not be told; NULL = they are. The reader must be given the same. */
+strl_status strl_node_mesh_write(const strl_node_mesh *node, const strl_pm *payload, strl_arena *arena,
+                                 strl_writer *writer, strl_error *err);
 /* Arrays come from arena. */
-strl_status strl_node_mesh_read(const void *data, size_t size, strl_arena *arena, strl_node_mesh *node, strl_error *err);
+strl_status strl_node_mesh_read(const void *data, size_t size, const strl_pm *payload, strl_arena *arena,
+                                strl_node_mesh *node, strl_error *err);
 
 /* Welds meshes at equal lattice positions, and their wedges where all attributes agree. Positions of the result are relative to the first mesh's anchor.
  * owner: [all triangles] receives the index of the mesh that each triangle came from. point_of: [count][points of each] receives the new

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/hash.h"
 #include "build/clusters/node_mesh.h"
 #include "store/pack.h"
 
@@ -10,31 +11,91 @@
 #define DRIFT_STEPS 250.f /* below 255: quotients may round up by one */
 
 typedef struct models {
-    strl_pack_points position;
-    strl_pack_model point, normal[2][STRL_PACK_LENGTHS], colour_repeats, colour[4], palette;
+    strl_pack_model vertex, point, normal[2][STRL_PACK_LENGTHS], colour_repeats, colour[4], palette;
     strl_pack_model corner[3];
     strl_pack_model drift_repeats, drift[6], deviation_repeats, deviation, shift_repeats, shift;
     strl_pack_model share_count, share;
 } models;
 
-static void write_positions(const strl_mesh *mesh, models *m, strl_packer *packer)
+/* Open addressing from position to base vertex; slot value vertex + 1. */
+typedef struct place_table {
+    const strl_pm *payload;
+    uint32_t *slots;
+    uint32_t mask;
+} place_table;
+
+static uint32_t *find_place(const place_table *table, const int32_t position[3])
 {
-    strl_pack_points_init(&m->position);
+    uint64_t hash = strl__mix64(((uint64_t)(uint32_t)position[0] << 32 | (uint32_t)position[1]) ^
+                                strl__mix64((uint32_t)position[2]));
+    uint32_t at = (uint32_t)hash & table->mask;
+    while (table->slots[at] &&
+           memcmp(table->payload->position[table->slots[at] - 1], position, sizeof *table->payload->position))
+        at = (at + 1) & table->mask;
+    return &table->slots[at];
+}
+
+static bool list_places(place_table *table, const strl_pm *payload, strl_arena *arena)
+{
+    uint32_t size = 16;
+    while (size < 2 * payload->vertex_end[0])
+        size *= 2;
+    *table = (place_table){.payload = payload, .mask = size - 1};
+    table->slots = strl_arena_alloc_zero(arena, size, sizeof *table->slots);
+    for (uint32_t v = 0; table->slots && v < payload->vertex_end[0]; v++) {
+        uint32_t *slot = find_place(table, payload->position[v]);
+        *slot = *slot ? *slot : v + 1;
+    }
+    return table->slots != NULL;
+}
+
+static void write_positions(const strl_mesh *mesh, strl_packer *packer)
+{
+    strl_pack_points points;
+    strl_pack_points_init(&points);
     for (uint32_t p = 0; p < mesh->point_count; p++) {
         uint32_t position[3];
         memcpy(position, mesh->position[p], sizeof position);
-        strl_pack_point(packer, &m->position, position);
+        strl_pack_point(packer, &points, position);
     }
 }
 
-static void read_positions(strl_mesh *mesh, models *m, strl_unpacker *unpacker)
+static void read_positions(strl_mesh *mesh, strl_unpacker *unpacker)
 {
-    strl_pack_points_init(&m->position);
+    strl_pack_points points;
+    strl_pack_points_init(&points);
     for (uint32_t p = 0; p < mesh->point_count; p++) {
         uint32_t position[3];
-        strl_unpack_point(unpacker, &m->position, position);
+        strl_unpack_point(unpacker, &points, position);
         memcpy(mesh->position[p], position, sizeof position);
     }
+}
+
+/* A point is told by the first base vertex at its position. False where there is none. */
+static bool write_points(const strl_mesh *mesh, const place_table *places, models *m, strl_packer *packer)
+{
+    uint32_t next = 0;
+    for (uint32_t p = 0; p < mesh->point_count; p++) {
+        uint32_t vertex = *find_place(places, mesh->position[p]);
+        if (!vertex)
+            return false;
+        strl_pack(packer, &m->vertex, strl_pack_zigzag(vertex - 1 - next));
+        next = vertex;
+    }
+    return true;
+}
+
+static bool read_points(strl_mesh *mesh, const strl_pm *payload, models *m, strl_unpacker *unpacker)
+{
+    uint32_t next = 0;
+    for (uint32_t p = 0; p < mesh->point_count; p++) {
+        uint32_t vertex = next + strl_unpack_zigzag(strl_unpack(unpacker, &m->vertex));
+        if (vertex >= payload->vertex_end[0])
+            return false;
+        memcpy(mesh->position[p], payload->position[vertex], sizeof *mesh->position);
+        next = vertex + 1;
+    }
+    return true;
 }
 
 static void write_wedges(const strl_mesh *mesh, models *m, strl_packer *packer)
@@ -201,12 +262,16 @@ static bool read_shares(strl_node_mesh *node, uint32_t shares, models *m, strl_u
     return at == shares;
 }
 
-void strl_node_mesh_write(const strl_node_mesh *node, strl_writer *writer)
+strl_status strl_node_mesh_write(const strl_node_mesh *node, const strl_pm *payload, strl_arena *arena,
+                                 strl_writer *writer, strl_error *err)
 {
     const strl_mesh *mesh = &node->mesh;
     strl_packer packer = {.out = writer};
     float step = drift_step(mesh);
     models m = {0};
+    place_table places;
+    if (payload && !list_places(&places, payload, arena))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", mesh->triangle_count);
     strl_writer_u32(writer, mesh->point_count);
     strl_writer_u32(writer, mesh->wedge_count);
     strl_writer_u32(writer, mesh->triangle_count);
@@ -214,7 +279,10 @@ void strl_node_mesh_write(const strl_node_mesh *node, strl_writer *writer)
     strl_writer_bytes(writer, node->anchor, sizeof node->anchor);
     strl_writer_f32(writer, mesh->start_error);
     strl_writer_f32(writer, step);
-    write_positions(mesh, &m, &packer);
+    if (payload && !write_points(mesh, &places, &m, &packer))
+        return strl__fail(err, STRL_ERR_INTERNAL, "a node's payload lacks a point of its base mesh");
+    if (!payload)
+        write_positions(mesh, &packer);
     write_wedges(mesh, &m, &packer);
     write_triangles(mesh, &m, &packer);
     write_drifts(mesh, step, &m, &packer);
@@ -223,14 +291,20 @@ void strl_node_mesh_write(const strl_node_mesh *node, strl_writer *writer)
     if (node->share_first)
         write_shares(node, &m, &packer);
     strl_pack_finish(&packer);
+    return writer->failed
+               ? strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", mesh->triangle_count)
+               : STRL_OK;
 }
 
-static bool read_arrays(strl_node_mesh *node, uint32_t shares, float step, strl_unpacker *unpacker)
+static bool read_arrays(strl_node_mesh *node, const strl_pm *payload, uint32_t shares, float step,
+                        strl_unpacker *unpacker)
 {
     strl_mesh *mesh = &node->mesh;
     models m = {0};
-    read_positions(mesh, &m, unpacker);
-    bool good = read_wedges(mesh, &m, unpacker);
+    bool good = !payload || read_points(mesh, payload, &m, unpacker);
+    if (!payload)
+        read_positions(mesh, unpacker);
+    good = read_wedges(mesh, &m, unpacker) && good;
     good = read_triangles(mesh, &m, unpacker) && good;
     read_drifts(mesh, step, &m, unpacker);
     read_floats(mesh->deviation, mesh->triangle_count, &m.deviation_repeats, &m.deviation, unpacker);
@@ -240,7 +314,8 @@ static bool read_arrays(strl_node_mesh *node, uint32_t shares, float step, strl_
     return good && !unpacker->failed;
 }
 
-strl_status strl_node_mesh_read(const void *data, size_t size, strl_arena *arena, strl_node_mesh *node, strl_error *err)
+strl_status strl_node_mesh_read(const void *data, size_t size, const strl_pm *payload, strl_arena *arena,
+                                strl_node_mesh *node, strl_error *err)
 {
     strl_cursor cursor = strl_cursor_make(data, size);
     uint32_t points = strl_cursor_u32(&cursor), wedges = strl_cursor_u32(&cursor);
@@ -263,7 +338,7 @@ strl_status strl_node_mesh_read(const void *data, size_t size, strl_arena *arena
     memcpy(node->anchor, anchor, sizeof node->anchor);
     node->mesh.start_error = start_error;
     strl_unpacker unpacker = strl_unpacker_make((const uint8_t *)data + cursor.at, size - cursor.at);
-    return read_arrays(node, shares, step, &unpacker)
+    return read_arrays(node, payload, shares, step, &unpacker)
                ? STRL_OK
                : strl__fail(err, STRL_ERR_INTERNAL, "a node's mesh in scratch is cut off or damaged");
 }
