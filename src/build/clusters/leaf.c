@@ -322,10 +322,9 @@ static strl_status take_leaf(void *context, uint64_t index, unsigned slot, unsig
     leaf_stage *stage = context;
     uint32_t cluster = stage->first_cluster + (uint32_t)index;
     (void)worker;
+    drop_what_was_read(stage, cluster);
     strl_status status = strl_take_node(stage->hierarchy, stage->level, cluster, &stage->slots[slot], err);
     strl_made_node_deinit(&stage->slots[slot]);
-    if (!status)
-        drop_what_was_read(stage, cluster);
     return status ? status : strl__build_report(stage->hierarchy->context, cluster + 1, stage->level->count, err);
 }
 

@@ -356,13 +356,12 @@ static strl_status take_group(void *context, uint64_t index, unsigned slot, unsi
     strl_status status = STRL_OK;
     (void)worker;
     finish_records(stage, made, member);
-    for (uint32_t m = 0; m < made->count && !status; m++) {
-        status = strl_take_node(stage->hierarchy, stage->level, member[m], &made->node[m], err);
-        for (uint32_t i = 0; i < 2 && !status; i++) { /* nobody else reads a child */
-            const strl_node_state *child = &stage->children->nodes[2 * member[m] + i];
-            strl_spill_drop(stage->children->meshes, child->mesh_at, child->mesh_bytes);
-        }
+    for (uint32_t i = 0; i < 2 * made->count; i++) { /* nobody else reads a child */
+        const strl_node_state *child = &stage->children->nodes[2 * member[i / 2] + (i & 1)];
+        strl_spill_drop(stage->children->meshes, child->mesh_at, child->mesh_bytes);
     }
+    for (uint32_t m = 0; m < made->count && !status; m++)
+        status = strl_take_node(stage->hierarchy, stage->level, member[m], &made->node[m], err);
     made_group_deinit(made);
     return status ? status
                   : strl__build_report(stage->hierarchy->context, stage->groups.first[index + 1], stage->level->count, err);
