@@ -12,6 +12,7 @@
 #include "base/hash.h"
 #include "build/cuts.h"
 #include "build/meshes.h"
+#include "build/open_edges.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define SMALLER 5u
@@ -216,25 +217,6 @@ static void random_cut(const built_model *model, groups *list, uint64_t *random,
 }
 
 /* ---- cracks ---- */
-typedef struct edge {
-    int64_t low[3], high[3];
-} edge;
-
-static int compare_places(const int64_t a[3], const int64_t b[3])
-{
-    for (int k = 0; k < 3; k++)
-        if (a[k] != b[k])
-            return a[k] < b[k] ? -1 : 1;
-    return 0;
-}
-
-static int compare_edges(const void *a, const void *b)
-{
-    const edge *x = a, *y = b;
-    int order = compare_places(x->low, y->low);
-    return order ? order : compare_places(x->high, y->high);
-}
-
 static uint64_t hash_place(const int64_t p[3])
 {
     return strl__mix64((uint64_t)p[0] + 0x9e37 + strl__mix64((uint64_t)p[1] + strl__mix64((uint64_t)p[2])));
@@ -254,34 +236,12 @@ static uint64_t odd_edges_hash(size_t count, const int64_t (*triangle)[3][3])
     return sum;
 }
 
-/* Edges of odd use, sorted: malloc. */
-static edge *list_odd_edges(size_t count, const int64_t (*triangle)[3][3], size_t *odd)
-{
-    edge *edges = malloc((3 * count + 1) * sizeof *edges);
-    assert_non_null(edges);
-    for (size_t i = 0; i < 3 * count; i++) {
-        const int64_t *a = triangle[i / 3][i % 3], *b = triangle[i / 3][(i + 1) % 3];
-        bool swap = compare_places(a, b) > 0;
-        memcpy(edges[i].low, swap ? b : a, sizeof edges[i].low);
-        memcpy(edges[i].high, swap ? a : b, sizeof edges[i].high);
-    }
-    qsort(edges, 3 * count, sizeof *edges, compare_edges);
-    *odd = 0;
-    for (size_t i = 0, next; i < 3 * count; i = next) {
-        for (next = i + 1; next < 3 * count && !compare_edges(&edges[i], &edges[next]);)
-            next++;
-        if ((next - i) & 1)
-            edges[(*odd)++] = edges[i];
-    }
-    return edges;
-}
-
 static void assert_closed(const cut_mesh *cut, const char *what, uint32_t number)
 {
     if (odd_edges_hash(cut->count, (const int64_t(*)[3][3])cut->triangle) == 0)
         return;
     size_t odd;
-    free(list_odd_edges(cut->count, (const int64_t(*)[3][3])cut->triangle, &odd));
+    free(list_open_edges(cut->count, (const int64_t(*)[3][3])cut->triangle, &odd));
     fail_msg("%s cut %u of %zu triangles has %zu open edges", what, number, cut->count, odd);
 }
 
@@ -324,40 +284,6 @@ static void a_closed_mesh_has_no_crack_in_any_cut(void **state)
     built_close(&model);
 }
 
-static int compare_stored_places(const void *a, const void *b)
-{
-    return compare_places(a, b);
-}
-
-/* Ends of open edges of the input: sorted, malloc. */
-static int64_t (*rim_of_input(const cut_input *in, size_t *count))[3]
-{
-    size_t odd;
-    edge *edges = list_odd_edges(in->count, (const int64_t(*)[3][3])in->triangle, &odd);
-    int64_t(*rim)[3] = malloc((2 * odd + 1) * sizeof *rim);
-    assert_non_null(rim);
-    for (size_t i = 0; i < odd; i++) {
-        memcpy(rim[2 * i], edges[i].low, sizeof rim[0]);
-        memcpy(rim[2 * i + 1], edges[i].high, sizeof rim[0]);
-    }
-    *count = 2 * odd;
-    qsort(rim, *count, sizeof *rim, compare_stored_places);
-    free(edges);
-    return rim;
-}
-
-static void assert_open_at_the_rim_only(const cut_mesh *cut, const int64_t (*rim)[3], size_t rim_count, uint32_t number)
-{
-    size_t odd;
-    edge *edges = list_odd_edges(cut->count, (const int64_t(*)[3][3])cut->triangle, &odd);
-    for (size_t i = 0; i < odd; i++)
-        if (!bsearch(edges[i].low, rim, rim_count, sizeof *rim, compare_stored_places) ||
-            !bsearch(edges[i].high, rim, rim_count, sizeof *rim, compare_stored_places))
-            fail_msg("cut %u has %zu open edges, one of which ends at %lld %lld %lld, where the input is closed",
-                     number, odd, (long long)edges[i].low[0], (long long)edges[i].low[1], (long long)edges[i].low[2]);
-    free(edges);
-}
-
 static void open_edges_end_at_boundary_points_of_the_input(void **state)
 {
     (void)state;
@@ -371,14 +297,15 @@ static void open_edges_end_at_boundary_points_of_the_input(void **state)
     built_open(&model, built_path("states.stroll"));
     cut_input_load(&model, &in);
     list_groups(&model, &list);
-    int64_t(*rim)[3] = rim_of_input(&in, &rim_count);
+    int64_t(*rim)[3] = list_rim_points(in.count, (const int64_t(*)[3][3])in.triangle, &rim_count);
     assert_true(rim_count > 0);
     for (uint32_t i = 0; i < RANDOM_CUTS / 2; i++) {
         random_cut(&model, &list, &random, &cut);
         if (cut.worst_rung >= STRL_RUNG_CLUSTERING)
             continue;
         checked++;
-        assert_open_at_the_rim_only(&cut, (const int64_t(*)[3])rim, rim_count, i);
+        assert_open_at_the_rim_only(cut.count, (const int64_t(*)[3][3])cut.triangle, (const int64_t(*)[3])rim, rim_count,
+                                    i);
     }
     assert_true(checked > RANDOM_CUTS / 8);
     free(rim);
