@@ -101,7 +101,11 @@ strl_status strl_groups_choose(const strl_level *children, const strl_adjacency 
                                uint32_t levels_above, bool single, strl_groups *groups, strl_error *err);
 void strl_groups_deinit(strl_groups *groups);
 
-/* Shared points of the leaves, by cluster: read from ingest, written to streams of cluster ranges. */
+/* A position that has more cells than this outside of a cluster has no sensible normal anyway. */
+#define STRL_HALO_CELLS 64u
+
+/* Shared points of the leaves, by cluster: read from ingest, written to streams of cluster ranges. The cells are those outside of
+ * the cluster; none where they are more than STRL_HALO_CELLS. */
 typedef struct strl_leaf_shares {
     uint32_t bucket_count;
     uint32_t *bucket_first; /* [bucket_count + 1] clusters */

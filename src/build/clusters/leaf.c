@@ -25,8 +25,6 @@ typedef struct leaf_stage {
     strl_arena *arenas;    /* per worker */
 } leaf_stage;
 
-/* A position in more cells than this has no sensible normal anyway. */
-#define HALO_CELLS 64u
 #define SAMPLE_LEAVES 16u
 #define NO_READER UINT32_MAX
 
@@ -71,8 +69,8 @@ static const uint32_t *cells_of_ref(const leaf_stage *stage, const shared_ref *r
 }
 
 /* The cluster's own cells and those of others that have one of its positions, ascending, each once: faces round a position then
- * come in one order wherever the position is looked at. Positions in very many cells bring none in: their normals are
- * then of the cluster's own faces. */
+ * come in one order wherever the position is looked at. Positions in very many cells list none: their normals are then
+ * of the cluster's own faces. */
 static uint32_t *cells_with_halo(const leaf_stage *stage, const uint32_t *own, uint32_t own_count, const shared_ref *refs,
                                  size_t ref_count, strl_arena *arena, uint32_t *count)
 {
@@ -80,7 +78,7 @@ static uint32_t *cells_with_halo(const leaf_stage *stage, const uint32_t *own, u
     uint32_t some;
     for (size_t i = 0; i < ref_count; i++) {
         cells_of_ref(stage, &refs[i], &some);
-        total += some <= HALO_CELLS ? some : 0;
+        total += some;
     }
     uint32_t *cells = strl_arena_alloc(arena, total, sizeof *cells);
     if (!cells)
@@ -89,8 +87,6 @@ static uint32_t *cells_with_halo(const leaf_stage *stage, const uint32_t *own, u
     size_t at = own_count;
     for (size_t i = 0; i < ref_count; i++) {
         const uint32_t *list = cells_of_ref(stage, &refs[i], &some);
-        if (some > HALO_CELLS)
-            continue;
         memcpy(cells + at, list, some * sizeof *cells);
         at += some;
     }

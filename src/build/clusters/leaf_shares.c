@@ -80,12 +80,27 @@ static void note_readers(distributor *d, uint32_t cell_count)
             last_reader[d->cells[i]] = last;
 }
 
+/* Returns how many there are; 0 where they are too many. */
+static uint32_t list_cells_outside(const distributor *d, uint32_t cluster, uint32_t cell_count,
+                                   uint32_t cells[STRL_HALO_CELLS])
+{
+    uint32_t count = 0;
+    for (uint32_t k = 0; k < cell_count; k++) {
+        if (d->hierarchy->partition->cluster[d->cells[k]] == cluster)
+            continue;
+        if (count == STRL_HALO_CELLS)
+            return 0;
+        cells[count++] = d->cells[k];
+    }
+    return count;
+}
+
 static strl_status hand_out(distributor *d, const uint32_t position[3], uint32_t cell_count, strl_error *err)
 {
     strl_status status = STRL_OK;
     for (uint32_t i = 0; i < d->cluster_count && !status; i++) {
         uint32_t cluster = d->clusters[i], size = 0;
-        if (!strl__grow(&d->words, &d->word_capacity, 6 + d->cluster_count + (size_t)cell_count, sizeof *d->words))
+        if (!strl__grow(&d->words, &d->word_capacity, 6 + (size_t)d->cluster_count + STRL_HALO_CELLS, sizeof *d->words))
             return strl__fail(err, STRL_ERR_MEMORY, "no memory for a position in %u cells", cell_count);
         d->words[size++] = cluster;
         memcpy(d->words + size, position, 12);
@@ -94,11 +109,9 @@ static strl_status hand_out(distributor *d, const uint32_t position[3], uint32_t
         for (uint32_t k = 0; k < d->cluster_count; k++)
             if (k != i)
                 d->words[size++] = d->clusters[k];
-        uint32_t count_at = size++;
-        for (uint32_t k = 0; k < cell_count; k++)
-            if (d->hierarchy->partition->cluster[d->cells[k]] != cluster)
-                d->words[size++] = d->cells[k];
-        d->words[count_at] = size - count_at - 1;
+        uint32_t *cells = d->words + size + 1, outside = list_cells_outside(d, cluster, cell_count, cells);
+        d->words[size] = outside;
+        size += 1 + outside;
         status = strl_spill_append(d->shares->spill[bucket_of_cluster(d->shares, cluster)], d->words, (size_t)size * 4, err);
     }
     return status;
