@@ -1,9 +1,11 @@
 /* Which groups split: the closure of what single nodes ask for (Quick-VDR 4.3 and 5.1, forced splits).
  *
- * A node that is too coarse asks for its group; a group that splits needs all its members, so the groups of its members' parents
- * must have split too, and so on up to the root. A group's error and box in the file bound everything at and below it: they say
- * where to look, but they grow with every level, and to split by them alone would draw far more than anybody asked for. So a
- * descent by these bounds first notes who asks for themselves, and what they need above them is then marked from the finest level up. */
+ * A node that is too coarse asks for its group; a group that splits needs all its members, so the
+ * groups of its members' parents must have split too, and so on up to the root. A group's error and
+ * box in the file bound everything at and below it: they say where to look, but they grow with every
+ * level, and to split by them alone would draw far more than anybody asked for. So a descent by
+ * these bounds first notes who asks for themselves, and what they need above them is then marked
+ * from the finest level up. */
 #include <string.h>
 
 #include "base/hash.h"
@@ -57,7 +59,8 @@ static strl_status explore_group(strl__descent *c, const strl__group *group)
     if (status != STRL_OK)
         return status;
     c->cut->records_missing |= worst == STRL__RECORDS_ABSENT;
-    for (size_t i = 0; i < walk->children.count; i++) { /* where some are absent, their groups are not complete */
+    /* where some children are absent, their groups are not complete */
+    for (size_t i = 0; i < walk->children.count; i++) {
         if (!strl__add_visit(&walk->below, walk->children.items[i], false))
             return strl__no_memory(c->err);
         walk->below.items[walk->below.count - 1].above = walk->demands.count - 1;

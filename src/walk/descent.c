@@ -75,20 +75,20 @@ bool strl__add_candidate(strl__candidates *candidates, strl__node *node, uint32_
 
 /* ---- children */
 
-/* True where a file's records contradict each other: the child is another node's. */
-static bool is_foreign(const strl_node *parent, uint32_t parent_id, const strl_node *child)
-{
-    return child->parent != parent_id || child->level + 1 != parent->level;
-}
-
 static uint32_t id_of(const strl__node *node)
 {
     return node->treelet->data.first_node + (uint32_t)(node - node->treelet->nodes);
 }
 
-static void check_child(strl_walk *walk, const strl__node *parent, strl__node *child)
+/* True where a file's records contradict each other: the child is another node's. */
+static bool is_foreign(const strl__node *parent, const strl__node *child)
 {
-    if (!is_foreign(parent->record, id_of(parent), child->record) || child->retry.frame > walk->frame)
+    return child->record->parent != id_of(parent) || child->record->level + 1 != parent->record->level;
+}
+
+static void note_foreign(strl_walk *walk, const strl__node *parent, strl__node *child)
+{
+    if (child->retry.frame > walk->frame)
         return;
     strl_error error = {0};
     strl__fail(&error, STRL_ERR_FORMAT, "tree %u: node %u is not the child of node %u that it is said to be",
@@ -97,14 +97,19 @@ static void check_child(strl_walk *walk, const strl__node *parent, strl__node *c
     strl__note_fault(walk, &error);
 }
 
-/* The records of one child, or a candidate for the treelet that has them. */
+/* The records of one child, or a candidate for the treelet that has them. Another node's child is withheld: a node is then
+ * met at most once in a descent, whatever a file says. */
 static strl__outlook find_child(strl__descent *c, strl__node *parent, uint32_t id, double urgency, strl__candidates *to,
-                          strl__node **child)
+                                strl__node **child)
 {
     strl_walk *walk = c->walk;
     *child = strl__node_find(walk, parent->treelet->tree, id);
+    if (*child && is_foreign(parent, *child)) {
+        note_foreign(walk, parent, *child);
+        *child = NULL;
+        return STRL__BACKING_OFF;
+    }
     if (*child) {
-        check_child(walk, parent, *child);
         bool waiting = (*child)->residency == STRL__ABSENT && (*child)->retry.frame > walk->frame;
         if (waiting && (*child)->retry.failures < STRL__GIVE_UP_FAILURES)
             c->cut->waits = true;
@@ -116,13 +121,13 @@ static strl__outlook find_child(strl__descent *c, strl__node *parent, uint32_t i
         return STRL__BACKING_OFF;
     }
     c->cut->waits = true;
-    strl__add_candidate(to, parent, id / STRL_TREELET_NODES, urgency); /* without memory it is asked for in a later frame */
+    /* without memory it is asked for in a later frame */
+    strl__add_candidate(to, parent, id / STRL_TREELET_NODES, urgency);
     return STRL__RECORDS_ABSENT;
 }
 
-/* Collects the children of all members in walk->children. The worst strl__outlook of any. */
 strl_status strl__find_children(strl__descent *c, const strl__group *group, double urgency, strl__candidates *to,
-                                 strl__outlook *worst)
+                                strl__outlook *worst)
 {
     strl_walk *walk = c->walk;
     walk->children.count = 0;
@@ -131,7 +136,8 @@ strl_status strl__find_children(strl__descent *c, const strl__group *group, doub
         strl__node *parent = walk->level.items[i].node;
         for (uint32_t k = 0; k < parent->record->child_count; k++) {
             strl__node *child;
-            strl__outlook found = find_child(c, parent, parent->record->first_child + k, urgency * RECORDS_FIRST, to, &child);
+            uint32_t id = parent->record->first_child + k;
+            strl__outlook found = find_child(c, parent, id, urgency * RECORDS_FIRST, to, &child);
             *worst = found > *worst ? found : *worst;
             if (child && !strl__add_node(&walk->children, child))
                 return strl__no_memory(c->err);

@@ -13,6 +13,7 @@ typedef struct strl__descent {
     strl_error *err;
 } strl__descent;
 
+/* What keeps a group's children away, the worst last. */
 typedef enum strl__outlook { STRL__HERE, STRL__RECORDS_ABSENT, STRL__BACKING_OFF } strl__outlook;
 
 strl_status strl__no_memory(strl_error *err);
@@ -30,7 +31,8 @@ bool strl__add_candidate(strl__candidates *candidates, strl__node *node, uint32_
 strl_status strl__gather_groups(strl_walk *walk, strl_error *err);
 /* All members are at this level, and none is a leaf. */
 bool strl__is_complete(const strl_walk *walk, const strl__group *group);
-/* Collects the children of all members in walk->children; absent records become candidates in `to`. *worst: the worst outlook of any. */
+/* Collects the children of all members whose records are here in walk->children; absent records become candidates in
+ * `to`. *worst: the worst outlook of any. */
 strl_status strl__find_children(strl__descent *c, const strl__group *group, double urgency, strl__candidates *to,
                                 strl__outlook *worst);
 

@@ -151,8 +151,8 @@ static strl_status visit_group(strl__descent *c, const strl__group *group)
     if (!complete || !strl__is_asked_for(walk, walk->level.items[group->first].node->record->group))
         return keep(c, group, complete, px);
     strl__outlook worst;
-    strl_status status =
-        strl__find_children(c, group, front ? px : PREFETCH_SHARE * px, front ? &walk->missing : &walk->prefetch, &worst);
+    strl_status status = strl__find_children(c, group, front ? px : PREFETCH_SHARE * px,
+                                             front ? &walk->missing : &walk->prefetch, &worst);
     if (status != STRL_OK)
         return status;
     cut->records_missing |= worst == STRL__RECORDS_ABSENT;

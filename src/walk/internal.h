@@ -1,9 +1,9 @@
 /* What the files of walk/ share.
  *
- * A frame runs: answers and finished decodes (requests.c) -> the groups that must split for the camera (closure.c) and the part of
- * that cut that residency allows (front.c, under budget.c's allowed error) -> states of the
- * front's meshes (refine.c) -> reads for what is missing (requests.c over residency.c) -> draw list
- * (draw.c).
+ * A frame runs: answers and finished decodes (requests.c) -> the groups that must split for the
+ * camera (closure.c) and the part of that cut that residency allows (front.c, under budget.c's
+ * allowed error) -> states of the front's meshes (refine.c) -> reads for what is missing (requests.c
+ * over residency.c) -> draw list (draw.c).
  *
  * Invariants: (1) a group splits as a whole, only when all its members are active and all children
  * of all members are resident, so that the front is a cut without cracks whatever is resident; (2)
