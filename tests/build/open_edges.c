@@ -60,17 +60,18 @@ int64_t (*list_rim_points(size_t count, const int64_t (*triangle)[3][3], size_t 
     return rim;
 }
 
-void assert_open_at_the_rim_only(size_t count, const int64_t (*triangle)[3][3], const int64_t (*rim)[3], size_t rim_count,
-                                 uint32_t number)
+void assert_open_at_the_rim_only(size_t count, const int64_t (*triangle)[3][3], const int64_t (*rim)[3],
+                                 size_t rim_count, uint32_t number)
 {
     size_t open;
     open_edge *edges = list_open_edges(count, triangle, &open);
     for (size_t i = 0; i < open; i++)
         if (!bsearch(edges[i].low, rim, rim_count, sizeof *rim, compare_places) ||
             !bsearch(edges[i].high, rim, rim_count, sizeof *rim, compare_places))
-            fail_msg("cut %u has %zu open edges, one of which runs from %lld %lld %lld to %lld %lld %lld: at one end, the "
-                     "input is closed",
-                     number, open, (long long)edges[i].low[0], (long long)edges[i].low[1], (long long)edges[i].low[2],
-                     (long long)edges[i].high[0], (long long)edges[i].high[1], (long long)edges[i].high[2]);
+            fail_msg(
+                "cut %u has %zu open edges, one of which runs from %lld %lld %lld to %lld %lld %lld: at one end, the "
+                "input is closed",
+                number, open, (long long)edges[i].low[0], (long long)edges[i].low[1], (long long)edges[i].low[2],
+                (long long)edges[i].high[0], (long long)edges[i].high[1], (long long)edges[i].high[2]);
     free(edges);
 }

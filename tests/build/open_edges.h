@@ -14,7 +14,7 @@ open_edge *list_open_edges(size_t count, const int64_t (*triangle)[3][3], size_t
 /* The ends of the open edges, each as often as it is one. Sorted: malloc. */
 int64_t (*list_rim_points(size_t count, const int64_t (*triangle)[3][3], size_t *points))[3];
 /* Fails the test where an open edge ends at a point that is none of the rim's. */
-void assert_open_at_the_rim_only(size_t count, const int64_t (*triangle)[3][3], const int64_t (*rim)[3], size_t rim_count,
-                                 uint32_t number);
+void assert_open_at_the_rim_only(size_t count, const int64_t (*triangle)[3][3], const int64_t (*rim)[3],
+                                 size_t rim_count, uint32_t number);
 
 #endif

@@ -304,8 +304,8 @@ static void open_edges_end_at_boundary_points_of_the_input(void **state)
         if (cut.worst_rung >= STRL_RUNG_CLUSTERING)
             continue;
         checked++;
-        assert_open_at_the_rim_only(cut.count, (const int64_t(*)[3][3])cut.triangle, (const int64_t(*)[3])rim, rim_count,
-                                    i);
+        assert_open_at_the_rim_only(cut.count, (const int64_t(*)[3][3])cut.triangle, (const int64_t(*)[3])rim,
+                                    rim_count, i);
     }
     assert_true(checked > RANDOM_CUTS / 8);
     free(rim);

@@ -13,8 +13,8 @@
 #include "geometry/record.h"
 
 #define PI 3.14159265358979323846
-/* No direction is farther from its code's. Half a step d = 1 / 1023 in both coordinates moves a point of the octahedron by
- * (d, d, -2d), and its faces come as near to the middle as sqrt(1 / 3): sqrt(6) d sqrt(3). */
+/* No direction is farther from its code's. Half a step d = 1 / 1023 in both coordinates moves a point of the
+ * octahedron by (d, d, -2d), and its faces come as near to the middle as sqrt(1 / 3): sqrt(6) d sqrt(3). */
 #define CODE_ANGLE 0.00415
 
 /* ---- directions ---- */
@@ -213,7 +213,8 @@ static void noise_about_a_plane_s_normal_is_averaged_away(void **state)
      * chosen blindly: a quarter more. */
     assert_true(expected < 0.5 * before);
     if (now > 1.25 * expected || now > 0.5 * before)
-        fail_msg("%u normals are off by %g on average, %g before; %g were to be expected", counted, now, before, expected);
+        fail_msg("%u normals are off by %g on average, %g before; %g were to be expected", counted, now, before,
+                 expected);
     run_end(&r);
 }
 
@@ -245,7 +246,8 @@ static void check_means(double most, uint32_t opposite, strl_simplify_rung last,
         } else if (slope < PI / 2 - 0.01) {
             means++;
             if (angle_of_code(after.wedge[w].normal, all->sum) > CODE_ANGLE)
-                fail_msg("a normal is %g off the mean of %u", angle_of_code(after.wedge[w].normal, all->sum), all->count);
+                fail_msg("a normal is %g off the mean of %u", angle_of_code(after.wedge[w].normal, all->sum),
+                         all->count);
         }
     }
     assert_true(means > 150 && single > 0 && kept >= least_kept);
@@ -335,7 +337,8 @@ static void a_crease_keeps_both_directions(void **state)
                 double off = angle_of_code(after.wedge[w].normal, side_normal[x > 0]);
                 bool on_ridge = after.position[after.wedge[w].point][0] == 0;
                 if (off > most + 2 * CODE_ANGLE)
-                    fail_msg("rung %d: a normal %s the ridge is %g off its side's", rung, on_ridge ? "of" : "beside", off);
+                    fail_msg("rung %d: a normal %s the ridge is %g off its side's", rung, on_ridge ? "of" : "beside",
+                             off);
                 of_ridge[x > 0] += on_ridge;
                 fell[x > 0] += on_ridge && list[origin[w]].count > 1;
             }
