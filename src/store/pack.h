@@ -1,5 +1,6 @@
-/* Numbers packed for scratch, not for exchange: how many bits a number has is told against what such numbers had so far, then come
- * the bits. Numbers of one kind share a model; both sides must use the same models in the same order. */
+/* Numbers packed for scratch, not for exchange: how many bits a number has is told against what such
+ * numbers had so far, then come the bits. Numbers of one kind share a model; both sides must use the
+ * same models in the same order. */
 #ifndef STRL_STORE_PACK_H
 #define STRL_STORE_PACK_H
 
@@ -123,8 +124,9 @@ static inline uint32_t strl_unpack(strl_unpacker *unpacker, strl_pack_model *mod
 
 #define STRL_PACK_LENGTHS 33u /* of 32-bit numbers */
 
-/* Lattice positions, as steps from one to the next. The steps are of one length mostly, or short and long in turn: the lengths of the
- * last two say what to expect of x, x what to expect of y, and both of z. */
+/* Lattice positions, as steps from one to the next. The steps are of one length mostly, or short and
+ * long in turn: the lengths of the last two say what to expect of x, x what to expect of y, and both
+ * of z. */
 typedef struct strl_pack_points {
     strl_pack_model x[STRL_PACK_LENGTHS][STRL_PACK_LENGTHS], y[STRL_PACK_LENGTHS], z[STRL_PACK_LENGTHS];
     uint32_t last[3];

@@ -31,19 +31,19 @@ strl_status strl_spill_open_kept(strl_spill_set *set, const char *name, uint64_t
                                  strl_error *err);
 
 /* On failure nothing has been appended, and the stream can be used on: STRL_ERR_DISK_FULL where the disk is full,
- * STRL_ERR_LIMIT where the set's limit would be passed. A failure of bytes still in the buffer shows at a later call.
- * */
+ * STRL_ERR_LIMIT where the set's limit would be passed. A failure of bytes still in the buffer shows at a later
+ * call. */
 strl_status strl_spill_append(strl_spill *spill, const void *data, size_t size, strl_error *err);
 /* Writes what is buffered and releases the buffer. */
 strl_status strl_spill_flush(strl_spill *spill, strl_error *err);
-uint64_t strl_spill_bytes(
-    const strl_spill *spill); /* appended so far, buffered bytes included; for the appending thread */
+/* Appended so far, buffered bytes included; for the appending thread. */
+uint64_t strl_spill_bytes(const strl_spill *spill);
 
 /* Exactly size bytes at offset, all of them flushed and not dropped, or failure. */
 strl_status strl_spill_read(strl_spill *spill, uint64_t offset, void *data, size_t size, strl_error *err);
-/* Promises that these bytes, flushed ones, will not be read again; to be said once of a byte. Whole 16 KiB steps of such bytes are
- * given back to the disk, and to the count, where the file system can do that. One thread at a time; others may read
- * other bytes meanwhile. */
+/* Promises that these bytes, flushed ones, will not be read again, by a later run of the program neither; to be said once
+ * of a byte. Whole 16 KiB steps of such bytes are given back to the disk, and to the count, where the file system can do
+ * that. One thread at a time; others may read other bytes meanwhile. */
 void strl_spill_drop(strl_spill *spill, uint64_t offset, uint64_t size);
 
 /* The stream is closed in any case; failure means that its file is still there, and counted. NULL is legal. */

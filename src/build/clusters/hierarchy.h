@@ -104,13 +104,13 @@ void strl_groups_deinit(strl_groups *groups);
 /* A position that has more cells than this outside of a cluster has no sensible normal anyway. */
 #define STRL_HALO_CELLS 64u
 
-/* Shared points of the leaves, by cluster: read from ingest, written to streams of cluster ranges. The cells are those outside of
- * the cluster; none where they are more than STRL_HALO_CELLS. */
+/* Shared points of the leaves, by cluster: read from ingest, written to streams of cluster ranges. The cells are those
+ * outside of the cluster; none where they are more than STRL_HALO_CELLS. */
 typedef struct strl_leaf_shares {
     uint32_t bucket_count;
     uint32_t *bucket_first; /* [bucket_count + 1] clusters */
     strl_spill **spill;     /* words: cluster x y z clusters n cluster[n] m cell[m] */
-    uint32_t *last_reader;  /* [cell_count] the last cluster that needs the cell: its own, or one that computes normals */
+    uint32_t *last_reader;  /* [cell_count] the last cluster that needs the cell: its own, or one beside it */
 } strl_leaf_shares;
 
 strl_status strl_leaf_shares_create(const strl_hierarchy *hierarchy, strl_leaf_shares *shares, strl_error *err);

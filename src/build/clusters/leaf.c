@@ -299,7 +299,8 @@ static void drop_cells(leaf_stage *stage, uint32_t cluster, const uint32_t *cell
         }
 }
 
-/* Gives back the disk of cells that no later cluster needs: the cluster's own, and those of others that waited for it. */
+/* Gives back the disk of cells that no later cluster needs: the cluster's own, and those of others
+ * that waited for it. */
 static void drop_what_was_read(leaf_stage *stage, uint32_t cluster)
 {
     const strl_partition *partition = stage->hierarchy->partition;

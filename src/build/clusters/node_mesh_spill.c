@@ -171,7 +171,7 @@ static bool read_triangles(strl_mesh *mesh, models *m, strl_unpacker *unpacker)
     return good;
 }
 
-/* Drifts are rounded outward to steps of a 250th of the largest: six bytes instead of 24, and still boxes that hold them. */
+/* Drifts are rounded outward to steps of a 250th of the largest: six small numbers, and still boxes that hold them. */
 static float drift_step(const strl_mesh *mesh)
 {
     float largest = 0;

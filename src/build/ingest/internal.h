@@ -43,14 +43,15 @@ typedef struct bucket_set {
 strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, const model_survey *survey,
                              strl_ingest *ingest, bucket_set *buckets, strl_error *err);
 void strl__buckets_deinit(bucket_set *buckets);
+
 /* A lattice position and the cell that has it. */
 typedef struct pair {
     uint32_t position[3];
     uint32_t cell;
 } pair;
 
-/* One of the streams that pairs go to by hash of position: packed differences, because the cells come in order and their positions
- * lie near each other. */
+/* One of the streams that pairs go to by hash of position: packed differences, because the cells come
+ * in order and their positions lie near each other. */
 typedef struct pair_spill {
     strl_spill *spill;
     uint64_t count; /* pairs */
@@ -62,18 +63,19 @@ typedef struct pair_spills {
     pair_spill *stream;
 } pair_spills;
 
-strl_status strl__pair_spills_open(strl_build_context *context, uint64_t triangles, pair_spills *pairs, strl_error *err);
+strl_status strl__pair_spills_open(strl_build_context *context, uint64_t triangles, pair_spills *pairs,
+                                   strl_error *err);
 /* Cells must not descend. */
 strl_status strl__pair_spills_append(pair_spills *pairs, const pair *added, strl_error *err);
 /* Nothing is appended any more. */
 strl_status strl__pair_spills_flush(pair_spills *pairs, strl_error *err);
 /* All pairs of one stream, in the order in which they were appended, for the caller to free. */
-strl_status strl__pair_spills_read(const pair_spills *pairs, uint32_t index, pair **read, size_t *count, strl_error *err);
+strl_status strl__pair_spills_read(const pair_spills *pairs, uint32_t index, pair **read, size_t *count,
+                                   strl_error *err);
 strl_status strl__pair_spills_delete(pair_spills *pairs, uint32_t index, strl_error *err);
 void strl__pair_spills_deinit(pair_spills *pairs);
 
 /* Buckets to soup, cells and position pairs. */
-
 strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest, bucket_set *buckets, pair_spills *pairs,
                                strl_error *err);
 /* Pairs to edges and shared positions. */

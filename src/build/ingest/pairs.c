@@ -7,8 +7,9 @@
 #include "build/ingest/internal.h"
 #include "store/pack.h"
 
-#define PIECE_BYTES 512u        /* appended to a stream at once */
-#define PAIRS_OF_TRIANGLE 7 / 8 /* on a connected surface */
+#define PIECE_BYTES 512u /* appended to a stream at once */
+/* In memory; a connected surface has about 7 pairs for 8 triangles. */
+#define PAIR_BYTES_OF_TRIANGLE (sizeof(pair) * 7 / 8)
 
 typedef struct pair_models {
     strl_pack_points position;
@@ -22,9 +23,10 @@ struct pair_packing {
     strl_writer bytes; /* not appended yet */
 };
 
-strl_status strl__pair_spills_open(strl_build_context *context, uint64_t triangles, pair_spills *pairs, strl_error *err)
+strl_status strl__pair_spills_open(strl_build_context *context, uint64_t triangles, pair_spills *pairs,
+                                   strl_error *err)
 {
-    uint64_t bytes = triangles * sizeof(pair) * PAIRS_OF_TRIANGLE, each = strl__bucket_bytes(context) / 4;
+    uint64_t bytes = triangles * PAIR_BYTES_OF_TRIANGLE, each = strl__bucket_bytes(context) / 4;
     pairs->count = 1;
     while (pairs->count < 256 && bytes / pairs->count > each)
         pairs->count *= 2;
@@ -66,8 +68,8 @@ strl_status strl__pair_spills_append(pair_spills *pairs, const pair *added, strl
     strl_pack_point(&stream->packing->packer, &models->position, position);
     models->last_cell = added->cell;
     stream->count++;
-    return stream->packing->bytes.size < PIECE_BYTES && !stream->packing->bytes.failed ? STRL_OK
-                                                                                       : append_bytes(stream, err);
+    const strl_writer *bytes = &stream->packing->bytes;
+    return bytes->size < PIECE_BYTES && !bytes->failed ? STRL_OK : append_bytes(stream, err);
 }
 
 static void packing_destroy(struct pair_packing *packing)
