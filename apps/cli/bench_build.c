@@ -171,8 +171,8 @@ static strl_status measure_build(strl_bench *bench, unsigned jobs, strl_bench_fi
                                  strl_error *err)
 {
     strl_build_result result;
-    uint64_t before = strl_process_peak_rss_bytes();
     strl_status status = need_scene(bench, err);
+    uint64_t before = strl_process_peak_rss_bytes();
     forget_peak_memory();
     uint64_t start = strl_clock_ns();
     if (status == STRL_OK)
