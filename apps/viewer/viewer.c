@@ -88,7 +88,8 @@ static void take_screenshot(viewer *v)
 static void reset(viewer *v)
 {
     strl_gui_controls old = v->controls;
-    v->controls = (strl_gui_controls){.error_px = (float)v->desc.error_px, .help = old.help, .screenshot = old.screenshot};
+    v->controls = (strl_gui_controls){
+        .error_px = (float)v->desc.error_px, .help = old.help, .screenshot = old.screenshot};
     strl_navigator_init(&v->navigator, v->model.bounds, v->model.up_axis);
 }
 

@@ -1,4 +1,5 @@
-/* Camera arithmetic in double precision: view basis, frustum, and the pixel error of a box (docs/algorithms/clusters.md, "Errors and boxes of a node"). */
+/* Camera arithmetic in double precision: view basis, frustum, and the pixel error of a box
+ * (docs/architecture.md, "The pixel error is conservative"). */
 #ifndef STRL_FRAME_VIEW_H
 #define STRL_FRAME_VIEW_H
 

@@ -27,7 +27,8 @@ float strl_drift_length(const strl_drift *drift);
 
 /* Point flags. */
 #define STRL_POINT_KEPT 1u    /* must not be removed: another node has it too, or the caller says so */
-#define STRL_POINT_OUTSIDE 2u /* known to nodes outside the piece: its attributes stay, and it must not get into parts that do not have it yet */
+/* Known to nodes outside the piece: its attributes stay, and it must not get into parts that do not have it yet. */
+#define STRL_POINT_OUTSIDE 2u
 
 typedef struct strl_mesh {
     uint32_t point_count, wedge_count, triangle_count;
