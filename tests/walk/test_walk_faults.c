@@ -9,6 +9,7 @@
 #include "base/memory.h"
 #include "container/container.h"
 #include "walk/grid_model.h"
+#include "walk/internal.h"
 #include "walk/walk_checks.h"
 
 static uint8_t *model;
@@ -123,6 +124,38 @@ static void a_file_damaged_anywhere_is_refused_or_walked_without_a_crack(void **
     strl__free(data);
 }
 
+/* As a page's own checks could let pass: each of its nodes names the children of the node before it. */
+static uint32_t contradict(strl_walk *walk)
+{
+    const strl__treelet *second = strl__treelets_find(&walk->treelets, 0, 1);
+    uint32_t changed = 0;
+    assert_non_null(second);
+    assert_int_equal(second->residency, STRL__RESIDENT);
+    for (uint32_t i = 0; i < second->data.node_count; i++)
+        if (second->data.nodes[i].child_count > 0) {
+            ((strl_node *)second->nodes[i].record)->first_child -= 2;
+            changed++;
+        }
+    return changed;
+}
+
+static void a_node_that_two_others_name_as_their_child_is_drawn_once(void **state)
+{
+    (void)state;
+    strl_walk *walk = open_walk(memory_source(model, model_bytes), &(strl_walk_desc){.error_px = 1e-3});
+    strl_camera camera = flight_camera(500);
+    size_t before = settle(walk, &camera, 3000).count;
+    assert_true(contradict(walk) > 100);
+    for (unsigned i = 0; i < 200; i++) {
+        strl_draw_list list = walk_frame(walk, &camera);
+        strl_walk_pump(walk, UINT64_MAX);
+        check_cut_is_closed(&list, 0);
+        assert_true(list.count < before);
+    }
+    assert_non_null(strstr(strl_walk_get_stats(walk)->last_fault, "is not the child of node"));
+    strl_walk_close(walk);
+}
+
 static void without_memory_calls_fail_and_the_walk_goes_on(void **state)
 {
     (void)state;
@@ -182,6 +215,7 @@ int main(void)
         cmocka_unit_test(a_source_that_fails_now_and_then_heals),
         cmocka_unit_test(a_damaged_page_keeps_its_nodes_coarse_until_it_is_repaired),
         cmocka_unit_test(a_file_damaged_anywhere_is_refused_or_walked_without_a_crack),
+        cmocka_unit_test(a_node_that_two_others_name_as_their_child_is_drawn_once),
         cmocka_unit_test(without_memory_calls_fail_and_the_walk_goes_on),
         cmocka_unit_test(a_degenerate_camera_is_refused_and_the_next_one_is_served),
     };
