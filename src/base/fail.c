@@ -38,6 +38,7 @@ strl_status strl__fail_context(strl_error *err, strl_status status, const char *
     int used = vsnprintf(err->message, sizeof err->message, format, args);
     va_end(args);
     if (used > 0 && (size_t)used < sizeof err->message - 2)
-        snprintf(err->message + used, sizeof err->message - (size_t)used, ": %s", inner);
+        snprintf(err->message + used, sizeof err->message - (size_t)used, ": %.*s",
+                 (int)sizeof err->message - used - 3, inner);
     return err->status ? err->status : status;
 }
