@@ -41,9 +41,10 @@ uint64_t strl_spill_bytes(const strl_spill *spill);
 
 /* Exactly size bytes at offset, all of them flushed and not dropped, or failure. */
 strl_status strl_spill_read(strl_spill *spill, uint64_t offset, void *data, size_t size, strl_error *err);
-/* Promises that these bytes, flushed ones, will not be read again, by a later run of the program neither; to be said once
- * of a byte. Whole 16 KiB steps of such bytes are given back to the disk, and to the count, where the file system can do
- * that. One thread at a time; others may read other bytes meanwhile. */
+/* Promises that these bytes, flushed ones, will not be read again, by a later run of the program
+ * neither; to be said once of a byte. Whole 16 KiB steps of such bytes are given back to the disk,
+ * and to the count, where the file system can do that. One thread at a time; others may read other
+ * bytes meanwhile. */
 void strl_spill_drop(strl_spill *spill, uint64_t offset, uint64_t size);
 
 /* The stream is closed in any case; failure means that its file is still there, and counted. NULL is legal. */

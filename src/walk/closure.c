@@ -68,7 +68,8 @@ static strl_status explore_group(strl__descent *c, const strl__group *group)
     return STRL_OK;
 }
 
-/* A need's upper group was noted before its lower one: from the last need up, every demand is final when it is passed on. */
+/* A need's upper group was noted before its lower one: from the last need up, every demand is final
+ * when it is passed on. */
 static bool close_upward(strl__demands *demands)
 {
     for (size_t i = demands->need_count; i-- > 0;)

@@ -97,8 +97,8 @@ static void note_foreign(strl_walk *walk, const strl__node *parent, strl__node *
     strl__note_fault(walk, &error);
 }
 
-/* The records of one child, or a candidate for the treelet that has them. Another node's child is withheld: a node is then
- * met at most once in a descent, whatever a file says. */
+/* The records of one child, or a candidate for the treelet that has them. Another node's child is
+ * withheld: a node is then met at most once in a descent, whatever a file says. */
 static strl__outlook find_child(strl__descent *c, strl__node *parent, uint32_t id, double urgency, strl__candidates *to,
                                 strl__node **child)
 {

@@ -18,9 +18,9 @@ typedef struct strl_node_mesh {
     uint32_t *share;       /* other holders, ascending */
 } strl_node_mesh;
 
-/* Scratch format, not for exchange. Appends to writer. payload: the node's payload, decoded: its base state has all
- * points of the node, so that positions need not be told; NULL = they are. The reader must be given the same. arena: for
- * temporaries. */
+/* Scratch format, not for exchange. Appends to writer. payload: the node's payload, decoded: its base
+ * state has all points of the node, so that positions need not be told; NULL = they are. The reader
+ * must be given the same. arena: for temporaries. */
 strl_status strl_node_mesh_write(const strl_node_mesh *node, const strl_pm *payload, strl_arena *arena,
                                  strl_writer *writer, strl_error *err);
 /* Arrays come from arena. */
