@@ -152,6 +152,7 @@ static bool allocate(simplifier *s, const strl_mesh *mesh, strl_arena *arena)
     s->corner_next = strl_arena_alloc(arena, (size_t)triangles * 3, sizeof *s->corner_next);
     s->head = strl_arena_alloc(arena, points, sizeof *s->head);
     s->tail = strl_arena_alloc(arena, points, sizeof *s->tail);
+    s->degree = strl_arena_alloc_zero(arena, points, sizeof *s->degree);
     s->dead = strl_arena_alloc_zero(arena, triangles, sizeof *s->dead);
     s->stamp = strl_arena_alloc_zero(arena, points, sizeof *s->stamp);
     s->heap = strl_arena_alloc(arena, points, sizeof *s->heap);
@@ -163,7 +164,7 @@ static bool allocate(simplifier *s, const strl_mesh *mesh, strl_arena *arena)
     s->holders = mesh->holders ? strl_arena_alloc(arena, points, 1) : NULL;
     if (mesh->holders && s->holders)
         memcpy(s->holders, mesh->holders, points);
-    return (s->holders || !mesh->holders) && s->position && s->point && s->normal && s->normal_sum && s->colour && s->quadrics && s->corner_next && s->head && s->tail && s->dead &&
+    return (s->holders || !mesh->holders) && s->position && s->point && s->normal && s->normal_sum && s->colour && s->quadrics && s->corner_next && s->head && s->tail && s->degree && s->dead &&
            s->stamp && s->heap && s->heap_at && s->plan && s->own_cost && s->only_wedge && s->stale;
 }
 
@@ -181,6 +182,17 @@ static bool allocate_result(simplifier *s, strl_simplified *result, strl_arena *
     result->shift = s->shift = strl_arena_alloc(arena, triangles, sizeof *s->shift);
     return result->collapses && result->wedge_parent && result->normal && result->removed_at && s->corner && s->drift && s->deviation &&
            s->shift;
+}
+
+static void append_corner(simplifier *s, uint32_t point, uint32_t corner)
+{
+    s->corner_next[corner] = NO_INDEX;
+    if (s->head[point] == NO_INDEX)
+        s->head[point] = corner;
+    else
+        s->corner_next[s->tail[point]] = corner;
+    s->tail[point] = corner;
+    s->degree[point]++;
 }
 
 static void load(simplifier *s, strl_simplified *result)
@@ -202,14 +214,8 @@ static void load(simplifier *s, strl_simplified *result)
     for (uint32_t t = 0; t < mesh->triangle_count; t++) {
         for (unsigned c = 0; c < 3; c++) {
             s->corner[t][c] = mesh->triangle[t][c];
-            uint32_t p = mesh->wedge[mesh->triangle[t][c]].point, corner = 3 * t + c;
-            s->point[t][c] = p;
-            s->corner_next[corner] = NO_INDEX;
-            if (s->head[p] == NO_INDEX)
-                s->head[p] = corner;
-            else
-                s->corner_next[s->tail[p]] = corner;
-            s->tail[p] = corner;
+            s->point[t][c] = mesh->wedge[mesh->triangle[t][c]].point;
+            append_corner(s, s->point[t][c], 3 * t + c);
         }
         s->drift[t] = mesh->drift[t];
         s->deviation[t] = mesh->deviation[t];
@@ -249,30 +255,28 @@ void strl__apply_collapse(simplifier *s, const strl_star *star, const collapse_p
     uint32_t u = star->point, v = plan->to;
     collapse_drift drift;
     strl__collapse_drift(s, star, v, &drift);
+    s->moves += strl__moves_of(s, star, v);
     map_wedges(s, star, v, result);
     for (uint32_t i = 0; i < star->count; i++) {
         uint32_t t = star->triangle[i];
         if (star->next[i] == v || star->previous[i] == v) {
             s->dead[t] = true;
+            s->degree[star->next[i]]--;
+            s->degree[star->previous[i]]--;
             result->removed_at[t] = result->collapse_count;
             s->triangles_left--;
             continue;
         }
         s->corner[t][star->corner[i]] = result->wedge_parent[s->corner[t][star->corner[i]]];
         s->point[t][star->corner[i]] = v;
+        append_corner(s, v, 3 * t + star->corner[i]);
         s->drift[t] = drift.of[i];
         s->deviation[t] = plan->deviation;
         s->shift[t] = plan->shift;
     }
+    s->head[u] = s->tail[u] = NO_INDEX;
+    s->degree[u] = 0;
     strl__receive_orphans(s, &drift);
-    if (s->head[u] != NO_INDEX) {
-        if (s->head[v] == NO_INDEX)
-            s->head[v] = s->head[u];
-        else
-            s->corner_next[s->tail[v]] = s->head[u];
-        s->tail[v] = s->tail[u];
-        s->head[u] = s->tail[u] = NO_INDEX;
-    }
     strl__quadric_add(&s->quadrics[v], &s->quadrics[u]);
     s->own_cost[v] = strl__quadric_at(&s->quadrics[v], s->position[v]);
     if (s->holders)
@@ -309,7 +313,7 @@ static void plan_and_push(simplifier *s, uint32_t point)
  * nearest of its neighbours is so far off their planes. Most points of a mesh are never planned for this. */
 static float estimate_key(const simplifier *s, uint32_t point)
 {
-    double off_planes = INFINITY, weight = 0;
+    double off_planes = INFINITY;
     float shift = 0, drift = 0;
     for (uint32_t corner = s->head[point]; corner != NO_INDEX; corner = s->corner_next[corner]) {
         uint32_t t = corner / 3, c = corner % 3;
@@ -320,10 +324,20 @@ static float estimate_key(const simplifier *s, uint32_t point)
         shift = strl__larger(shift, s->shift[t]);
         drift = strl__larger(drift, strl_drift_length(&s->drift[t]));
     }
-    weight = s->quadrics[point].xx + s->quadrics[point].yy + s->quadrics[point].zz; /* of unit normals */
+    double weight = s->quadrics[point].xx + s->quadrics[point].yy + s->quadrics[point].zz; /* of unit normals */
     if (weight > 0 && off_planes < INFINITY)
         drift += ESTIMATE_SHARE * (float)sqrt(off_planes / weight);
     return strl__larger(shift, s->mesh->start_error + drift);
+}
+
+static void push_all(simplifier *s)
+{
+    for (uint32_t p = 0; p < s->mesh->point_count; p++) {
+        if ((s->mesh->flags[p] & STRL_POINT_KEPT) || s->head[p] == NO_INDEX || s->heap_at[p] != NO_INDEX)
+            continue;
+        s->stale[p] = true;
+        heap_push(s, p, estimate_key(s, p));
+    }
 }
 
 static float smaller(float a, float b)
@@ -365,12 +379,7 @@ static float run_rung(simplifier *s, float limit, bool adaptive, float *middle, 
 {
     uint32_t half = s->mesh->triangle_count - (s->mesh->triangle_count - s->desc->target_triangles) / 2;
     float reached = 0;
-    for (uint32_t p = 0; p < s->mesh->point_count; p++)
-        if (!(s->mesh->flags[p] & STRL_POINT_KEPT) && s->head[p] != NO_INDEX && s->heap_at[p] == NO_INDEX)
-        {
-            s->stale[p] = true;
-            heap_push(s, p, estimate_key(s, p));
-        }
+    push_all(s);
     while (s->heap_count && wants_more(s, s->heap[0].key)) {
         if (s->heap[0].key > limit || (adaptive && *middle > 0 && s->heap[0].key > LADDER_RATIO * *middle))
             break;

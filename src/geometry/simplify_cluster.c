@@ -111,7 +111,7 @@ static void merge_cells(clustering *c, double size, float limit, bool disjoint_o
         if ((same && disjoint_only) || !strl__star_gather(s, p, &star) || star.count == 0)
             continue;
         s->rung = same ? STRL_SIMPLIFY_CLUSTERING : STRL_SIMPLIFY_DISJOINT;
-        if (!strl__leaves_surface_at(s, &star, to))
+        if (strl__crowds(s, &star, to) || !strl__leaves_surface_at(s, &star, to))
             continue;
         strl__plan_collapse(s, &star, to, &plan);
         if (plan.key > limit)

@@ -131,6 +131,8 @@ static bool wedges_can_follow(simplifier *s, const strl_star *u_star, uint32_t t
 bool strl__may_collapse(simplifier *s, const strl_star *star, uint32_t to)
 {
     unsigned uses = strl__star_uses(star, to);
+    if (strl__crowds(s, star, to))
+        return false;
     if (s->holders && (s->mesh->flags[to] & STRL_POINT_OUTSIDE) && (s->holders[star->point] & ~s->holders[to]))
         return false; /* a node that outsiders do not know would come to share this point with them */
     if (star->on_boundary && !(uses & 1))

@@ -2,9 +2,11 @@
 #ifndef STRL_GEOMETRY_SIMPLIFY_STAR_H
 #define STRL_GEOMETRY_SIMPLIFY_STAR_H
 
+#include "geometry/progressive.h"
 #include "geometry/simplify.h"
 
 #define STAR_MAX 64u /* triangles; a point with more is left alone */
+#define CROWD_MAX 4096u /* triangles that collapses may gather at a point */
 #define NO_INDEX UINT32_MAX
 
 typedef struct quadric {
@@ -56,6 +58,7 @@ typedef struct simplifier {
     uint32_t (*point)[3];   /* their points */
     uint32_t *corner_next;  /* [3 * triangle_count] next corner at the same point */
     uint32_t *head, *tail;  /* per point, corners */
+    uint32_t *degree;       /* per point: its live triangles */
     bool *dead;             /* per triangle */
     strl_drift *drift;      /* per triangle */
     float *deviation, *shift; /* per triangle */
@@ -63,6 +66,7 @@ typedef struct simplifier {
     uint32_t *stamp;        /* per point, against `tick` */
     uint32_t tick;
     uint32_t triangles_left;
+    uint64_t moves;         /* of all collapses so far, see strl__moves_of */
     float free_key;         /* the largest key that was claimed before anything collapsed */
     strl_simplify_rung rung;
     /* candidates: a binary heap of points by key */
@@ -81,6 +85,18 @@ static inline float strl__larger(float a, float b)
 static inline uint32_t strl__corner_point(const simplifier *s, uint32_t triangle, unsigned corner)
 {
     return s->point[triangle][corner];
+}
+
+/* What the collapse will cost who refines it, at most: the triangles at v once for each wedge of u (STRL_PM_MAX_MOVES). */
+static inline uint64_t strl__moves_of(const simplifier *s, const strl_star *star, uint32_t to)
+{
+    return (uint64_t)star->count * (s->degree[to] + star->count);
+}
+
+/* Whether u -> v would gather too many triangles at v. */
+static inline bool strl__crowds(const simplifier *s, const strl_star *star, uint32_t to)
+{
+    return s->degree[to] + star->count > CROWD_MAX || s->moves + strl__moves_of(s, star, to) > STRL_PM_MAX_MOVES;
 }
 
 /* Gathers the star of a point; dead corners met on the way are unlinked. False where it has more than STAR_MAX triangles. */

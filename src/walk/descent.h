@@ -19,7 +19,7 @@ typedef enum strl__outlook { STRL__HERE, STRL__RECORDS_ABSENT, STRL__BACKING_OFF
 strl_status strl__no_memory(strl_error *err);
 /* An upper bound of what any group at or below this member's may ask for, in pixels. */
 double strl__group_px(const strl__descent *c, const strl_node *record);
-/* Whether the node's own coarsest state is too coarse. */
+/* Whether even the node's finest state is too coarse. */
 bool strl__asks_itself(const strl__descent *c, const strl_node *record);
 
 /* False without memory. */
