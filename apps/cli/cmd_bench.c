@@ -1,6 +1,5 @@
 /* stroll bench: how fast this program is on this machine, on a generated model in a temporary folder. */
 #include <errno.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -8,6 +7,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "bench.h"
+#include "interrupt.h"
 #include "options.h"
 #include "platform/file.h"
 #include "platform/thread.h"
@@ -23,19 +23,6 @@ static const strl_bench_entry entries[] = {
     {"select", "selecting and refining the front, per frame of a smooth path", strl_bench_select},
     {"draw", "whole frames of the same path, from camera to finished pixels", strl_bench_draw},
 };
-
-static volatile sig_atomic_t interrupted; /* set by the signal handler alone */
-
-static void on_signal(int number)
-{
-    (void)number;
-    interrupted = 1;
-}
-
-static bool stopped(void)
-{
-    return interrupted != 0;
-}
 
 /* ---- what the measurements share */
 
@@ -143,9 +130,8 @@ static int run_and_print(strl_cli_args *args, strl_bench *bench, unsigned wanted
     strl_cli_progress progress;
     strl_cli_progress_init(&progress, args->quiet);
     bench->progress = &progress;
-    bench->stopped = stopped;
-    signal(SIGINT, on_signal);
-    signal(SIGTERM, on_signal);
+    bench->stopped = strl_cli_interrupted;
+    strl_cli_catch_interrupts();
     strl_status status = run_entries(bench, wanted, parent, &err);
     if (status == STRL_OK && json)
         status = strl_bench_print_json(bench, &err);

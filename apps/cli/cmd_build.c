@@ -1,25 +1,16 @@
 #include <jansson.h>
-#include <signal.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "build/build.h"
+#include "interrupt.h"
 #include "options.h"
 #include "progress.h"
-
-static volatile sig_atomic_t interrupted; /* set by the signal handler alone */
-
-static void on_signal(int number)
-{
-    (void)number;
-    interrupted = 1;
-}
 
 static bool show_progress(void *context, const strl_build_progress *progress)
 {
     strl_cli_progress_update(context, progress->stage, progress->done, progress->total, "items");
-    return !interrupted;
+    return !strl_cli_interrupted();
 }
 
 static double per_second(uint64_t count, double seconds)
@@ -103,8 +94,7 @@ static int run(strl_cli_args *args)
     desc.jobs = (unsigned)jobs;
     desc.progress = show_progress;
     desc.context = &progress;
-    signal(SIGINT, on_signal);
-    signal(SIGTERM, on_signal);
+    strl_cli_catch_interrupts();
     strl_status status = strl_build_clusters(&desc, &result, &err);
     strl_cli_progress_end(&progress);
     if (status)
