@@ -156,16 +156,6 @@ strl_status strl_bench_need_container(strl_bench *bench, strl_error *err)
     return bench->has_container ? STRL_OK : build(bench, bench->jobs, &result, err);
 }
 
-/* The process has had a peak before this build; Linux can be told to forget it. */
-static void forget_peak_memory(void)
-{
-    FILE *file = fopen("/proc/self/clear_refs", "w");
-    if (!file)
-        return;
-    fputs("5\n", file);
-    fclose(file);
-}
-
 /* One build, its rate and its peak. A peak that was there before the build, and stayed, tells nothing about it. */
 static strl_status measure_build(strl_bench *bench, unsigned jobs, strl_bench_figure *rate, strl_bench_figure *memory,
                                  strl_error *err)
@@ -173,7 +163,7 @@ static strl_status measure_build(strl_bench *bench, unsigned jobs, strl_bench_fi
     strl_build_result result;
     strl_status status = need_scene(bench, err);
     uint64_t before = strl_process_peak_rss_bytes();
-    forget_peak_memory();
+    strl_process_forget_peak();
     uint64_t start = strl_clock_ns();
     if (status == STRL_OK)
         status = build(bench, jobs, &result, err);

@@ -27,24 +27,10 @@ double strl_bench_median(double *values, size_t count)
     return (values[(count - 1) / 2] + values[count / 2]) / 2;
 }
 
-/* As the system names it; "unknown" where it does not. */
-static void read_cpu_model(char *model, size_t size)
-{
-    char line[256] = "", *colon = NULL;
-    FILE *file = fopen("/proc/cpuinfo", "r");
-    while (file && !colon && fgets(line, sizeof line, file))
-        colon = strncmp(line, "model name", 10) ? NULL : strchr(line, ':');
-    if (file)
-        fclose(file);
-    if (colon)
-        colon[strcspn(colon, "\n")] = '\0';
-    snprintf(model, size, "%s", colon && colon[1] ? colon + 2 : "unknown");
-}
-
 void strl_bench_print_text(const strl_bench *bench)
 {
     char cpu[128];
-    read_cpu_model(cpu, sizeof cpu);
+    strl_cpu_model(cpu, sizeof cpu);
     printf("stroll %s, %s; %s, %u processors\n", STRL_VERSION, COMPILER, cpu, strl_cpu_count());
     printf("scene isosurface of %" PRIu64 " triangles; runs: %u\n\n", bench->triangles, bench->runs);
     printf("%-16s %10s %10s %10s  %-14s %s\n", "figure", "median", "least", "most", "unit", "with");
@@ -75,7 +61,7 @@ static json_t *figure_to_json(const strl_bench_figure *figure)
 strl_status strl_bench_print_json(const strl_bench *bench, strl_error *err)
 {
     char cpu[128];
-    read_cpu_model(cpu, sizeof cpu);
+    strl_cpu_model(cpu, sizeof cpu);
     json_t *machine = json_pack("{s:s,s:I}", "cpu", cpu, "cores", (json_int_t)strl_cpu_count());
     json_t *figures = json_array();
     for (size_t f = 0; f < bench->figure_count; f++)

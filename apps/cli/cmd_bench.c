@@ -1,5 +1,4 @@
 /* stroll bench: how fast this program is on this machine, on a generated model in a temporary folder. */
-#include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -52,8 +51,8 @@ static strl_status make_folder(strl_bench *bench, const char *parent, strl_error
     bench->folder = strl_path_join(parent, "stroll-bench-XXXXXX");
     if (!bench->folder)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
-    if (!mkdtemp(bench->folder)) {
-        strl_status status = strl__fail(err, STRL_ERR_IO, "cannot make a folder in %s: %s", parent, strerror(errno));
+    strl_status status = strl_path_make_temporary(bench->folder, err);
+    if (status != STRL_OK) {
         strl__free(bench->folder);
         bench->folder = NULL;
         return status;

@@ -44,6 +44,8 @@ bool strl_path_exists(const char *path);
 strl_status strl_path_rename(const char *from, const char *to, strl_error *err); /* replaces; then syncs the folder */
 strl_status strl_path_remove(const char *path, strl_error *err);                 /* a missing file is not an error */
 strl_status strl_path_make_directory(const char *path, strl_error *err);         /* existing is not an error */
+/* A new folder of this process alone; `pattern` ends in XXXXXX, which becomes its name. */
+strl_status strl_path_make_temporary(char *pattern, strl_error *err);
 /* With the files in it; a folder in it is a failure. A missing folder is not an error. */
 strl_status strl_path_remove_directory(const char *path, strl_error *err);
 strl_status strl_path_free_bytes(const char *path, uint64_t *bytes, strl_error *err);

@@ -4,6 +4,7 @@
 
 #include <pthread.h>
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "stroll/error.h"
@@ -30,5 +31,7 @@ uint64_t strl_clock_cpu_ns(void); /* processor time of this process, all threads
 void strl_sleep_ns(uint64_t ns);
 unsigned strl_cpu_count(void);              /* processors this process may use, at least 1 */
 uint64_t strl_process_peak_rss_bytes(void); /* the operating system's peak resident set, children included */
+void strl_process_forget_peak(void);        /* counts the peak anew from here on, where the system can */
+void strl_cpu_model(char *model, size_t size); /* as the system names it; "unknown" where it does not */
 
 #endif

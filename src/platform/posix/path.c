@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
 #include <sys/stat.h>
@@ -88,6 +89,11 @@ strl_status strl_path_make_directory(const char *path, strl_error *err)
     if (code == EEXIST && stat(path, &facts) == 0 && S_ISDIR(facts.st_mode))
         return STRL_OK;
     return strl__fail_system(err, code, "create folder", path);
+}
+
+strl_status strl_path_make_temporary(char *pattern, strl_error *err)
+{
+    return mkdtemp(pattern) ? STRL_OK : strl__fail_system(err, errno, "create folder", pattern);
 }
 
 /* Removes what is not a folder from an open folder; a folder in it is left for rmdir to refuse. */

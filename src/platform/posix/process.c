@@ -2,6 +2,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <sched.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/resource.h>
@@ -76,4 +77,27 @@ uint64_t strl_process_peak_rss_bytes(void)
         own = usage_peak_bytes(RUSAGE_SELF);
     uint64_t children = usage_peak_bytes(RUSAGE_CHILDREN);
     return own > children ? own : children;
+}
+
+void strl_process_forget_peak(void)
+{
+    int descriptor = open("/proc/self/clear_refs", O_WRONLY | O_CLOEXEC);
+    if (descriptor < 0)
+        return;
+    ssize_t written = write(descriptor, "5\n", 2);
+    (void)written; /* a system that cannot forget keeps the old peak */
+    close(descriptor);
+}
+
+void strl_cpu_model(char *model, size_t size)
+{
+    char line[256] = "", *colon = NULL;
+    FILE *file = fopen("/proc/cpuinfo", "re");
+    while (file && !colon && fgets(line, sizeof line, file))
+        colon = strncmp(line, "model name", 10) ? NULL : strchr(line, ':');
+    if (file)
+        fclose(file);
+    if (colon)
+        colon[strcspn(colon, "\n")] = '\0';
+    snprintf(model, size, "%s", colon && colon[1] ? colon + 2 : "unknown");
 }
