@@ -383,26 +383,51 @@ static float colour_gap(const simplifier *s, uint32_t u, uint32_t x, double alon
     return most;
 }
 
-float strl__colour_change(const simplifier *s, const strl_star *star, uint32_t to, float *reach)
+static float normal_gap(const simplifier *s, uint32_t u, uint32_t x, double along, uint32_t v, uint32_t y, double on_new)
+{
+    float sum = 0;
+    for (int k = 0; k < 3; k++) {
+        float before = s->normal[u][k] + (float)along * (s->normal[x][k] - s->normal[u][k]);
+        float after = s->normal[v][k] + (float)on_new * (s->normal[y][k] - s->normal[v][k]);
+        sum += (before - after) * (before - after);
+    }
+    return sum; /* squared */
+}
+
+/* Whether normals or colours differ anywhere in the star from those of one wedge of u. */
+static void find_variation(const simplifier *s, const strl_star *star, uint32_t own, bool *colours, bool *normals)
+{
+    *colours = *normals = false;
+    for (uint32_t i = 0; i < star->count; i++)
+        for (unsigned c = 0; c < 3; c++) {
+            uint32_t w = s->corner[star->triangle[i]][c];
+            for (int k = 0; k < 3; k++) {
+                *colours |= s->colour[w][k] != s->colour[own][k];
+                *normals |= s->normal[w][k] != s->normal[own][k];
+            }
+        }
+}
+
+void strl__spoke_change(const simplifier *s, const strl_star *star, uint32_t to, spoke_change *change)
 {
     polygon patch;
     uint32_t wedge[STAR_MAX + 1], own = s->corner[star->triangle[0]][star->corner[0]];
-    bool exact, varies = false;
-    *reach = 0;
-    for (uint32_t i = 0; i < star->count; i++)
-        for (unsigned c = 0; c < 3; c++)
-            for (int k = 0; k < 3; k++)
-                varies |= s->colour[s->corner[star->triangle[i]][c]][k] != s->colour[own][k];
-    if (!varies)
-        return 0;
+    bool exact, colours, normals;
+    *change = (spoke_change){0};
+    find_variation(s, star, own, &colours, &normals);
+    normals = normals && s->only_wedge[star->point] != NO_INDEX; /* along a crease each side has its own */
+    if (!colours && !normals)
+        return;
     for (uint32_t i = 0; i < star->neighbour_count; i++)
-        *reach = strl__larger(*reach, (float)distance(s->position[to], s->position[star->neighbour[i]]));
+        change->reach = strl__larger(change->reach, (float)distance(s->position[to], s->position[star->neighbour[i]]));
     uint32_t target = strl__wedge_target(s, star, to, own, &exact);
-    if (!star->manifold || !build_patch(s, star, to, &patch) || target == NO_INDEX)
-        return 1;
+    if (!star->manifold || !build_patch(s, star, to, &patch) || target == NO_INDEX) {
+        change->colour = colours ? 1 : 0;
+        return;
+    }
     list_ring_wedges(s, star, wedge);
-    float most = 0;
     uint32_t n = patch.count, v = patch.v_at;
+    float normal2 = 0;
     for (uint32_t step = 2; step + 2 <= n; step++) {
         uint32_t j = v + step < n ? v + step : v + step - n;
         const flat *d = &patch.x[j];
@@ -412,10 +437,14 @@ float strl__colour_change(const simplifier *s, const strl_star *star, uint32_t t
             double side_x = cross2(d->s, d->t, patch.x[i].s, patch.x[i].t), span = side_u - side_x;
             double along = span != 0 ? side_u / span : 0;
             double x = patch.u.s + along * (patch.x[i].s - patch.u.s), y = patch.u.t + along * (patch.x[i].t - patch.u.t);
-            most = strl__larger(most, colour_gap(s, own, wedge[i], along, target, wedge[j], (x * d->s + y * d->t) * inverse));
+            double on_new = (x * d->s + y * d->t) * inverse;
+            if (colours)
+                change->colour = strl__larger(change->colour, colour_gap(s, own, wedge[i], along, target, wedge[j], on_new));
+            if (normals)
+                normal2 = strl__larger(normal2, normal_gap(s, own, wedge[i], along, target, wedge[j], on_new));
         }
     }
-    return most;
+    change->normal = sqrtf(normal2);
 }
 
 void strl__receive_orphans(simplifier *s, const collapse_drift *drift)

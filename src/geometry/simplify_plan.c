@@ -4,6 +4,7 @@
 #include <math.h>
 
 #define RIM_WEIGHT 2.f
+#define SPOKE_WEIGHT 0.45f /* of a normal's change along a spoke: a dent in the shading as long as the spoke */
 
 /* The second target in quadric order is planned too where its quadric is not so many times worse. */
 #define SECOND_CHOICE 1.5
@@ -203,13 +204,16 @@ void strl__plan_collapse(simplifier *s, const strl_star *star, uint32_t to, coll
     const double *u = s->position[star->point], *v = s->position[to];
     for (int i = 0; i < 3; i++)
         longest += (u[i] - v[i]) * (u[i] - v[i]);
-    float reach, change = attribute_change(s, star, to, drift.image, drift.weights);
-    float colour = s->desc->colour_weight * strl__colour_change(s, star, to, &reach);
-    change = strl__larger(change, colour);
+    float change = attribute_change(s, star, to, drift.image, drift.weights);
+    spoke_change spokes;
+    strl__spoke_change(s, star, to, &spokes);
+    change = strl__larger(change, s->desc->colour_weight * spokes.colour);
     plan->to = to;
     plan->geometric = nextafterf(drift.longest + s->mesh->start_error, INFINITY);
     plan->deviation = sqrtf(deviation * deviation + change * change);
-    plan->shift = strl__larger(shift, strl__larger((float)sqrt(longest), reach) * fminf(1, plan->deviation));
+    float way = strl__larger((float)sqrt(longest), spokes.colour > 0 ? spokes.reach : 0);
+    plan->shift = strl__larger(shift, way * fminf(1, plan->deviation));
+    plan->shift = strl__larger(plan->shift, SPOKE_WEIGHT * spokes.reach * fminf(1, spokes.normal));
     if (star->on_boundary) /* two rims that meet in the image can both draw back: each may have half */
         plan->shift = strl__larger(plan->shift, RIM_WEIGHT * drift.longest);
     plan->key = strl__larger(plan->geometric, plan->shift);

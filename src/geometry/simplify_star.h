@@ -117,9 +117,14 @@ typedef struct collapse_drift {
 } collapse_drift;
 
 void strl__collapse_drift(const simplifier *s, const strl_star *star, uint32_t to, collapse_drift *result);
-/* The largest change of colour (0..1) where an old spoke crosses a new one; what u itself sees is not in it. *reach: how far from v a
- * point of the patch can be, where the colours of the patch differ at all; else 0. */
-float strl__colour_change(const simplifier *s, const strl_star *star, uint32_t to, float *reach);
+/* The largest changes where an old spoke crosses a new one; what u itself sees is not in them. */
+typedef struct spoke_change {
+    float colour; /* 0..1 */
+    float normal; /* length of the difference of unit normals; 0 where u lies on a crease */
+    float reach;  /* how far from v a point of the patch can be; 0 where nothing differs */
+} spoke_change;
+
+void strl__spoke_change(const simplifier *s, const strl_star *star, uint32_t to, spoke_change *change);
 /* Gives the receivers what they take over, once the collapse is carried out. */
 void strl__receive_orphans(simplifier *s, const collapse_drift *drift);
 

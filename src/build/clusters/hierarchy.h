@@ -15,7 +15,7 @@
 
 #define STRL_GROUP_MAX 8u
 /* Appearance: attribute deviation of a normal turned by one radian, and of black against white. */
-#define STRL_NORMAL_WEIGHT 0.5f
+#define STRL_NORMAL_WEIGHT 0.4f
 #define STRL_COLOUR_WEIGHT 1.f
 
 /* What is kept of every node. Nodes of a level are numbered 0 .. count - 1; the children of i are 2i and 2i + 1 one level down. */
