@@ -67,18 +67,15 @@ static bool prepare(clustering *c, simplifier *s, strl_arena *arena)
     for (uint32_t p = 0; p < points; p++)
         c->component[p] = p;
     for (uint32_t t = 0; t < s->mesh->triangle_count; t++)
-        for (unsigned k = 1; k < 3 && !s->dead[t]; k++)
-            unite(c->component, strl__corner_point(s, t, 0), strl__corner_point(s, t, k));
+        for (unsigned k = 1; k < 3 && !s->faces[t].gone; k++)
+            unite(c->component, s->faces[t].point[0], s->faces[t].point[k]);
     return true;
 }
 
 /* A point whose triangles have all vanished is no place to go to: it has no wedge left. */
 static bool is_on_surface(const simplifier *s, uint32_t point)
 {
-    for (uint32_t corner = s->head[point]; corner != NO_INDEX; corner = s->corner_next[corner])
-        if (!s->dead[corner / 3])
-            return true;
-    return false;
+    return s->sites[point].degree > 0;
 }
 
 /* Kept points first: they cannot move, so they represent their cells. */
@@ -90,7 +87,7 @@ static void choose_representatives(clustering *c, double size)
         for (uint32_t p = 0; p < c->s->mesh->point_count; p++) {
             if (((c->s->mesh->flags[p] & STRL_POINT_KEPT) != 0) != (kept != 0) || !is_on_surface(c->s, p))
                 continue;
-            cell_slot *slot = find_cell(c, c->s->position[p], size);
+            cell_slot *slot = find_cell(c, c->s->sites[p].position, size);
             if (slot->point == NO_INDEX)
                 slot->point = p;
         }
@@ -101,22 +98,22 @@ static void merge_cells(clustering *c, double size, float limit, bool disjoint_o
     simplifier *s = c->s;
     choose_representatives(c, size);
     for (uint32_t p = 0; p < s->mesh->point_count && s->triangles_left > s->desc->target_triangles; p++) {
-        strl_star star;
+        const strl_star *star = &s->star;
         collapse_plan plan;
-        uint32_t to = find_cell(c, s->position[p], size)->point;
+        uint32_t to = find_cell(c, s->sites[p].position, size)->point;
         if ((s->mesh->flags[p] & STRL_POINT_KEPT) || to == p || to == NO_INDEX || !is_on_surface(s, p) ||
             !is_on_surface(s, to))
             continue;
         bool same = find_root(c->component, p) == find_root(c->component, to);
-        if ((same && disjoint_only) || !strl__star_gather(s, p, &star) || star.count == 0)
+        if ((same && disjoint_only) || !strl__star_gather(s, p, &s->star) || star->count == 0)
             continue;
         s->rung = same ? STRL_SIMPLIFY_CLUSTERING : STRL_SIMPLIFY_DISJOINT;
-        if (strl__crowds(s, &star, to) || !strl__leaves_surface_at(s, &star, to))
+        if (strl__crowds(s, star, to) || !strl__leaves_surface_at(s, star, to))
             continue;
-        strl__plan_collapse(s, &star, to, &plan);
+        strl__plan_collapse(s, star, to, &plan, &s->effect);
         if (plan.key > limit)
             continue;
-        strl__apply_collapse(s, &star, &plan, result);
+        strl__apply_collapse(s, star, &plan, &s->effect, result);
         unite(c->component, p, to);
     }
 }

@@ -47,15 +47,38 @@ static double dot(const double a[3], const double b[3])
 }
 
 /* No triangle that stays may turn by more than about 75 degrees or become a line. */
+static bool fan_keeps_orientation(const strl_fan *fan, uint32_t v_at, uint32_t first, uint32_t end)
+{
+    double v[3] = {fan->x[0][v_at], fan->x[1][v_at], fan->x[2][v_at]};
+    unsigned turned = 0;
+    for (uint32_t i = v_at + first; i < v_at + end; i++) {
+        double before[3] = {fan->cross[0][i], fan->cross[1][i], fan->cross[2][i]}, edge[3], after[3];
+        for (unsigned k = 0; k < 3; k++)
+            edge[k] = fan->x[k][i] - fan->x[k][i + 1];
+        after[0] = before[0] + v[1] * edge[2] - v[2] * edge[1];
+        after[1] = before[1] + v[2] * edge[0] - v[0] * edge[2];
+        after[2] = before[2] + v[0] * edge[1] - v[1] * edge[0];
+        double along = dot(before, after);
+        turned |= !(along > 0) | (along * along < 0.0625 * dot(before, before) * dot(after, after));
+    }
+    return !turned;
+}
+
 static bool keeps_orientation(const simplifier *s, const strl_star *star, uint32_t to)
 {
+    if (star->manifold) {
+        uint32_t n = star->fan.n, v_at = strl__fan_at(&star->fan, to);
+        if (star->closed)
+            return fan_keeps_orientation(&star->fan, v_at, 1, n - 1);
+        return v_at == 0 || v_at == n - 1 ? fan_keeps_orientation(&star->fan, v_at, 1, n - 1) : false;
+    }
     for (uint32_t i = 0; i < star->count; i++) {
         if (star->next[i] == to || star->previous[i] == to)
             continue;
-        const double *a = s->position[star->next[i]], *b = s->position[star->previous[i]];
+        const double *a = s->sites[star->next[i]].position, *b = s->sites[star->previous[i]].position;
         double before[3], after[3];
-        cross_of(s->position[star->point], a, b, before);
-        cross_of(s->position[to], a, b, after);
+        cross_of(s->sites[star->point].position, a, b, before);
+        cross_of(s->sites[to].position, a, b, after);
         double along = dot(before, after);
         if (!(along > 0) || along * along < 0.0625 * dot(before, before) * dot(after, after))
             return false;
@@ -63,25 +86,25 @@ static bool keeps_orientation(const simplifier *s, const strl_star *star, uint32
     return true;
 }
 
-/* The link condition: u and v share exactly the neighbours that the triangles of their edge name. */
-static bool link_is_disk(simplifier *s, const strl_star *star, uint32_t to)
+/* The link condition: u and v share exactly the neighbours that the triangles of their edge name. The star's stamps must be in force. */
+static bool link_is_disk(const simplifier *s, const strl_star *star, uint32_t to)
 {
-    uint32_t base = s->tick;
-    for (uint32_t i = 0; i < star->neighbour_count; i++)
-        s->stamp[star->neighbour[i]] = base + 1;
+    bool seen[2 * STAR_MAX] = {false};
     unsigned common = 0;
-    for (uint32_t corner = s->head[to]; corner != NO_INDEX; corner = s->corner_next[corner]) {
-        if (s->dead[corner / 3])
+    for (uint32_t corner = s->sites[to].head, next; corner != NO_INDEX; corner = next) {
+        const face *f = &s->faces[corner >> 2];
+        unsigned c = corner & 3;
+        next = f->next[c];
+        if (f->gone)
             continue;
         for (unsigned k = 1; k < 3; k++) {
-            uint32_t p = strl__corner_point(s, corner / 3, (corner % 3 + k) % 3);
-            if (s->stamp[p] == base + 1) {
-                s->stamp[p] = base + 2;
+            uint32_t stamp = s->sites[f->point[(c + k) % 3]].stamp;
+            if (stamp > star->stamp && !seen[stamp - star->stamp - 1]) {
+                seen[stamp - star->stamp - 1] = true;
                 common++;
             }
         }
     }
-    s->tick = base + 2;
     return common == strl__star_uses(star, to);
 }
 
@@ -90,25 +113,21 @@ bool strl__leaves_surface_at(const simplifier *s, const strl_star *star, uint32_
     for (uint32_t i = 0; i < star->count; i++)
         if (star->next[i] != to && star->previous[i] != to)
             return true;
-    for (uint32_t corner = s->head[to]; corner != NO_INDEX; corner = s->corner_next[corner]) {
-        if (s->dead[corner / 3])
-            continue;
-        bool has_u = false;
-        for (unsigned c = 0; c < 3; c++)
-            has_u |= strl__corner_point(s, corner / 3, c) == star->point;
-        if (!has_u)
+    for (uint32_t corner = s->sites[to].head, next; corner != NO_INDEX; corner = next) {
+        const face *f = &s->faces[corner >> 2];
+        next = f->next[corner & 3];
+        if (!f->gone && f->point[0] != star->point && f->point[1] != star->point && f->point[2] != star->point)
             return true;
     }
     return false;
 }
 
 /* Every wedge of u needs a wedge of v to fall onto; on the first rung, each its own. */
-static bool wedges_can_follow(simplifier *s, const strl_star *u_star, uint32_t to)
+static bool wedges_can_follow(const simplifier *s, const strl_star *u_star, uint32_t to)
 {
     uint32_t seen[STAR_MAX], targets[STAR_MAX], count = 0;
-    uint32_t only = s->only_wedge[u_star->point];
-    if (only != NO_INDEX && s->only_wedge[to] != NO_INDEX &&
-        s->mesh->wedge[only].palette == s->mesh->wedge[s->only_wedge[to]].palette)
+    uint32_t only = s->sites[u_star->point].only_wedge, other = s->sites[to].only_wedge;
+    if (only != NO_INDEX && other != NO_INDEX && s->mesh->wedge[only].palette == s->mesh->wedge[other].palette)
         return true;
     for (uint32_t i = 0; i < u_star->count; i++) {
         uint32_t wedge = s->corner[u_star->triangle[i]][u_star->corner[i]];
@@ -129,12 +148,13 @@ static bool wedges_can_follow(simplifier *s, const strl_star *u_star, uint32_t t
     return true;
 }
 
-bool strl__may_collapse(simplifier *s, const strl_star *star, uint32_t to)
+bool strl__may_collapse(const simplifier *s, const strl_star *star, uint32_t to)
 {
     unsigned uses = strl__star_uses(star, to);
+    const site *u = &s->sites[star->point], *v = &s->sites[to];
     if (strl__crowds(s, star, to))
         return false;
-    if (s->holders && (s->mesh->flags[to] & STRL_POINT_OUTSIDE) && (s->holders[star->point] & ~s->holders[to]))
+    if ((v->flags & STRL_POINT_OUTSIDE) && (u->holders & ~v->holders))
         return false; /* a node that outsiders do not know would come to share this point with them */
     if (star->on_boundary && !(uses & 1))
         return false; /* the rim collapses along itself only: an open edge then always ends at rim points of the input */
@@ -144,114 +164,117 @@ bool strl__may_collapse(simplifier *s, const strl_star *star, uint32_t to)
            (s->rung >= STRL_SIMPLIFY_SEAMS || link_is_disk(s, star, to));
 }
 
+/* What one wedge of u looks like and what the new patch shows in its place. */
+static float wedge_change(const simplifier *s, uint32_t wedge, const float *normal, const float *colour)
+{
+    float dn = 0, dc = 0;
+    for (unsigned k = 0; k < 3; k++)
+        dn += (s->normal[wedge][k] - normal[k]) * (s->normal[wedge][k] - normal[k]);
+    for (unsigned k = 0; k < 3 && s->has_colours; k++)
+        dc = strl__larger(dc, fabsf(s->colour[wedge][k] - colour[k]));
+    return s->desc->normal_weight * sqrtf(dn) + s->desc->colour_weight * dc;
+}
+
 /* How far the attributes of u's wedges are from what the new patch shows in their place. */
-static float attribute_change(const simplifier *s, const strl_star *star, uint32_t to, uint32_t image, const double weights[3])
+static float attribute_change(const simplifier *s, const strl_star *star, uint32_t to, const collapse_effect *effect)
 {
     float worst = 0, mixed_normal[3] = {0}, mixed_colour[3] = {0};
     uint32_t own = NO_INDEX;
-    if (image != NO_INDEX) {
-        const uint32_t *corner = s->corner[star->triangle[image]];
-        unsigned c = star->corner[image];
-        bool exact;
+    bool exact;
+    if (effect->image != NO_INDEX) {
+        const uint32_t *corner = s->corner[star->triangle[effect->image]];
+        unsigned c = star->corner[effect->image];
         own = corner[c];
-        uint32_t v_wedge = strl__wedge_target(s, star, to, own, &exact);
-        uint32_t corners[3] = {v_wedge, corner[(c + 1) % 3], corner[(c + 2) % 3]};
-        if (v_wedge == NO_INDEX)
+        uint32_t corners[3] = {strl__wedge_target(s, star, to, own, &exact), corner[(c + 1) % 3], corner[(c + 2) % 3]};
+        if (corners[0] == NO_INDEX)
             own = NO_INDEX;
-        else
-            for (int k = 0; k < 3; k++)
-                for (int i = 0; i < 3; i++) {
-                    mixed_normal[i] += (float)weights[k] * s->normal[corners[k]][i];
-                    mixed_colour[i] += (float)weights[k] * s->colour[corners[k]][i];
-                }
+        for (unsigned k = 0; k < 3 && own != NO_INDEX; k++)
+            for (unsigned i = 0; i < 3; i++) {
+                mixed_normal[i] += (float)effect->weights[k] * s->normal[corners[k]][i];
+                mixed_colour[i] += (float)effect->weights[k] * s->colour[corners[k]][i];
+            }
         float length = sqrtf(mixed_normal[0] * mixed_normal[0] + mixed_normal[1] * mixed_normal[1] +
                              mixed_normal[2] * mixed_normal[2]);
-        for (int i = 0; i < 3 && length > 0; i++)
+        for (unsigned i = 0; i < 3 && length > 0; i++)
             mixed_normal[i] /= length;
     }
-    uint32_t wedges = s->only_wedge[star->point] != NO_INDEX ? 1 : star->count;
+    uint32_t wedges = s->sites[star->point].only_wedge != NO_INDEX ? 1 : star->count;
     for (uint32_t i = 0; i < wedges; i++) {
         uint32_t wedge = s->corner[star->triangle[i]][star->corner[i]];
-        const float *normal = mixed_normal, *colour = mixed_colour;
-        if (wedge != own) {
-            bool exact;
-            uint32_t target = strl__wedge_target(s, star, to, wedge, &exact);
-            if (target == NO_INDEX)
-                return s->desc->normal_weight + s->desc->colour_weight;
-            normal = s->normal[target], colour = s->colour[target];
+        if (wedge == own) {
+            worst = strl__larger(worst, wedge_change(s, wedge, mixed_normal, mixed_colour));
+            continue;
         }
-        float dn = 0, dc = 0;
-        for (int k = 0; k < 3; k++) {
-            dn += (s->normal[wedge][k] - normal[k]) * (s->normal[wedge][k] - normal[k]);
-            dc = strl__larger(dc, fabsf(s->colour[wedge][k] - colour[k]));
-        }
-        worst = strl__larger(worst, s->desc->normal_weight * sqrtf(dn) + s->desc->colour_weight * dc);
+        uint32_t target = strl__wedge_target(s, star, to, wedge, &exact);
+        if (target == NO_INDEX)
+            return s->desc->normal_weight + s->desc->colour_weight;
+        worst = strl__larger(worst, wedge_change(s, wedge, s->normal[target], s->colour[target]));
     }
     return worst;
 }
 
-void strl__plan_collapse(simplifier *s, const strl_star *star, uint32_t to, collapse_plan *plan)
+void strl__plan_collapse(const simplifier *s, const strl_star *star, uint32_t to, collapse_plan *plan, collapse_effect *effect)
 {
-    collapse_drift drift;
-    strl__collapse_drift(s, star, to, &drift);
-    float deviation = 0, shift = 0;
+    strl__collapse_effect(s, star, to, effect);
+    float deviation = effect->all.of[REACH_DEVIATION], change = attribute_change(s, star, to, effect);
+    const double *u = s->sites[star->point].position, *v = s->sites[to].position;
     double longest = 0;
-    for (uint32_t i = 0; i < star->count; i++) {
-        uint32_t t = star->triangle[i];
-        deviation = strl__larger(deviation, s->deviation[t]);
-        shift = strl__larger(shift, s->shift[t]);
-    }
-    const double *u = s->position[star->point], *v = s->position[to];
-    for (int i = 0; i < 3; i++)
+    for (unsigned i = 0; i < 3; i++)
         longest += (u[i] - v[i]) * (u[i] - v[i]);
-    float change = attribute_change(s, star, to, drift.image, drift.weights);
-    spoke_change spokes;
-    strl__spoke_change(s, star, to, &spokes);
-    change = strl__larger(change, s->desc->colour_weight * spokes.colour);
+    change = strl__larger(change, s->desc->colour_weight * effect->spoke_colour);
     plan->to = to;
-    plan->geometric = nextafterf(drift.longest + s->mesh->start_error, INFINITY);
+    plan->geometric = nextafterf(effect->longest + s->mesh->start_error, INFINITY);
     plan->deviation = sqrtf(deviation * deviation + change * change);
-    float way = strl__larger((float)sqrt(longest), spokes.colour > 0 ? spokes.reach : 0);
-    plan->shift = strl__larger(shift, way * fminf(1, plan->deviation));
-    plan->shift = strl__larger(plan->shift, SPOKE_WEIGHT * spokes.reach * fminf(1, spokes.normal));
+    float way = strl__larger((float)sqrt(longest), effect->spoke_colour > 0 ? effect->spoke_reach : 0);
+    plan->shift = strl__larger(effect->all.of[REACH_SHIFT], way * fminf(1, plan->deviation));
+    plan->shift = strl__larger(plan->shift, SPOKE_WEIGHT * effect->spoke_reach * fminf(1, effect->spoke_normal));
     if (star->on_boundary) /* two rims that meet in the image can both draw back: each may have half */
-        plan->shift = strl__larger(plan->shift, RIM_WEIGHT * drift.longest);
+        plan->shift = strl__larger(plan->shift, RIM_WEIGHT * effect->longest);
     plan->key = strl__larger(plan->geometric, plan->shift);
+}
+
+static void list_costs(const simplifier *s, const strl_star *star, double *cost)
+{
+    const quadric *q = &s->quadrics[star->point];
+    const double *u = s->sites[star->point].position;
+    for (uint32_t i = 0; i < star->neighbour_count; i++) {
+        const site *v = &s->sites[star->neighbour[i]];
+        double length = 0;
+        for (unsigned k = 0; k < 3; k++)
+            length += (u[k] - v->position[k]) * (u[k] - v->position[k]);
+        cost[i] = strl__quadric_at(q, v->position) + v->own_cost + 1e-4 * length * length; /* flat regions: the nearest */
+    }
 }
 
 bool strl__plan_best(simplifier *s, uint32_t point, collapse_plan *plan)
 {
-    strl_star star;
-    if (!strl__star_gather(s, point, &star) || star.count == 0)
-        return false;
-    double cost[2 * STAR_MAX];
-    uint8_t order[2 * STAR_MAX];
-    for (uint32_t i = 0; i < star.neighbour_count; i++) {
-        const double *u = s->position[point], *v = s->position[star.neighbour[i]];
-        double length = 0;
-        for (int k = 0; k < 3; k++)
-            length += (u[k] - v[k]) * (u[k] - v[k]);
-        cost[i] = strl__quadric_at(&s->quadrics[point], v) + s->own_cost[star.neighbour[i]] +
-                  1e-4 * length * length; /* flat regions: the nearest */
-        uint32_t at = i;
-        for (; at > 0 && cost[order[at - 1]] > cost[i]; at--)
-            order[at] = order[at - 1];
-        order[at] = (uint8_t)i;
-    }
+    const strl_star *star = &s->star;
+    double cost[2 * STAR_MAX], first_cost = 0;
     unsigned found = 0;
-    double least = 0;
-    for (uint32_t i = 0; i < star.neighbour_count && found < 2; i++) {
-        if (found && cost[order[i]] > SECOND_CHOICE * least)
+    if (!strl__star_gather(s, point, &s->star) || star->count == 0)
+        return false;
+    list_costs(s, star, cost);
+    for (uint32_t tried = 0; tried < star->neighbour_count && found < 2; tried++) {
+        uint32_t least = 0;
+        for (uint32_t i = 1; i < star->neighbour_count; i++)
+            least = cost[i] < cost[least] ? i : least;
+        if (found && cost[least] > SECOND_CHOICE * first_cost)
             break;
-        uint32_t to = star.neighbour[order[i]];
-        if (!strl__may_collapse(s, &star, to))
+        if (found == 0)
+            first_cost = cost[least];
+        cost[least] = INFINITY;
+        uint32_t to = star->neighbour[least];
+        if (!strl__may_collapse(s, star, to))
             continue;
         collapse_plan other;
-        strl__plan_collapse(s, &star, to, &other);
-        if (found++ == 0 || other.key < plan->key)
+        collapse_effect *effect = found ? &s->other_effect : &s->effect;
+        strl__plan_collapse(s, star, to, &other, effect);
+        if (found++ == 0)
             *plan = other;
-        if (found == 1)
-            least = cost[order[i]];
+        else if (other.key < plan->key) {
+            *plan = other;
+            s->effect = s->other_effect;
+        }
     }
     return found > 0;
 }

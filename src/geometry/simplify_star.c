@@ -5,98 +5,175 @@
 /* Larger than any difference of attributes. */
 #define OTHER_PALETTE 1e6f
 
+/* Which neighbour each triangle's next and previous points are. */
+typedef struct sides {
+    uint8_t next[STAR_MAX], previous[STAR_MAX];
+} sides;
+
+static uint8_t count_use(simplifier *s, strl_star *star, uint32_t point)
+{
+    uint32_t *stamp = &s->sites[point].stamp;
+    if (*stamp <= star->stamp) {
+        star->neighbour[star->neighbour_count] = point;
+        star->uses[star->neighbour_count++] = 0;
+        *stamp = star->stamp + star->neighbour_count;
+    }
+    uint32_t i = *stamp - star->stamp - 1;
+    star->uses[i]++;
+    return (uint8_t)i;
+}
+
 /* Counts the triangles at each neighbour; an odd count makes the edge a boundary edge. */
-static void count_uses(simplifier *s, strl_star *star)
+static void count_uses(simplifier *s, strl_star *star, sides *at)
 {
     star->neighbour_count = 0;
-    uint32_t base = s->tick; /* stamp[p] = base + 1 + index of p among the neighbours */
-    for (uint32_t i = 0; i < star->count; i++)
-        for (int side = 0; side < 2; side++) {
-            uint32_t p = side ? star->previous[i] : star->next[i];
-            if (s->stamp[p] <= base) {
-                star->neighbour[star->neighbour_count] = p;
-                star->uses[star->neighbour_count++] = 0;
-                s->stamp[p] = base + star->neighbour_count;
-            }
-            star->uses[s->stamp[p] - base - 1]++;
-        }
-    s->tick = base + star->neighbour_count + 1;
+    star->stamp = s->tick;
+    for (uint32_t i = 0; i < star->count; i++) {
+        at->next[i] = count_use(s, star, star->next[i]);
+        at->previous[i] = count_use(s, star, star->previous[i]);
+    }
+    s->tick += star->neighbour_count + 1;
     star->on_boundary = false;
     for (uint32_t i = 0; i < star->neighbour_count; i++)
         star->on_boundary |= star->uses[i] & 1;
 }
 
-/* Chains the triangles into one fan, if they are one. Stamps still name the neighbours (count_uses). */
-static void order_fan(const simplifier *s, strl_star *star)
+/* Chains the triangles into one fan, if they are one: order[i + 1] follows order[i] counter-clockwise. */
+static bool order_fan(strl_star *star, const sides *at, uint8_t *order)
 {
     uint8_t by_next[2 * STAR_MAX]; /* triangle whose `next` is the neighbour; STAR_MAX = none */
-    uint32_t base = s->tick - star->neighbour_count - 1, start = 0, open_ends = 0;
-    star->manifold = false;
+    uint32_t start = 0, open_ends = 0, done = 0;
     star->closed = false;
     for (uint32_t i = 0; i < star->neighbour_count; i++) {
         if (star->uses[i] > 2)
-            return;
+            return false;
         by_next[i] = STAR_MAX;
     }
     for (uint32_t i = 0; i < star->count; i++) {
-        uint8_t *slot = &by_next[s->stamp[star->next[i]] - base - 1];
-        if (*slot != STAR_MAX)
-            return; /* two triangles leave the same neighbour: not oriented alike */
-        *slot = (uint8_t)i;
+        if (by_next[at->next[i]] != STAR_MAX)
+            return false; /* two triangles leave the same neighbour: not oriented alike */
+        by_next[at->next[i]] = (uint8_t)i;
     }
-    uint8_t follower[STAR_MAX];
     bool followed[STAR_MAX] = {false};
-    for (uint32_t i = 0; i < star->count; i++) {
-        follower[i] = by_next[s->stamp[star->previous[i]] - base - 1];
-        if (follower[i] != STAR_MAX)
-            followed[follower[i]] = true;
-    }
+    for (uint32_t i = 0; i < star->count; i++)
+        if (by_next[at->previous[i]] != STAR_MAX)
+            followed[by_next[at->previous[i]]] = true;
     for (uint32_t i = 0; i < star->count; i++)
         if (!followed[i]) {
             start = i;
             open_ends++;
         }
     if (open_ends > 1)
-        return;
-    uint32_t at = start, done = 0;
+        return false;
+    uint32_t i = start;
     do {
-        star->order[done++] = (uint8_t)at;
-        at = follower[at];
-    } while (at != STAR_MAX && at != start && done < star->count);
-    if (done != star->count)
-        return;
-    star->closed = at == start;
-    star->manifold = star->closed ? star->count >= 3 : true;
+        order[done++] = (uint8_t)i;
+        i = by_next[at->previous[i]];
+    } while (i != STAR_MAX && i != start && done < star->count);
+    star->closed = i == start && open_ends == 0;
+    return done == star->count && (!star->closed || star->count >= 3);
+}
+
+/* Axes with the last one along the normal of the ring's polygon. */
+static bool find_axes(strl_fan *fan)
+{
+    double n[3] = {0, 0, 0};
+    uint32_t last = fan->n - 1; /* an open ring is closed by a straight edge */
+    double closing[3] = {fan->x[1][last] * fan->x[2][0] - fan->x[2][last] * fan->x[1][0],
+                         fan->x[2][last] * fan->x[0][0] - fan->x[0][last] * fan->x[2][0],
+                         fan->x[0][last] * fan->x[1][0] - fan->x[1][last] * fan->x[0][0]};
+    for (unsigned k = 0; k < 3; k++) {
+        for (uint32_t i = 0; i < last; i++)
+            n[k] += fan->cross[k][i];
+        n[k] += closing[k];
+    }
+    double length = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    if (!(length > 0))
+        return false;
+    double *w = fan->axis[2], *p = fan->axis[0], *q = fan->axis[1];
+    for (unsigned k = 0; k < 3; k++)
+        w[k] = n[k] / length;
+    unsigned least = fabs(n[0]) < fabs(n[1]) ? (fabs(n[0]) < fabs(n[2]) ? 0 : 2) : (fabs(n[1]) < fabs(n[2]) ? 1 : 2);
+    unsigned next = (least + 1) % 3, third = (least + 2) % 3; /* p = w times the axis that is furthest from it */
+    double scale = 1 / sqrt(w[next] * w[next] + w[third] * w[third]);
+    p[least] = 0;
+    p[next] = w[third] * scale;
+    p[third] = -w[next] * scale;
+    q[0] = w[1] * p[2] - w[2] * p[1];
+    q[1] = w[2] * p[0] - w[0] * p[2];
+    q[2] = w[0] * p[1] - w[1] * p[0];
+    return true;
+}
+
+/* Stores a ring's second round. */
+static void repeat(double *values, uint32_t n)
+{
+    for (uint32_t i = 0; i < n; i++)
+        values[n + i] = values[i];
+}
+
+static void flatten(const simplifier *s, strl_star *star, const uint8_t *order)
+{
+    strl_fan *fan = &star->fan;
+    uint32_t n = fan->n = star->closed ? star->count : star->count + 1;
+    const double *u = s->sites[star->point].position;
+    for (uint32_t i = 0; i < n; i++) {
+        uint32_t p = i < star->count ? star->next[order[i]] : star->previous[order[i - 1]];
+        fan->point[i] = fan->point[n + i] = p;
+        fan->triangle[i] = fan->triangle[n + i] = i < star->count ? order[i] : 0;
+        for (unsigned k = 0; k < 3; k++)
+            fan->x[k][i] = s->sites[p].position[k] - u[k];
+    }
+    for (unsigned k = 0; k < 3; k++)
+        repeat(fan->x[k], n);
+    for (uint32_t i = 0; i < n; i++) {
+        fan->cross[0][i] = fan->x[1][i] * fan->x[2][i + 1] - fan->x[2][i] * fan->x[1][i + 1];
+        fan->cross[1][i] = fan->x[2][i] * fan->x[0][i + 1] - fan->x[0][i] * fan->x[2][i + 1];
+        fan->cross[2][i] = fan->x[0][i] * fan->x[1][i + 1] - fan->x[1][i] * fan->x[0][i + 1];
+    }
+    for (unsigned k = 0; k < 3; k++)
+        repeat(fan->cross[k], n);
+    fan->has_axes = find_axes(fan);
+    for (unsigned k = 0; k < 3 && fan->has_axes; k++) {
+        for (uint32_t i = 0; i < n; i++)
+            fan->flat[k][i] = fan->x[0][i] * fan->axis[k][0] + fan->x[1][i] * fan->axis[k][1] + fan->x[2][i] * fan->axis[k][2];
+        repeat(fan->flat[k], n);
+    }
 }
 
 bool strl__star_gather(simplifier *s, uint32_t point, strl_star *star)
 {
+    site *own = &s->sites[point];
+    uint32_t before = NO_INDEX, count = 0;
     star->point = point;
-    star->count = 0;
-    uint32_t before = NO_INDEX;
-    for (uint32_t corner = s->head[point], next; corner != NO_INDEX; corner = next) {
-        next = s->corner_next[corner];
-        if (s->dead[corner / 3]) {
+    for (uint32_t corner = own->head, next; corner != NO_INDEX; corner = next) {
+        const face *f = &s->faces[corner >> 2];
+        unsigned c = corner & 3;
+        next = f->next[c];
+        if (f->gone) {
             if (before == NO_INDEX)
-                s->head[point] = next;
+                own->head = next;
             else
-                s->corner_next[before] = next;
+                s->faces[before >> 2].next[before & 3] = next;
             if (next == NO_INDEX)
-                s->tail[point] = before;
+                own->tail = before;
             continue;
         }
         before = corner;
-        if (star->count == STAR_MAX)
+        if (count == STAR_MAX)
             return false;
-        unsigned c = corner % 3;
-        star->triangle[star->count] = corner / 3;
-        star->corner[star->count] = (uint8_t)c;
-        star->next[star->count] = strl__corner_point(s, corner / 3, c == 2 ? 0 : c + 1);
-        star->previous[star->count] = strl__corner_point(s, corner / 3, c == 0 ? 2 : c - 1);
-        star->count++;
+        star->triangle[count] = corner >> 2;
+        star->corner[count] = (uint8_t)c;
+        star->next[count] = f->point[c == 2 ? 0 : c + 1];
+        star->previous[count++] = f->point[c == 0 ? 2 : c - 1];
     }
-    count_uses(s, star);
-    order_fan(s, star);
+    star->count = count;
+    sides at;
+    uint8_t order[STAR_MAX];
+    count_uses(s, star, &at);
+    star->manifold = count > 0 && order_fan(star, &at, order);
+    if (star->manifold)
+        flatten(s, star, order);
     return true;
 }
 
@@ -106,6 +183,14 @@ unsigned strl__star_uses(const strl_star *star, uint32_t point)
         if (star->neighbour[i] == point)
             return star->uses[i];
     return 0;
+}
+
+uint32_t strl__fan_at(const strl_fan *fan, uint32_t point)
+{
+    for (uint32_t i = 0; i < fan->n; i++)
+        if (fan->point[i] == point)
+            return i;
+    return NO_INDEX;
 }
 
 static float attribute_difference(const simplifier *s, uint32_t a, uint32_t b)
@@ -121,8 +206,8 @@ static float attribute_difference(const simplifier *s, uint32_t a, uint32_t b)
 
 uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32_t to, uint32_t wedge, bool *exact)
 {
-    uint32_t only = s->only_wedge[to];
-    if (only != NO_INDEX && s->only_wedge[u_star->point] != NO_INDEX &&
+    uint32_t only = s->sites[to].only_wedge;
+    if (only != NO_INDEX && s->sites[u_star->point].only_wedge != NO_INDEX &&
         s->mesh->wedge[only].palette == s->mesh->wedge[wedge].palette && strl__star_uses(u_star, to)) {
         *exact = true;
         return only;
@@ -143,9 +228,10 @@ uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32
     *exact = false;
     uint32_t best = NO_INDEX;
     float least = INFINITY;
-    for (uint32_t corner = s->head[to]; corner != NO_INDEX; corner = s->corner_next[corner]) {
-        uint32_t other = s->corner[corner / 3][corner % 3];
-        if (s->dead[corner / 3])
+    for (uint32_t corner = s->sites[to].head, next; corner != NO_INDEX; corner = next) {
+        uint32_t other = s->corner[corner >> 2][corner & 3];
+        next = s->faces[corner >> 2].next[corner & 3];
+        if (s->faces[corner >> 2].gone)
             continue;
         float difference = attribute_difference(s, wedge, other);
         if (s->mesh->wedge[other].palette != s->mesh->wedge[wedge].palette) {

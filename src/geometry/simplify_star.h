@@ -1,4 +1,6 @@
-/* Internal to simplify*.c: the state of a simplification and the star of a point. */
+/* Internal to simplify*.c: the state of a simplification and the star of a point.
+ *
+ * What a plan reads of a point or a triangle lies in one cache line each: most of the time goes into reading stars. */
 #ifndef STRL_GEOMETRY_SIMPLIFY_STAR_H
 #define STRL_GEOMETRY_SIMPLIFY_STAR_H
 
@@ -6,12 +8,56 @@
 #include "geometry/simplify.h"
 
 #define STAR_MAX 64u /* triangles; a point with more is left alone */
+#define RING_MAX (STAR_MAX + 1)
 #define CROWD_MAX 4096u /* triangles that collapses may gather at a point */
 #define NO_INDEX UINT32_MAX
 
 typedef struct quadric {
     double xx, xy, xz, yy, yz, zz, x, y, z, c; /* v'Av + 2 b'v + c */
 } quadric;
+
+/* What has become of a piece of surface, as numbers that only grow: the six sides of its drift (strl_drift; the lower ones
+ * negated), then its attribute deviation and its appearance error. Eight of them, so that vector registers hold it. */
+typedef struct reach {
+    float of[8];
+} reach;
+#define REACH_DEVIATION 6
+#define REACH_SHIFT 7
+
+/* A corner's name is its triangle * 4 + 0, 1 or 2. */
+typedef struct face {
+    uint32_t point[3];
+    uint32_t next[3]; /* per corner: the next corner at the same point */
+    reach reach;
+    uint32_t gone;    /* collapses have removed it */
+    uint32_t unused;
+} face;
+
+typedef struct site {
+    double position[3];
+    double own_cost;     /* its quadric at its own position */
+    uint32_t head, tail; /* corners */
+    uint32_t degree;     /* its live triangles */
+    uint32_t only_wedge; /* its wedge where it has just one; else NO_INDEX */
+    uint32_t stamp;      /* against `tick` */
+    uint32_t heap_at;    /* NO_INDEX = not in the heap */
+    uint8_t flags;       /* STRL_POINT_... */
+    uint8_t holders;     /* follows the collapses; 0 where the mesh has none */
+    bool stale;          /* the neighbourhood has changed since its plan was made */
+} site;
+
+/* The fan of a manifold star, flattened; fan order throughout. Rings are stored twice over, so that ring + v_at begins anywhere:
+ * a closed fan has n points and triangles, an open one n points and n - 1 triangles; triangle i lies between points i and i + 1. */
+typedef struct strl_fan {
+    uint32_t n;
+    uint32_t point[2 * RING_MAX];
+    uint8_t triangle[2 * RING_MAX]; /* index in the star; meaningless for an open fan's last */
+    double x[3][2 * RING_MAX];      /* relative to the star's point */
+    double cross[3][2 * RING_MAX];  /* x[i] times x[i + 1]: twice the area of triangle i */
+    double axis[3][3];              /* the last one is the unit normal of the ring's polygon */
+    bool has_axes;
+    double flat[3][2 * RING_MAX];   /* along the axes */
+} strl_fan;
 
 /* The live triangles round one point. */
 typedef struct strl_star {
@@ -24,10 +70,11 @@ typedef struct strl_star {
     uint32_t neighbour_count;
     uint32_t neighbour[2 * STAR_MAX]; /* different ones, in order of first appearance */
     uint8_t uses[2 * STAR_MAX];   /* triangles that hold the edge to that neighbour */
+    uint32_t stamp;               /* neighbour i is stamped stamp + 1 + i until the next star is gathered */
     bool on_boundary;             /* some edge is used by an odd number of triangles */
     bool manifold;                /* one closed or open fan */
     bool closed;                  /* the fan is closed */
-    uint8_t order[STAR_MAX];      /* fan order of the triangles where manifold: next[order[i + 1]] == previous[order[i]] */
+    strl_fan fan;                 /* where manifold */
 } strl_star;
 
 /* What a collapse would do. */
@@ -39,6 +86,21 @@ typedef struct collapse_plan {
     float key;
 } collapse_plan;
 
+/* What u -> v does to the surface round u. */
+typedef struct collapse_effect {
+    reach of[STAR_MAX];      /* by index in the star, drift only; meaningless for triangles that vanish */
+    reach all;               /* of the star before */
+    reach orphan;            /* of vanishing triangles that no triangle of the star takes over */
+    uint32_t receiver[STAR_MAX], receivers; /* triangles at v that the orphans fall onto: their drifts must hold `orphan` too */
+    uint32_t image;          /* index in the star of the triangle whose image holds u's; NO_INDEX = v itself */
+    double weights[3];       /* of (v, next, previous) there */
+    float longest;           /* the largest drift */
+    /* the largest changes of attributes where an old spoke crosses a new one; what u itself sees is not in them */
+    float spoke_colour;      /* 0..1 */
+    float spoke_normal;      /* length of the difference of unit normals; 0 where u lies on a crease */
+    float spoke_reach;       /* how far from v a point of the patch can be */
+} collapse_effect;
+
 typedef struct candidate {
     float key;
     uint32_t point;
@@ -47,23 +109,14 @@ typedef struct candidate {
 typedef struct simplifier {
     const strl_mesh *mesh;
     const strl_simplify_desc *desc;
-    double (*position)[3];
-    float (*normal)[3];     /* per wedge, decoded */
-    float (*colour)[3];     /* per wedge, 0..1 */
-    float (*normal_sum)[3]; /* per wedge, weighted by area, of it and all that fell onto it */
+    site *sites;            /* per point */
     quadric *quadrics;      /* per point */
-    double *own_cost;       /* per point: its quadric at its own position */
-    uint32_t *only_wedge;   /* per point: its wedge where it has just one; else NO_INDEX */
-    uint32_t (*corner)[3];  /* current wedges */
-    uint32_t (*point)[3];   /* their points */
-    uint32_t *corner_next;  /* [3 * triangle_count] next corner at the same point */
-    uint32_t *head, *tail;  /* per point, corners */
-    uint32_t *degree;       /* per point: its live triangles */
-    bool *dead;             /* per triangle */
-    strl_drift *drift;      /* per triangle */
-    float *deviation, *shift; /* per triangle */
-    uint8_t *holders;       /* per point, a copy that follows the collapses; NULL where the mesh has none */
-    uint32_t *stamp;        /* per point, against `tick` */
+    face *faces;            /* per triangle */
+    uint32_t (*corner)[3];  /* per triangle: current wedges */
+    float (*normal)[4];     /* per wedge, decoded; the last is 0 */
+    float (*colour)[4];     /* per wedge, 0..1; the last is 0 */
+    float (*normal_sum)[3]; /* per wedge, weighted by area, of it and all that fell onto it */
+    bool has_colours;       /* not all wedges are of one colour */
     uint32_t tick;
     uint32_t triangles_left;
     uint64_t moves;         /* of all collapses so far, see strl__moves_of */
@@ -72,9 +125,10 @@ typedef struct simplifier {
     /* candidates: a binary heap of points by key */
     candidate *heap;
     uint32_t heap_count;
-    uint32_t *heap_at;      /* per point, NO_INDEX = not in the heap */
     collapse_plan *plan;    /* per point: the best collapse, valid where not stale */
-    bool *stale;            /* per point: the neighbourhood changed since key was computed */
+    /* the star that was planned last, with the effect of its plan: most plans are carried out at once */
+    strl_star star;
+    collapse_effect effect, other_effect;
 } simplifier;
 
 static inline float strl__larger(float a, float b)
@@ -82,50 +136,43 @@ static inline float strl__larger(float a, float b)
     return a > b ? a : b;
 }
 
-static inline uint32_t strl__corner_point(const simplifier *s, uint32_t triangle, unsigned corner)
+static inline void strl__unite(reach *to, const reach *other)
 {
-    return s->point[triangle][corner];
+    for (unsigned k = 0; k < 8; k++)
+        to->of[k] = strl__larger(to->of[k], other->of[k]);
+}
+
+static inline float strl__drift_squared(const reach *r)
+{
+    float x = strl__larger(r->of[0], r->of[3]), y = strl__larger(r->of[1], r->of[4]), z = strl__larger(r->of[2], r->of[5]);
+    return x * x + y * y + z * z;
 }
 
 /* What the collapse will cost who refines it, at most: the triangles at v once for each wedge of u (STRL_PM_MAX_MOVES). */
 static inline uint64_t strl__moves_of(const simplifier *s, const strl_star *star, uint32_t to)
 {
-    return (uint64_t)star->count * (s->degree[to] + star->count);
+    return (uint64_t)star->count * (s->sites[to].degree + star->count);
 }
 
 /* Whether u -> v would gather too many triangles at v. */
 static inline bool strl__crowds(const simplifier *s, const strl_star *star, uint32_t to)
 {
-    return s->degree[to] + star->count > CROWD_MAX || s->moves + strl__moves_of(s, star, to) > STRL_PM_MAX_MOVES;
+    return s->sites[to].degree + star->count > CROWD_MAX || s->moves + strl__moves_of(s, star, to) > STRL_PM_MAX_MOVES;
 }
 
-/* Gathers the star of a point; dead corners met on the way are unlinked. False where it has more than STAR_MAX triangles. */
+/* Gathers the star of a point; gone corners met on the way are unlinked. False where it has more than STAR_MAX triangles. */
 bool strl__star_gather(simplifier *s, uint32_t point, strl_star *star);
 /* How many triangles hold the edge to `point` (0 = no neighbour). */
 unsigned strl__star_uses(const strl_star *star, uint32_t point);
+/* Where `point` stands in the fan of a manifold star; NO_INDEX where it does not. */
+uint32_t strl__fan_at(const strl_fan *fan, uint32_t point);
 /* The wedge of v that a wedge of u falls onto. *exact: a triangle of the edge says so; else it is the one of v's that looks most
  * like it, of the same palette where the rung does not allow others. NO_INDEX = none. */
 uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32_t to, uint32_t wedge, bool *exact);
-/* What u -> v does to the surface round u. */
-typedef struct collapse_drift {
-    strl_drift of[STAR_MAX];  /* by index in the star; meaningless for triangles that vanish */
-    strl_drift orphan;        /* of vanishing triangles that no triangle of the star takes over */
-    uint32_t receiver[STAR_MAX], receivers; /* triangles at v that the orphans fall onto: their drifts must hold `orphan` too */
-    uint32_t image;           /* index in the star of the triangle whose image holds u's; NO_INDEX = v itself */
-    double weights[3];        /* of (v, next, previous) there */
-    float longest;            /* the largest length */
-} collapse_drift;
 
-void strl__collapse_drift(const simplifier *s, const strl_star *star, uint32_t to, collapse_drift *result);
-/* The largest changes where an old spoke crosses a new one; what u itself sees is not in them. */
-typedef struct spoke_change {
-    float colour; /* 0..1 */
-    float normal; /* length of the difference of unit normals; 0 where u lies on a crease */
-    float reach;  /* how far from v a point of the patch can be; 0 where nothing differs */
-} spoke_change;
-
-void strl__spoke_change(const simplifier *s, const strl_star *star, uint32_t to, spoke_change *change);
+/* The bound of u -> v and what it does to attributes (simplify_bound.c). */
+void strl__collapse_effect(const simplifier *s, const strl_star *star, uint32_t to, collapse_effect *effect);
 /* Gives the receivers what they take over, once the collapse is carried out. */
-void strl__receive_orphans(simplifier *s, const collapse_drift *drift);
+void strl__receive_orphans(simplifier *s, const collapse_effect *effect);
 
 #endif
