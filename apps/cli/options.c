@@ -1,6 +1,7 @@
 /* The command line of every command: parse, help and usage errors. See options.h. */
 #include "options.h"
 
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -47,6 +48,7 @@ int strl_cli_usage_error(const strl_cli_args *args, const char *format, ...)
 int strl_cli_fail(const strl_error *err)
 {
     const char *sentence = err->message[0] ? err->message : strl_status_name(err->status);
+    fflush(stdout); /* what was said before stands before, through a pipe too */
     fprintf(stderr, "stroll: %s\n", sentence);
     return 1;
 }
@@ -95,13 +97,29 @@ static int read_enum(const strl_cli_args *args, const strl_cli_option *option, c
     return strl_cli_usage_error(args, "--%s is one of %s, not \"%s\"", option->name, argument_of(option), word);
 }
 
+/* A bound as somebody would type it: 64M, not 6.71089e+07. */
+static void format_bound(char text[32], const strl_cli_option *option, double bound)
+{
+    const char *suffix = "KMGT";
+    double thousand = option->kind == STRL_CLI_BYTES ? 1024 : 1000;
+    int power = 0;
+    if (option->kind != STRL_CLI_REAL)
+        while (power < 4 && bound >= thousand && fmod(bound, thousand) == 0) {
+            bound /= thousand;
+            power++;
+        }
+    snprintf(text, 32, "%.15g%.*s", bound, power > 0, suffix + (power > 0 ? power - 1 : 0));
+}
+
 static int check_bounds(const strl_cli_args *args, const strl_cli_option *option, double value, const char *word)
 {
     bool bounded = option->least != 0 || option->most != 0;
-    if (bounded && !(value >= option->least && value <= option->most))
-        return strl_cli_usage_error(args, "--%s lies between %g and %g, found %s", option->name, option->least,
-                                    option->most, word);
-    return -1;
+    if (!bounded || (value >= option->least && value <= option->most))
+        return -1;
+    char least[32], most[32];
+    format_bound(least, option, option->least);
+    format_bound(most, option, option->most);
+    return strl_cli_usage_error(args, "--%s lies between %s and %s, found %s", option->name, least, most, word);
 }
 
 static int read_scaled(const strl_cli_args *args, const strl_cli_option *option, const char *word)
@@ -265,13 +283,25 @@ static int take_word(parse_state *state)
     return -1;
 }
 
+/* A list takes every word up to the next option, so it may have taken this one. */
+static int missing_word(const parse_state *state)
+{
+    const strl_cli_usage *usage = state->usage;
+    for (size_t i = 0; i < usage->option_count; i++)
+        if (usage->options[i].kind == STRL_CLI_LIST && state->seen & (uint64_t)1 << i)
+            return strl_cli_usage_error(state->args,
+                                        "%s is missing: --%s takes all words that follow it, so %s goes before it or after --",
+                                        usage->positional, usage->options[i].name, usage->positional);
+    return strl_cli_usage_error(state->args, "%s is missing", usage->positional);
+}
+
 static int check_complete(const parse_state *state)
 {
     const strl_cli_usage *usage = state->usage;
     if (!usage->positional && state->words > 0)
         return strl_cli_usage_error(state->args, "\"%s\" is one word too many", state->args->words[0]);
     if (state->words < usage->least)
-        return strl_cli_usage_error(state->args, "%s is missing", usage->positional);
+        return missing_word(state);
     if (usage->positional && state->words > usage->most)
         return strl_cli_usage_error(state->args, "\"%s\" is one word too many",
                                     state->args->words[usage->most]);

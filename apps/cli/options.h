@@ -103,10 +103,10 @@ int strl_cli_parse(strl_cli_args *args, const strl_cli_usage *usage, strl_cli_li
 /* For rules that a declaration cannot say: prints "stroll COMMAND: sentence" and where help is; returns 2. */
 int strl_cli_usage_error(const strl_cli_args *args, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
-/* Prints "stroll: sentence" to standard error; returns 1. */
+/* Prints "stroll: sentence" to standard error, after what is on its way to standard output; returns 1. */
 int strl_cli_fail(const strl_error *err);
 
-/* The same parsers for words inside a specification. False where the whole word is not such a value. */
+/* The same parsers for words inside a specification. False where the whole word is not such a value; 1.5 is no count, 1.5K is. */
 bool strl_cli_read_scaled(const char *word, unsigned thousand, uint64_t *value); /* thousand: 1000 or 1024 */
 bool strl_cli_read_real(const char *word, double *value);
 bool strl_cli_read_size(const char *word, uint32_t size[2]);

@@ -49,10 +49,12 @@ bool strl_cli_read_scaled(const char *word, unsigned thousand, uint64_t *value)
     if (!isdigit((unsigned char)word[0]))
         return false;
     if (read_fraction(word, &end, &fraction)) {
-        if (!read_scale(end, thousand, &scale) || fraction * (double)scale >= 9.0e18)
+        double scaled = 0;
+        if (!read_scale(end, thousand, &scale) || (scaled = fraction * (double)scale) >= 9.0e18)
             return false;
-        *value = (uint64_t)(fraction * (double)scale);
-        return true;
+        *value = (uint64_t)round(scaled);
+        /* 1.3G is no whole number of bytes and still a budget; there is no half thread and no half byte. */
+        return (thousand == 1024 && scale > 1) || fabs(scaled - round(scaled)) <= 1e-12 * scaled;
     }
     errno = 0;
     char *stop = NULL;

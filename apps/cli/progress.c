@@ -10,6 +10,9 @@
 
 enum { BAR_MOST = 30, LINE_BYTES = 256, REDRAW_NS = 100000000 };
 
+/* A stage that has just begun has no rate yet, and what it says of the time left would be noise. */
+#define LEAST_RATE_SECONDS 0.1
+
 /* 1234567 as "1.23 M". */
 static void format_amount(char text[16], double amount)
 {
@@ -32,23 +35,31 @@ static void format_time(char text[24], double seconds)
         snprintf(text, 24, "%u:%02u", whole / 60, whole % 60);
 }
 
+static void format_rate(char text[40], double rate, const char *unit)
+{
+    char amount[16];
+    format_amount(amount, rate);
+    snprintf(text, 40, "  %s%s%.16s/s", amount, *unit ? " " : "", unit);
+}
+
 void strl_cli_progress_format(char *text, unsigned size, const char *stage, uint64_t done, uint64_t total,
                               const char *unit, double seconds, unsigned columns)
 {
-    char amount[16], rate[16], left[24] = "";
+    char amount[16], rate[40] = "", left[24] = "";
     char bar[BAR_MOST + 1] = "";
+    bool known = done > 0 && seconds >= LEAST_RATE_SECONDS;
     format_amount(amount, (double)done);
-    format_amount(rate, seconds > 0 ? (double)done / seconds : 0);
+    if (known)
+        format_rate(rate, (double)done / seconds, total ? unit : "");
     if (total == 0) {
-        snprintf(text, size, "%s  %s %s  %s/s", stage, amount, unit, rate);
+        snprintf(text, size, "%s  %s %s%s", stage, amount, unit, rate);
     } else {
         double share = done < total ? (double)done / (double)total : 1;
         memset(bar, '-', BAR_MOST);
         memset(bar, '#', (size_t)(share * BAR_MOST));
-        if (done > 0)
+        if (known)
             format_time(left, seconds * (1 - share) / share);
-        snprintf(text, size, "%-12s [%s] %3.0f %%  %s %s/s%s%s", stage, bar, share * 100, rate, unit,
-                 *left ? "  left " : "", left);
+        snprintf(text, size, "%-12s [%s] %3.0f %%%s%s%s", stage, bar, share * 100, rate, known ? "  left " : "", left);
     }
     if (strlen(text) > columns)
         text[columns] = '\0';

@@ -132,7 +132,7 @@ static void wrong_usage_stops_with_2(void **state)
     (void)state;
     static const char *const lines[] = {
         "-o x", "a", "a b c -o x", "a -o", "a -o x --nothing", "a -o x -z", "a -o x --memory", "a -o x --memory 1Q",
-        "a -o x --memory -1", "a -o x --memory 99999999999G", "a -o x --jobs 0", "a -o x --jobs 65", "a -o x --jobs 2.x",
+        "a -o x --memory -1", "a -o x --memory 99999999999G", "a -o x --jobs 0", "a -o x --jobs 65", "a -o x --jobs 2.x", "a -o x --jobs 1.5",
         "a -o x --error nan", "a -o x --error 1x", "a -o x --size 1280", "a -o x --size 0x5", "a -o x --size 5x20000",
         "a -o x --structure hl", "a -o x --structure |", "a -o x --json=1", "a -o x -o y", "a -o x --out y",
     };
@@ -165,6 +165,12 @@ static void suffixes_are_powers_of_1000_or_1024(void **state)
     assert_false(strl_cli_read_scaled("", 1000, &value));
     assert_false(strl_cli_read_scaled(" 1", 1000, &value));
     assert_false(strl_cli_read_scaled("1.2.3", 1000, &value));
+    assert_true(strl_cli_read_scaled("2.3M", 1000, &value) && value == 2300000);
+    assert_true(strl_cli_read_scaled("2.0", 1000, &value) && value == 2);
+    assert_true(strl_cli_read_scaled("1.3G", 1024, &value) && value == 1395864371);
+    assert_false(strl_cli_read_scaled("1.5", 1000, &value));
+    assert_false(strl_cli_read_scaled("1.5", 1024, &value));
+    assert_false(strl_cli_read_scaled("1.2345K", 1000, &value));
     assert_false(strl_cli_read_scaled("1KK", 1000, &value));
 }
 
@@ -180,7 +186,21 @@ static void the_progress_line_states_share_rate_and_time_left(void **state)
     strl_cli_progress_format(text, sizeof text, "sort", 2500000, 10000000, "triangles", 5, 10);
     assert_int_equal(strlen(text), 10);
     strl_cli_progress_format(text, sizeof text, "read", 0, 0, "bytes", 0, 120);
-    assert_string_equal(text, "read  0 bytes  0/s");
+    assert_string_equal(text, "read  0 bytes");
+    strl_cli_progress_format(text, sizeof text, "read", 3000, 0, "bytes", 2, 120);
+    assert_string_equal(text, "read  3.00 K bytes  1.50 K/s");
+}
+
+static void a_stage_that_has_just_begun_states_no_rate(void **state)
+{
+    (void)state;
+    char text[128];
+    strl_cli_progress_format(text, sizeof text, "sort", 0, 10, "items", 3, 120);
+    assert_string_equal(text, "sort         [------------------------------]   0 %");
+    strl_cli_progress_format(text, sizeof text, "sort", 10, 10, "items", 0.001, 120);
+    assert_string_equal(text, "sort         [##############################] 100 %");
+    strl_cli_progress_format(text, sizeof text, "sort", 5, 10, "items", 1, 120);
+    assert_string_equal(text, "sort         [###############---------------]  50 %  5 items/s  left 0:01");
 }
 
 static void progress_is_silent_where_nobody_reads_it(void **state)
@@ -208,6 +228,7 @@ int main(void)
         cmocka_unit_test(help_stops_with_0_even_where_words_are_missing),
         cmocka_unit_test(suffixes_are_powers_of_1000_or_1024),
         cmocka_unit_test(the_progress_line_states_share_rate_and_time_left),
+        cmocka_unit_test(a_stage_that_has_just_begun_states_no_rate),
         cmocka_unit_test(progress_is_silent_where_nobody_reads_it),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
