@@ -44,6 +44,7 @@ struct strl_reader {
     strl__table vertices, normals;
     strl__batch batch;
     strl__names parts, materials;
+    strl__names missing; /* sentences: why files that this one names could not be read */
     strl_reader_drops drops;
     bool prepared; /* tables and batch are there */
     bool started;  /* the input stands at a face */

@@ -81,16 +81,20 @@ static strl_status read_materials(strl__input *input, strl__names *materials, st
     }
 }
 
-strl_status strl__mtl_read(const char *path, strl__names *materials, bool *found, strl_error *err)
+strl_status strl__mtl_read(const char *path, strl__names *materials, strl_error *why,
+                           strl_error *err)
 {
     strl_file *file = NULL;
-    *found = strl_file_open(path, &file, NULL) == STRL_OK;
-    if (!*found)
-        return STRL_OK;
+    *why = (strl_error){0};
+    if (strl_file_open(path, &file, why))
+        return why->status == STRL_ERR_MEMORY ? strl__fail(err, why->status, "%s", why->message)
+                                              : STRL_OK;
     strl__input input;
     strl_status status = strl__input_init(&input, file, BUFFER_BYTES, err);
     if (!status)
         status = read_materials(&input, materials, err);
+    if (!status)
+        strl__input_status(&input, why);
     strl__input_deinit(&input);
     strl_file_close(file, NULL); /* only read from */
     return status;

@@ -165,36 +165,72 @@ static char *library_path(const strl_reader *reader, const char *name, size_t le
     return path;
 }
 
-static strl_status read_library(strl_reader *reader, const char *name, size_t length, bool *found,
-                                strl_error *err)
+/* Of one library; `why` as for strl__mtl_read. */
+static strl_status read_library(strl_reader *reader, const char *name, size_t length,
+                                strl_error *why, strl_error *err)
 {
     obj_state *obj = reader->state;
     char *path = library_path(reader, name, length);
     strl_status status =
-        path ? strl__mtl_read(path, &obj->library, found, err)
+        path ? strl__mtl_read(path, &obj->library, why, err)
              : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", reader->path);
     strl__free(path);
     return status;
 }
 
+/* Once for each library, however often it is named. */
+static strl_status note_missing(strl_reader *reader, const strl_error *why, strl_error *err)
+{
+    uint32_t index;
+    strl_status status =
+        strl__names_add(&reader->missing, why->message, strlen(why->message), &index, err);
+    return status ? strl__fail_context(err, status, "%s, line %" PRIu64 ", missing libraries",
+                                       reader->path, reader->input.line)
+                  : STRL_OK;
+}
+
+/* Each word of the line as a name, but one of whole_length bytes, which was tried. */
+static strl_status read_words(strl_reader *reader, size_t whole_length, bool note, bool *found,
+                              strl_error *err)
+{
+    strl__input *input = &reader->input;
+    strl_status status = STRL_OK;
+    for (; !status && !strl__text_at_line_end(input); strl__text_skip_blanks(input)) {
+        size_t length = strl__text_token(input);
+        strl_error why = {0};
+        if (length != whole_length) {
+            status = read_library(reader, input->at, length, &why, err);
+            *found = *found || (!status && !why.status);
+        }
+        if (!status && why.status && note)
+            status = note_missing(reader, &why, err);
+        input->at += length;
+    }
+    return status;
+}
+
 /* mtllib NAME..: the whole line is tried first, because names with blanks are more common than
- * several names. */
+ * several names. Where a word of it names a library the other words do too, and are missing; where
+ * none does, the whole line is what is missing. */
 static strl_status read_libraries(strl_reader *reader, strl_error *err)
 {
     strl__input *input = &reader->input;
     strl__text_skip_blanks(input);
-    size_t length = strl__text_rest_of_line(input);
+    const uint64_t offset = strl__input_offset(input), line = input->line;
+    const size_t length = strl__text_rest_of_line(input);
+    strl_error why = {0};
+    if (length == 0)
+        return STRL_OK;
+    strl_status status = read_library(reader, input->at, length, &why, err);
+    if (status || !why.status)
+        return status;
     bool found = false;
-    strl_status status = length ? read_library(reader, input->at, length, &found, err) : STRL_OK;
-    while (!status && !found && !strl__text_at_line_end(input)) {
-        bool ignored;
-        size_t token = strl__text_token(input);
-        if (token < length)
-            status = read_library(reader, input->at, token, &ignored, err);
-        input->at += token;
-        strl__text_skip_blanks(input);
-    }
-    return status;
+    status = read_words(reader, length, false, &found, err);
+    if (status || !found)
+        return status ? status : note_missing(reader, &why, err);
+    strl__input_seek(input, offset, line);
+    strl__text_skip_blanks(input);
+    return read_words(reader, length, true, &found, err);
 }
 
 static strl_status gather(strl_reader *reader, strl_error *err)
@@ -245,6 +281,8 @@ static void build_tables(strl_reader *reader)
 static strl_status obj_prepare(strl_reader *reader, strl_error *err)
 {
     obj_state *obj = reader->state;
+    strl__names_deinit(&reader->missing);
+    strl__names_init(&reader->missing, (size_t)(reader->memory_bytes / 64));
     if (obj->has_library)
         strl__names_deinit(&obj->library);
     strl__names_init(&obj->library, (size_t)(reader->memory_bytes / 32));
@@ -364,6 +402,23 @@ static strl_status read_corner(strl_reader *reader, uint64_t *vertex, uint64_t *
     return STRL_OK;
 }
 
+/* At the first corner beyond the limit. */
+static strl_status too_many_corners(strl_reader *reader, strl_error *err)
+{
+    strl__input *input = &reader->input;
+    uint64_t count = STRL__POLYGON_CORNERS_MAX, line = input->line;
+    for (; !strl__text_at_line_end(input) && *input->at != '#'; strl__text_skip_blanks(input)) {
+        input->at += strl__text_token(input);
+        count++;
+    }
+    strl_status failed = strl__input_status(input, err);
+    return failed ? failed
+                  : strl__fail(err, STRL_ERR_LIMIT,
+                               "%s, line %" PRIu64
+                               ": expected at most %u corners in a face, found %" PRIu64,
+                               reader->path, line, STRL__POLYGON_CORNERS_MAX, count);
+}
+
 static strl_status read_face(strl_reader *reader, strl_error *err)
 {
     obj_state *obj = reader->state;
@@ -374,9 +429,7 @@ static strl_status read_face(strl_reader *reader, strl_error *err)
         if (strl__text_at_line_end(&reader->input) || *reader->input.at == '#')
             break;
         if (face.corner_count == STRL__POLYGON_CORNERS_MAX)
-            return strl__fail(err, STRL_ERR_LIMIT,
-                              "%s, line %" PRIu64 ": expected at most %u corners in a face",
-                              reader->path, reader->input.line, STRL__POLYGON_CORNERS_MAX);
+            return too_many_corners(reader, err);
         size_t slot = batch->corner_count + face.corner_count++;
         uint64_t normal = STRL__NO_INDEX;
         strl_status status = read_corner(reader, &batch->vertex[slot], &normal, err);

@@ -254,8 +254,7 @@ static strl_status fill_strip(strl_reader *reader, const strl__ply_property *pro
     for (; !status && ply->strip_left > 0 && !strl__batch_is_full(&reader->batch);
          ply->strip_left--) {
         double value;
-        if (ply->header.ascii)
-            strl__text_skip_space(&reader->input);
+        strl__ply_begin_record(reader); /* of the line */
         status = read_index(reader, property->type, &value, err);
         if (!status)
             status = add_strip_item(reader, value, err);
@@ -309,6 +308,7 @@ static strl_status check_end(strl_reader *reader, strl_error *err)
 {
     strl__ply_state *ply = reader->state;
     strl__input *input = &reader->input;
+    strl__ply_begin_record(reader);
     do
         strl__text_skip_space(input);
     while (input->at < input->end && *input->at == 0 && strl__input_skip(input, 1));

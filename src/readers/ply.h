@@ -118,7 +118,8 @@ static inline bool strl__ply_next_scalar(const strl__ply_state *ply, strl__input
 
 /* A record's first value comes next. In a text each record is a line; words beyond what the header
  * announces are passed over at its end, as Turk's own reader does (some programs write such). Only
- * a strip may go on in the next line. */
+ * a strip may go on in the next line. Comments may stand between lines: they are of the header, but
+ * some programs write them here, and no record begins with a word. */
 void strl__ply_begin_record(strl_reader *reader);
 void strl__ply_end_record(strl_reader *reader);
 /* The length of a list, checked against what is left of the file. */

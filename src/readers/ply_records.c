@@ -37,8 +37,14 @@ strl_status strl__ply_value_fail(strl_reader *reader, const char *what, uint64_t
 void strl__ply_begin_record(strl_reader *reader)
 {
     const strl__ply_state *ply = reader->state;
-    if (ply->header.ascii)
-        strl__text_skip_space(&reader->input);
+    strl__input *input = &reader->input;
+    if (!ply->header.ascii)
+        return;
+    strl__text_skip_space(input);
+    while (strl__text_token_is(input, "comment") || strl__text_token_is(input, "obj_info")) {
+        strl__text_skip_line(input);
+        strl__text_skip_space(input);
+    }
 }
 
 void strl__ply_end_record(strl_reader *reader)

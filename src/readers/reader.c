@@ -29,6 +29,16 @@ static bool has_extension(const char *path, const char *extension)
     return true;
 }
 
+/* The first bytes for a sentence: what is not printable becomes a question mark. */
+static void show_start(const strl__input *input, char *text, size_t size)
+{
+    size_t length = (size_t)(input->end - input->at);
+    length = length < size - 1 ? length : size - 1;
+    for (size_t i = 0; i < length; i++)
+        text[i] = input->at[i] >= 0x20 && input->at[i] < 0x7f ? input->at[i] : '?';
+    text[length] = 0;
+}
+
 static strl_status recognise(strl_reader *reader, strl_error *err)
 {
     if (reader->opened.bytes == 0)
@@ -46,10 +56,12 @@ static strl_status recognise(strl_reader *reader, strl_error *err)
             reader->format = formats[i];
     if (reader->format)
         return STRL_OK;
-    return strl__fail(
-        err, STRL_ERR_UNSUPPORTED,
-        "%s: expected a PLY, STL or OBJ file, found neither their first bytes nor their names",
-        reader->path);
+    char found[32];
+    show_start(&reader->input, found, sizeof found);
+    return strl__fail(err, STRL_ERR_UNSUPPORTED,
+                      "%s: expected a PLY, STL or OBJ file by its first bytes or its name's "
+                      "ending, found one that begins with '%s'",
+                      reader->path, found);
 }
 
 static strl_status open_file(strl_reader *reader, const strl_reader_desc *desc, strl_error *err)
@@ -124,6 +136,7 @@ void strl_reader_close(strl_reader *reader)
     strl__input_deinit(&reader->input);
     strl__names_deinit(&reader->parts);
     strl__names_deinit(&reader->materials);
+    strl__names_deinit(&reader->missing);
     strl_file_close(reader->file, NULL); /* only read from */
     strl__free(reader->state);
     strl__free(reader->scratch_dir);
@@ -238,6 +251,21 @@ strl_status strl_reader_rewind(strl_reader *reader, strl_error *err)
 void strl_reader_drops_get(const strl_reader *reader, strl_reader_drops *drops)
 {
     *drops = reader->drops;
+}
+
+uint64_t strl_reader_vertex_count(const strl_reader *reader)
+{
+    return reader->vertices.count;
+}
+
+uint32_t strl_reader_missing_count(const strl_reader *reader)
+{
+    return (uint32_t)reader->missing.count;
+}
+
+const char *strl_reader_missing(const strl_reader *reader, uint32_t index)
+{
+    return reader->missing.items[index].text;
 }
 
 uint64_t strl_reader_bytes_done(const strl_reader *reader)

@@ -59,6 +59,12 @@ strl_status strl_reader_next(strl_reader *reader, strl_triangle *triangles, size
 strl_status strl_reader_rewind(strl_reader *reader, strl_error *err);
 /* Of the pass so far; complete after the end was reached. */
 void strl_reader_drops_get(const strl_reader *reader, strl_reader_drops *drops);
+/* Vertices that the file lists, used or not, after the first call of next; 0 where the format has no such list (STL). */
+uint64_t strl_reader_vertex_count(const strl_reader *reader);
+/* Files that this one names and that could not be read (an OBJ's material libraries), each once, after the first call of
+ * next: what they would bring is as if absent. index < count; why, a sentence that names the file; borrowed until close. */
+uint32_t strl_reader_missing_count(const strl_reader *reader);
+const char *strl_reader_missing(const strl_reader *reader, uint32_t index);
 /* Bytes of the file consumed so far in this pass, for progress. */
 uint64_t strl_reader_bytes_done(const strl_reader *reader);
 

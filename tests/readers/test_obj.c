@@ -136,6 +136,72 @@ static void materials_take_their_colours_from_the_libraries(void **state)
     strl_reader_close(reader);
 }
 
+/* Reads a model of one triangle after these mtllib lines; the caller closes the reader. */
+static strl_reader *read_with_libraries(const char *lines)
+{
+    strl_reader *reader;
+    strl_error err;
+    read_result result;
+    char text[512];
+    snprintf(text, sizeof text, "%s%susemtl m\nf 1 2 3\n", lines, corners);
+    write_test_text("libraries.obj", text);
+    assert_int_equal(open_test_file("libraries.obj", 0, &reader, &err), STRL_OK);
+    for (unsigned pass = 0; pass < 2; pass++) {
+        read_pass(reader, &result);
+        assert_int_equal(result.status, STRL_OK);
+        assert_int_equal(result.count, 1);
+        free_result(&result);
+        assert_int_equal(strl_reader_rewind(reader, &err), STRL_OK);
+    }
+    return reader;
+}
+
+static void libraries_that_cannot_be_read_are_told_once_each(void **state)
+{
+    (void)state;
+    write_test_text("here.mtl", "newmtl m\nKd 0 1 0\n");
+    assert_int_equal(strl_path_make_directory(test_path("folder.mtl"), NULL), STRL_OK);
+    static const struct {
+        const char *lines, *told[2];
+    } cases[] = {
+        {"mtllib here.mtl\n", {NULL}},
+        {"mtllib\n", {NULL}},
+        {"mtllib gone.mtl\nmtllib gone.mtl\n", {"/gone.mtl: No such file"}},
+        {"mtllib gone with blanks.mtl\n", {"/gone with blanks.mtl: No such file"}},
+        {"mtllib gone.mtl here.mtl folder.mtl\n", {"/gone.mtl: No such file", "/folder.mtl: expected a file"}},
+        {"mtllib here.mtl \\\n gone.mtl\n", {"/gone.mtl: No such file"}},
+        {"mtllib gone.mtl\nmtllib folder.mtl\n", {"/gone.mtl: No such file", "/folder.mtl: expected a file"}},
+    };
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        strl_reader *reader = read_with_libraries(cases[i].lines);
+        uint32_t expected = (cases[i].told[0] != NULL) + (cases[i].told[1] != NULL), rgba;
+        if (strl_reader_missing_count(reader) != expected)
+            fail_msg("%s: %u are missing", cases[i].lines, strl_reader_missing_count(reader));
+        for (uint32_t m = 0; m < expected; m++)
+            if (!strstr(strl_reader_missing(reader, m), cases[i].told[m]))
+                fail_msg("%s: %s", cases[i].lines, strl_reader_missing(reader, m));
+        strl_reader_material(reader, 0, &rgba);
+        assert_int_equal(rgba, strstr(cases[i].lines, "here") ? 0xff00ff00u : 0xffffffffu);
+        strl_reader_close(reader);
+    }
+    assert_int_equal(rmdir(test_path("folder.mtl")), 0);
+}
+
+static void vertices_are_counted_whether_used_or_not(void **state)
+{
+    (void)state;
+    strl_reader *reader;
+    strl_error err;
+    read_result result;
+    write_test_text("points.obj", corners);
+    assert_int_equal(open_test_file("points.obj", 0, &reader, &err), STRL_OK);
+    read_pass(reader, &result);
+    assert_int_equal(result.count, 0);
+    assert_int_equal(strl_reader_vertex_count(reader), 4);
+    free_result(&result);
+    strl_reader_close(reader);
+}
+
 static void colours_of_vertices_are_read_and_weights_are_not(void **state)
 {
     (void)state;
@@ -219,7 +285,8 @@ static void long_lines_are_read_and_longer_polygons_refused(void **state)
         fprintf(file, "\n# %0300000d\nf 1 2 3", 0);
         fclose(file);
         if (extra) {
-            assert_refused("long.obj", "expected at most 16384 corners in a face");
+            assert_refused("long.obj",
+                           "line 16386: expected at most 16384 corners in a face, found 16385");
             continue;
         }
         read_test_file("long.obj", MEMORY_LEAST, &result);
@@ -311,6 +378,8 @@ int main(void)
         cmocka_unit_test(any_line_end_and_a_missing_last_one_are_accepted),
         cmocka_unit_test(objects_and_groups_are_parts),
         cmocka_unit_test(materials_take_their_colours_from_the_libraries),
+        cmocka_unit_test(libraries_that_cannot_be_read_are_told_once_each),
+        cmocka_unit_test(vertices_are_counted_whether_used_or_not),
         cmocka_unit_test(colours_of_vertices_are_read_and_weights_are_not),
         cmocka_unit_test(what_cannot_be_a_triangle_is_counted),
         cmocka_unit_test(bad_files_are_refused_with_a_line),

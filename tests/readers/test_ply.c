@@ -267,6 +267,39 @@ static void other_line_ends_and_words_too_many_are_accepted(void **state)
     }
 }
 
+/* They belong into the header, but some programs write them anywhere between lines. */
+static void comments_between_records_are_passed_over(void **state)
+{
+    (void)state;
+    static const char *const texts[] = {
+        "ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE "element face 2\n" FACE
+        "\n0 0 0\ncomment this is another\ncomment\n\n1 0 0\nobj_info 7 8 9\n0 1 0\n"
+        "comment before faces\n3 0 1 2\n  comment 3 0 1 2\n3 2 1 0\ncomment the end",
+        "ply\nformat ascii 1.0\nelement edge 1\nproperty int vertex1\nelement vertex 3\n" TRIANGLE
+        "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+        "comment first\n1\n0 0 0\n1 0 0\ncomment\n0 1 0\n5 0 1\ncomment inside a strip\n2 -1 0\n"};
+    for (unsigned i = 0; i < 2; i++) {
+        read_result result;
+        write_test_text("comments.ply", texts[i]);
+        read_test_file("comments.ply", MEMORY_LEAST, &result);
+        if (result.status)
+            fail_msg("%s", result.err.message);
+        assert_int_equal(result.count, i ? 1 : 2);
+        assert_positions(&result.triangles[0], (double[]){0, 0, 0, 1, 0, 0, 0, 1, 0});
+        assert_int_equal(result.drops.lines, i);
+        free_result(&result);
+        assert_rewinds("comments.ply", MEMORY_LEAST);
+    }
+    assert_text_refused("inside.ply",
+                        "ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE "element face 1\n" FACE
+                        "0 0 comment\n0 0 0\n0 0 0\n3 0 1 2\n",
+                        "line 10: expected a number, found 'comment'");
+    assert_text_refused("short.ply",
+                        "ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE "element face 1\n" FACE
+                        "0 0 0\n0 0 0\n0 0 0\ncomment 3 0 1 2\n",
+                        "line 14: expected the length of a list, found the end of the file");
+}
+
 /* In a binary file with \r line ends, a first data byte of \n is data. */
 static void the_byte_after_the_header_is_data(void **state)
 {
@@ -526,7 +559,10 @@ static void facts_are_known_at_opening(void **state)
     assert_null(reader);
     assert_int_equal(open_test_file("missing.ply", 0, &reader, &err), STRL_ERR_IO);
     write_test_text("what.txt", "once upon a time\n");
-    assert_refused("what.txt", "expected a PLY, STL or OBJ file");
+    assert_refused("what.txt", "expected a PLY, STL or OBJ file by its first bytes or its name's ending, "
+                               "found one that begins with 'once upon a time?'");
+    write_test_file("what.glb", "glTF\2\0\0\0", 8);
+    assert_refused("what.glb", "found one that begins with 'glTF");
     write_test_text("empty.ply", "");
     assert_refused("empty.ply", "found an empty file");
 }
@@ -540,6 +576,8 @@ int main(void)
         cmocka_unit_test(real_colours_and_colours_of_faces_are_read),
         cmocka_unit_test(what_cannot_be_a_triangle_is_counted),
         cmocka_unit_test(other_line_ends_and_words_too_many_are_accepted),
+        cmocka_unit_test(comments_between_records_are_passed_over),
+        cmocka_unit_test(comments_between_records_are_passed_over),
         cmocka_unit_test(the_byte_after_the_header_is_data),
         cmocka_unit_test(bad_files_are_refused_with_a_place),
         cmocka_unit_test(lying_binary_counts_are_refused_without_work),
