@@ -577,7 +577,6 @@ int main(void)
         cmocka_unit_test(what_cannot_be_a_triangle_is_counted),
         cmocka_unit_test(other_line_ends_and_words_too_many_are_accepted),
         cmocka_unit_test(comments_between_records_are_passed_over),
-        cmocka_unit_test(comments_between_records_are_passed_over),
         cmocka_unit_test(the_byte_after_the_header_is_data),
         cmocka_unit_test(bad_files_are_refused_with_a_place),
         cmocka_unit_test(lying_binary_counts_are_refused_without_work),
