@@ -49,6 +49,14 @@ strl_camera strl_path_camera(const strl_camera_path *path, size_t frame, const u
     return camera;
 }
 
+const char *strl_path_fault(const strl_camera_path *path, size_t frame)
+{
+    strl_camera camera = strl_path_camera(path, frame, (const uint32_t[2]){1, 1});
+    if (camera.fov_y_deg == 0) /* which is an orthographic camera elsewhere */
+        camera.fov_y_deg = -1;
+    return strl_view_fault(&camera);
+}
+
 /* Uniform in [0, 1), the n-th number of a seed. */
 static double random_at(uint64_t seed, uint64_t n)
 {
@@ -330,10 +338,9 @@ strl_status strl_path_parse(const strl_path_site *site, const char *spec, strl_c
         }
         at += strspn(at, " ,\t");
     }
-    strl_view view;
-    strl_camera camera = strl_path_camera(path, 0, (const uint32_t[2]){1, 1});
-    if (status == STRL_OK && !(path->fov_y_deg > 0 && strl_view_init(&view, &camera)))
-        status = strl__fail(err, STRL_ERR_ARGUMENT, "camera: eye, target, up and fov do not make a view");
+    const char *fault = status == STRL_OK ? strl_path_fault(path, 0) : NULL;
+    if (fault)
+        status = strl__fail(err, STRL_ERR_ARGUMENT, "camera: %s", fault);
     if (status != STRL_OK)
         strl_path_deinit(path);
     return status;

@@ -44,11 +44,13 @@ strl_status strl_path_flythrough(const strl_path_site *site, size_t frames, uint
  * STRL_ERR_ARGUMENT names the word that is wrong. */
 strl_status strl_path_parse(const strl_path_site *site, const char *spec, strl_camera_path *path, strl_error *err);
 
-/* {"fov_y_deg":60,"frames":[{"eye":[x,y,z],"target":[x,y,z],"up":[x,y,z]}, ...]} */
+/* {"fov_y_deg":60,"frames":[{"eye":[x,y,z],"target":[x,y,z],"up":[x,y,z]}, ...]}. Loading: STRL_ERR_IO where there is no such file. */
 strl_status strl_path_load(const char *file, strl_camera_path *path, strl_error *err);
 strl_status strl_path_save(const strl_camera_path *path, const char *file, strl_error *err);
 
 void strl_path_deinit(strl_camera_path *path);
 strl_camera strl_path_camera(const strl_camera_path *path, size_t frame, const uint32_t size[2]);
+/* Why a frame's camera makes no view, half a sentence; NULL = it makes one. */
+const char *strl_path_fault(const strl_camera_path *path, size_t frame);
 
 #endif

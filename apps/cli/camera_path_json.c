@@ -1,12 +1,13 @@
 /* Camera paths as JSON files. */
+#include <errno.h>
 #include <jansson.h>
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
 #include "camera_path.h"
-#include "frame/view.h"
 
 #define MOST_FRAMES 1000000u
 
@@ -36,13 +37,11 @@ static strl_status read_frames(const json_t *root, const char *file, strl_camera
     for (size_t f = 0; f < count; f++) {
         const json_t *entry = json_array_get(frames, f);
         strl_path_frame *frame = &path->frames[f];
-        strl_view view;
-        bool whole = read_vector(entry, "eye", frame->eye) && read_vector(entry, "target", frame->target) &&
-                     read_vector(entry, "up", frame->up);
-        strl_camera camera = strl_path_camera(path, f, (const uint32_t[2]){1, 1});
-        if (!whole || !(path->fov_y_deg > 0) || !strl_view_init(&view, &camera))
-            return strl__fail(err, STRL_ERR_FORMAT, "path file %s: frame %zu: expected eye, target and up of three numbers each that make a view",
-                              file, f);
+        if (!read_vector(entry, "eye", frame->eye) || !read_vector(entry, "target", frame->target) || !read_vector(entry, "up", frame->up))
+            return strl__fail(err, STRL_ERR_FORMAT, "path file %s: frame %zu: expected eye, target and up of three numbers each", file, f);
+        const char *fault = strl_path_fault(path, f);
+        if (fault)
+            return strl__fail(err, STRL_ERR_FORMAT, "path file %s: frame %zu: %s", file, f, fault);
     }
     return STRL_OK;
 }
@@ -51,7 +50,11 @@ strl_status strl_path_load(const char *file, strl_camera_path *path, strl_error 
 {
     *path = (strl_camera_path){0};
     json_error_t json_error;
-    json_t *root = json_load_file(file, 0, &json_error);
+    FILE *stream = fopen(file, "rb");
+    if (!stream)
+        return strl__fail(err, STRL_ERR_IO, "cannot open the path file %s: %s", file, strerror(errno));
+    json_t *root = json_loadf(stream, 0, &json_error);
+    fclose(stream);
     if (!root)
         return strl__fail(err, STRL_ERR_FORMAT, "path file %s: line %d: %s", file, json_error.line, json_error.text);
     strl_status status = read_frames(root, file, path, err);

@@ -6,27 +6,45 @@
 #include "interrupt.h"
 #include "options.h"
 #include "progress.h"
+#include "units.h"
+
+/* What the build calls back with. */
+typedef struct build_watch {
+    strl_cli_progress progress;
+    bool quiet;
+} build_watch;
 
 static bool show_progress(void *context, const strl_build_progress *progress)
 {
-    strl_cli_progress_update(context, progress->stage, progress->done, progress->total, "items");
+    build_watch *watch = context;
+    strl_cli_progress_update(&watch->progress, progress->stage, progress->done, progress->total, "items");
     return !strl_cli_interrupted();
 }
 
-static double per_second(uint64_t count, double seconds)
+static void show_warning(void *context, const char *sentence)
 {
-    return seconds > 0 ? (double)count / seconds : 0;
+    build_watch *watch = context;
+    if (watch->quiet)
+        return;
+    strl_cli_progress_end(&watch->progress);
+    fprintf(stderr, "stroll: warning: %s\n", sentence);
+}
+
+static void format_rate(char text[16], uint64_t count, double seconds)
+{
+    strl_cli_format_amount(text, seconds > 0 ? (double)count / seconds : 0);
 }
 
 static int print_json(const strl_build_result *r)
 {
     uint64_t dropped = r->dropped_nonfinite + r->dropped_degenerate;
     json_t *object = json_pack(
-        "{s:I, s:I, s:{s:I, s:I, s:I, s:I, s:I}, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:f, s:I, s:I}",
+        "{s:I, s:I, s:{s:I, s:I, s:I, s:I, s:I}, s:{s:I, s:I}, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:f, s:I, s:I}",
         "triangles_in", (json_int_t)r->triangles_in, "triangles_leaf", (json_int_t)r->triangles_leaf, "dropped",
         "triangles", (json_int_t)dropped, "nonfinite", (json_int_t)r->dropped_nonfinite, "degenerate",
         (json_int_t)r->dropped_degenerate, "lines", (json_int_t)r->dropped_lines, "points",
-        (json_int_t)r->dropped_points, "vertices", (json_int_t)r->vertices, "parts", (json_int_t)r->parts, "materials",
+        (json_int_t)r->dropped_points, "warnings", "missing_libraries", (json_int_t)r->missing_libraries,
+        "coarse_lattices", (json_int_t)r->coarse_lattices, "vertices", (json_int_t)r->vertices, "parts", (json_int_t)r->parts, "materials",
         (json_int_t)r->materials, "placements", (json_int_t)r->placements, "nodes", (json_int_t)r->nodes, "groups",
         (json_int_t)r->groups, "levels", (json_int_t)r->levels, "root_triangles", (json_int_t)r->root_triangles,
         "bytes_out", (json_int_t)r->bytes_out, "seconds", r->seconds, "cpu_seconds", r->cpu_seconds, "peak_rss_bytes",
@@ -41,16 +59,25 @@ static int print_json(const strl_build_result *r)
 
 static void print_text(const strl_build_result *r, const char *output)
 {
-    printf("%s: %llu triangles in %llu nodes on %u levels, %.1f MB (%.2f bytes a triangle)\n", output,
-           (unsigned long long)r->triangles_leaf, (unsigned long long)r->nodes, r->levels, (double)r->bytes_out / 1e6,
+    char rate[16], processor_rate[16];
+    format_rate(rate, r->triangles_in, r->seconds);
+    format_rate(processor_rate, r->triangles_in, r->cpu_seconds);
+    printf("%s: %llu triangle%s in %llu node%s on %u level%s, %.1f MB (%.2f bytes a triangle)\n", output,
+           (unsigned long long)r->triangles_leaf, strl_cli_plural(r->triangles_leaf), (unsigned long long)r->nodes,
+           strl_cli_plural(r->nodes), r->levels, strl_cli_plural(r->levels), (double)r->bytes_out / 1e6,
            (double)r->bytes_out / (double)r->triangles_leaf);
     if (r->dropped_nonfinite + r->dropped_degenerate + r->dropped_lines + r->dropped_points)
-        printf("left out: %llu triangles that are not finite, %llu without area on the lattice, %llu lines, %llu points\n",
-               (unsigned long long)r->dropped_nonfinite, (unsigned long long)r->dropped_degenerate,
-               (unsigned long long)r->dropped_lines, (unsigned long long)r->dropped_points);
-    printf("%.1f s, %.2f M triangles a second (%.2f a second of processor), peak memory %.0f MB, scratch %.0f MB\n",
-           r->seconds, per_second(r->triangles_in, r->seconds) / 1e6, per_second(r->triangles_in, r->cpu_seconds) / 1e6,
-           (double)r->peak_rss_bytes / 1e6, (double)r->scratch_bytes / 1e6);
+        printf("left out: %llu triangle%s not finite, %llu without area on the lattice, %llu line%s, %llu point%s\n",
+               (unsigned long long)r->dropped_nonfinite, strl_cli_plural(r->dropped_nonfinite),
+               (unsigned long long)r->dropped_degenerate, (unsigned long long)r->dropped_lines,
+               strl_cli_plural(r->dropped_lines), (unsigned long long)r->dropped_points,
+               strl_cli_plural(r->dropped_points));
+    if (r->missing_libraries + r->coarse_lattices)
+        printf("warnings: %llu material librar%s that cannot be read, %u lattice%s coarser than a sixteenth of a short edge\n",
+               (unsigned long long)r->missing_libraries, r->missing_libraries == 1 ? "y" : "ies", r->coarse_lattices,
+               strl_cli_plural(r->coarse_lattices));
+    printf("%.1f s, %s triangles a second (%s a second of processor), peak memory %.0f MB, scratch %.0f MB\n",
+           r->seconds, rate, processor_rate, (double)r->peak_rss_bytes / 1e6, (double)r->scratch_bytes / 1e6);
 }
 
 static int run(strl_cli_args *args)
@@ -58,23 +85,25 @@ static int run(strl_cli_args *args)
     strl_build_desc desc = {0};
     strl_cli_list inputs;
     uint64_t jobs = 0;
-    bool json = false;
+    bool json = false, unit_given = false;
+    int unit = 0;
     const strl_cli_option options[] = {
         {.name = "output", .letter = 'o', .kind = STRL_CLI_STRING, .value = &desc.output, .argument = "OUT.stroll",
          .help = "the container to write; an older one is replaced only when the new one is whole", .required = true},
         {.name = "structure", .kind = STRL_CLI_ENUM, .value = &(int){0}, .argument = "clusters",
          .help = "how detail is arranged (clusters)"},
         {.name = "memory", .letter = 'm', .kind = STRL_CLI_BYTES, .value = &desc.memory_bytes,
-         .help = "peak memory of the build (1G)", .least = (double)STRL_BUILD_LEAST_MEMORY, .most = 1e15},
+         .help = "peak memory of the build (1G)", .least = (double)STRL_BUILD_LEAST_MEMORY, .most = 0x1p50},
         {.name = "jobs", .letter = 'j', .kind = STRL_CLI_COUNT, .value = &jobs, .help = "threads (one per processor)",
          .least = 1, .most = 256},
         {.name = "scratch", .kind = STRL_CLI_STRING, .value = &desc.scratch, .argument = "DIR",
-         .help = "folder in which OUT.stroll.tmp is made for the time of the build (beside the output)"},
+         .help = "folder in which OUT.stroll.tmp is made for the time of the build, with it where missing (beside the output)"},
         {.name = "grid", .kind = STRL_CLI_REAL, .value = &desc.grid, .argument = "STEP",
-         .help = "largest lattice step, model units (chosen from the model)", .least = 1e-300, .most = 1e300},
+         .help = "largest lattice step, model units; one below a 2^30th of the extent is refused (chosen from the model)",
+         .least = 1e-300, .most = 1e300},
         {.name = "up", .kind = STRL_CLI_ENUM, .value = &desc.up_axis, .argument = "auto|x|y|z",
          .help = "which axis points up; stored, never applied (auto: what the format says)"},
-        {.name = "unit", .kind = STRL_CLI_STRING, .value = &desc.unit, .argument = "m|cm|mm|in|...",
+        {.name = "unit", .kind = STRL_CLI_ENUM, .value = &unit, .given = &unit_given, .argument = STRL_CLI_UNITS,
          .help = "length unit; stored, never applied (unknown)"},
         {.name = "no-dependencies", .kind = STRL_CLI_FLAG, .value = &desc.no_dependencies,
          .help = "no shared boundaries simplified before their nodes merge: to measure what that brings"},
@@ -85,18 +114,20 @@ static int run(strl_cli_args *args)
     int stop = strl_cli_parse(args, &usage, &inputs);
     if (stop >= 0)
         return stop;
-    strl_cli_progress progress;
+    build_watch watch = {.quiet = args->quiet};
     strl_build_result result;
     strl_error err = {0};
-    strl_cli_progress_init(&progress, args->quiet);
+    strl_cli_progress_init(&watch.progress, args->quiet);
     desc.inputs = (const char *const *)inputs.items;
     desc.input_count = (uint32_t)inputs.count;
     desc.jobs = (unsigned)jobs;
+    desc.unit = unit_given ? strl_cli_unit_name(unit) : NULL;
     desc.progress = show_progress;
-    desc.context = &progress;
+    desc.warn = show_warning;
+    desc.context = &watch;
     strl_cli_catch_interrupts();
     strl_status status = strl_build_clusters(&desc, &result, &err);
-    strl_cli_progress_end(&progress);
+    strl_cli_progress_end(&watch.progress);
     if (status)
         return strl_cli_fail(&err);
     if (json)

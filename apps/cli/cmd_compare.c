@@ -9,6 +9,7 @@
 #include "base/memory.h"
 #include "camera_path.h"
 #include "compare_images.h"
+#include "interrupt.h"
 #include "options.h"
 #include "platform/file.h"
 #include "progress.h"
@@ -111,6 +112,8 @@ static strl_status load_path(const char *folder, strl_camera_path *path, strl_er
     char *file = strl_path_join(folder, "path.json");
     strl_status status = file ? strl_path_load(file, path, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
     strl__free(file);
+    if (status == STRL_ERR_IO)
+        return strl__fail_context(err, status, "%s is no folder of images that `stroll render` wrote", folder);
     return status;
 }
 
@@ -140,6 +143,7 @@ static strl_status compare(const compare_options *o, compare_totals *totals, str
     strl_camera_path path = {0};
     strl_cli_progress progress;
     strl_cli_progress_init(&progress, o->quiet);
+    strl_cli_catch_interrupts();
     strl_status status = load_common_path(o, &path, err);
     if (status == STRL_OK) {
         totals->psnr_db = strl__alloc(path.count, sizeof *totals->psnr_db);
@@ -148,6 +152,8 @@ static strl_status compare(const compare_options *o, compare_totals *totals, str
     }
     for (size_t f = 0; status == STRL_OK && f < path.count; f++) {
         status = compare_frame(o, &path, f, totals, err);
+        if (status == STRL_OK)
+            status = strl_cli_check_interrupt(err);
         strl_cli_progress_update(&progress, "compare", f + 1, path.count, "frames");
     }
     strl_cli_progress_end(&progress);
@@ -195,7 +201,7 @@ static void print_json(const compare_options *o, const compare_totals *t, bool h
 
 static void print_text(const compare_totals *t)
 {
-    printf("%zu frames\n", t->frames);
+    printf("%zu frame%s\n", t->frames, strl_cli_plural(t->frames));
     printf("coverage  %" PRIu64 " uncovered, %" PRIu64 " overcovered pixels (worst frame %zu)\n", t->uncovered, t->overcovered,
            t->worst_coverage_frame);
     printf("depth     %.4f %% of %" PRIu64 " pixels within the range (worst frame %zu)\n", 100 * depth_share(t), t->both, t->worst_depth_frame);

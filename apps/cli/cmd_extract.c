@@ -11,8 +11,10 @@
 #include "container/container.h"
 #include "container/cut.h"
 #include "geometry/octahedral.h"
+#include "interrupt.h"
 #include "options.h"
 #include "platform/file.h"
+#include "platform/output.h"
 #include "progress.h"
 
 #define COPY_BYTES ((size_t)1 << 20)
@@ -20,8 +22,8 @@
 
 typedef struct extraction {
     strl_container *container; /* owned, as all below */
-    char *part_path, *spill_path;
-    strl_file *out, *spill;
+    strl_output *output;
+    strl_file *out, *spill; /* out: the output's; borrowed */
     strl_writer vertices, triangles; /* of the node at hand */
     uint16_t *map;
     strl_arena arena;
@@ -29,7 +31,6 @@ typedef struct extraction {
     double length;
     bool wide; /* positions as double */
     bool colour;
-    bool part_made; /* the file under its temporary name is ours to remove */
     uint64_t out_bytes, spill_bytes, vertex_count, triangle_count, node_count;
     strl_cli_progress line;
 } extraction;
@@ -68,20 +69,12 @@ static strl_status write_header(extraction *self, uint64_t *bytes, strl_error *e
 
 static strl_status open_output(extraction *self, strl_error *err)
 {
-    size_t length = strlen(self->path);
-    self->part_path = malloc(length + 8);
-    self->spill_path = malloc(length + 8);
-    if (!self->part_path || !self->spill_path)
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory to write %s", self->path);
-    snprintf(self->part_path, length + 8, "%s.part", self->path);
-    snprintf(self->spill_path, length + 8, "%s.faces", self->path);
-    strl_status status = strl_file_create(self->part_path, &self->out, err);
-    self->part_made = status == STRL_OK;
-    if (status == STRL_OK)
-        status = strl_file_create(self->spill_path, &self->spill, err);
-    if (status == STRL_OK)
-        status = write_header(self, &self->out_bytes, err);
-    return status;
+    strl_status status = strl_output_open(self->path, NULL, &self->output, err);
+    if (status != STRL_OK)
+        return status;
+    self->out = strl_output_file(self->output);
+    status = strl_output_spill(self->output, &self->spill, err);
+    return status == STRL_OK ? write_header(self, &self->out_bytes, err) : status;
 }
 
 /* What a vertex of this placement needs beside the mesh. */
@@ -221,6 +214,9 @@ static strl_status extract_placement(extraction *self, const strl_placement *pla
         if (status != STRL_OK)
             return status;
         strl_cli_progress_update(&self->line, "extract", id + 1, tree->node_count, "nodes");
+        status = strl_cli_check_interrupt(err);
+        if (status != STRL_OK)
+            return status;
     }
 }
 
@@ -235,6 +231,8 @@ static strl_status append_triangles(extraction *self, strl_error *err)
         status = strl_file_read(self->spill, at, buffer, step, err);
         if (status == STRL_OK)
             status = strl_file_write(self->out, self->out_bytes + at, buffer, step, err);
+        if (status == STRL_OK)
+            status = strl_cli_check_interrupt(err);
         strl_file_punch(self->spill, at, step);
         at += step;
         strl_cli_progress_update(&self->line, "triangles", at / TRIANGLE_BYTES, self->triangle_count, "triangles");
@@ -249,12 +247,7 @@ static strl_status finish(extraction *self, strl_error *err)
     strl_status status = append_triangles(self, err);
     if (status == STRL_OK)
         status = write_header(self, &header_bytes, err);
-    if (status == STRL_OK) {
-        strl_file *file = self->out;
-        self->out = NULL;
-        status = strl_file_close(file, err);
-    }
-    return status == STRL_OK ? strl_path_rename(self->part_path, self->path, err) : status;
+    return status == STRL_OK ? strl_output_finish(self->output, false, err) : status;
 }
 
 static strl_status extract(extraction *self, strl_error *err)
@@ -274,22 +267,16 @@ static strl_status extract(extraction *self, strl_error *err)
     return status == STRL_OK ? finish(self, err) : status;
 }
 
-static void release(extraction *self, bool failed)
+static void release(extraction *self)
 {
     strl_cli_progress_end(&self->line);
-    if (failed && self->part_made)
-        strl_path_remove(self->part_path, NULL);
-    if (self->spill)
-        strl_path_remove(self->spill_path, NULL);
-    strl_file_close(self->out, NULL);
+    strl_output_close(self->output);
     strl_file_close(self->spill, NULL);
     strl__free(self->vertices.data);
     strl__free(self->triangles.data);
     strl_arena_deinit(&self->arena);
     strl_container_close(self->container);
     free(self->map);
-    free(self->part_path);
-    free(self->spill_path);
 }
 
 static strl_status refuse_own_input(const char *model, const char *path, strl_error *err)
@@ -331,18 +318,22 @@ static int run(strl_cli_args *args)
     strl_error err;
     strl_arena_init(&self.arena, 0);
     strl_cli_progress_init(&self.line, args->quiet);
+    strl_cli_catch_interrupts();
     strl_status status = refuse_own_input(models.items[0], self.path, &err);
+    if (status == STRL_OK)
+        status = strl_output_check(self.path, &err);
     if (status == STRL_OK)
         status = strl_container_open_path(models.items[0], &self.container, &err);
     if (status == STRL_OK)
         status = extract(&self, &err);
-    release(&self, status != STRL_OK);
+    release(&self);
     if (status != STRL_OK)
         return strl_cli_fail(&err);
     if (!args->quiet)
-        printf("%s: %" PRIu64 " triangles, %" PRIu64 " vertices from %" PRIu64 " nodes\n", self.path,
-               self.triangle_count, self.vertex_count, self.node_count);
+        printf("%s: %" PRIu64 " triangle%s, %" PRIu64 " vertices from %" PRIu64 " node%s\n", self.path,
+               self.triangle_count, strl_cli_plural(self.triangle_count), self.vertex_count, self.node_count,
+               strl_cli_plural(self.node_count));
     return 0;
 }
 
-STRL_CLI_COMMAND(extract, "writes the coarsest mesh within an error as PLY", run);
+STRL_CLI_COMMAND(extract, "write the coarsest mesh within an error as PLY", run);

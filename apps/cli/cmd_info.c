@@ -191,6 +191,15 @@ static void format_id(const strl_container_info *info, char text[33])
         snprintf(text + (size_t)2 * i, 3, "%02x", info->model_id[i]);
 }
 
+/* Another program's container may name any unit; a line break in it is not to break the line. */
+static void format_unit(const strl_container_info *info, char text[sizeof info->unit])
+{
+    memcpy(text, info->unit, sizeof info->unit);
+    for (char *at = text; *at; at++)
+        if ((unsigned char)*at < ' ' || *at == 0x7f)
+            *at = '?';
+}
+
 static void header_to_json(json_t *object, const strl_container *container)
 {
     static const char *const axes[] = {"x", "y", "z"};
@@ -225,18 +234,23 @@ static void print_header(const char *path, const strl_container *container)
     char id[33];
     format_id(info, id);
     printf("%s: version %" PRIu32 ", model %s\n", path, info->version, id);
-    printf("  %" PRIu64 " bytes, %" PRIu64 " triangles, %.2f bytes a triangle\n", info->file_bytes,
-           triangles_of(container), share(info->file_bytes, triangles_of(container)));
-    printf("  unit %s, up %c, %s, %s\n", info->unit[0] ? info->unit : "unknown", "xyz"[info->up_axis],
+    uint64_t triangles = triangles_of(container);
+    printf("  %" PRIu64 " bytes, %" PRIu64 " triangle%s, %.2f bytes a triangle\n", info->file_bytes, triangles,
+           strl_cli_plural(triangles), share(info->file_bytes, triangles));
+    char unit[sizeof info->unit];
+    format_unit(info, unit);
+    printf("  unit %s, up %c, %s, %s\n", unit[0] ? unit : "unknown", "xyz"[info->up_axis],
            info -> has_colour ? "coloured" : "white", info->closed_hint ? "input closed" : "input open");
     printf("  bounds %.9g %.9g %.9g to %.9g %.9g %.9g\n", info->bounds[0], info->bounds[1], info->bounds[2],
            info->bounds[3], info->bounds[4], info->bounds[5]);
-    printf("  read %" PRIu64 " triangles; dropped %" PRIu64 " not finite, %" PRIu64 " degenerate; skipped %" PRIu64
-           " lines, %" PRIu64 " points\n",
-           info->triangles_in, info->dropped_nonfinite, info->dropped_degenerate, info->dropped_lines,
-           info->dropped_points);
-    printf("  %" PRIu32 " parts, %" PRIu32 " materials, %" PRIu64 " placements\n", info->part_count,
-           info->material_count, info->placement_count);
+    printf("  read %" PRIu64 " triangle%s; dropped %" PRIu64 " not finite, %" PRIu64 " degenerate; skipped %" PRIu64
+           " line%s, %" PRIu64 " point%s\n",
+           info->triangles_in, strl_cli_plural(info->triangles_in), info->dropped_nonfinite, info->dropped_degenerate,
+           info->dropped_lines, strl_cli_plural(info->dropped_lines), info->dropped_points,
+           strl_cli_plural(info->dropped_points));
+    printf("  %" PRIu32 " part%s, %" PRIu32 " material%s, %" PRIu64 " placement%s\n", info->part_count,
+           strl_cli_plural(info->part_count), info->material_count, strl_cli_plural(info->material_count),
+           info->placement_count, strl_cli_plural(info->placement_count));
 }
 
 static void print_groups(const level_facts *level)
@@ -257,12 +271,15 @@ static void print_tree(uint32_t index, const strl_tree *tree, const tree_facts *
 {
     printf("tree %" PRIu32 ": %s, lattice step %.9g, origin %.9g %.9g %.9g\n", index, structure_names[tree->structure],
            tree->step, tree->origin[0], tree->origin[1], tree->origin[2]);
-    printf("  %" PRIu32 " nodes, %" PRIu32 " levels, %" PRIu32 " groups, %" PRIu64 " pages with %" PRIu64
+    printf("  %" PRIu32 " node%s, %" PRIu32 " level%s, %" PRIu32 " group%s, %" PRIu64 " page%s with %" PRIu64
            " bytes of payload\n",
-           tree->node_count, tree->level_count, tree->group_count, facts->pages, facts->payload_bytes);
-    printf("  leaves: %" PRIu64 " triangles, %" PRIu64 " vertices, quantisation error %.3g; root: %" PRIu32
-           " triangles\n",
-           tree->triangle_count, tree->vertex_count, (double)tree->leaf_geometric * tree->step, tree->root_triangles);
+           tree->node_count, strl_cli_plural(tree->node_count), tree->level_count, strl_cli_plural(tree->level_count),
+           tree->group_count, strl_cli_plural(tree->group_count), facts->pages, strl_cli_plural(facts->pages),
+           facts->payload_bytes);
+    printf("  leaves: %" PRIu64 " triangle%s, %" PRIu64 " vertices, quantisation error %.3g; root: %" PRIu32
+           " triangle%s\n",
+           tree->triangle_count, strl_cli_plural(tree->triangle_count), tree->vertex_count,
+           (double)tree->leaf_geometric * tree->step, tree->root_triangles, strl_cli_plural(tree->root_triangles));
     printf("  %5s %8s %8s %12s %12s %10s %10s %7s %9s\n", "level", "nodes", "groups", "triangles", "base", "error min",
            "error max", "locked", "boundary");
     for (uint32_t i = tree->level_count; i-- > 0;) {
@@ -331,4 +348,4 @@ static int run(strl_cli_args *args)
     return status == STRL_OK ? 0 : strl_cli_fail(&err);
 }
 
-STRL_CLI_COMMAND(info, "prints what a container holds", run);
+STRL_CLI_COMMAND(info, "print what a container holds", run);

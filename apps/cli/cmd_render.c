@@ -6,22 +6,24 @@
 
 #include "base/fail.h"
 #include "camera_path.h"
+#include "coarse.h"
 #include "options.h"
 #include "platform/thread.h"
 #include "progress.h"
 #include "render_model.h"
 #include "render_output.h"
+#include "units.h"
 
 #define DEFAULT_FPS 60.0
 #define WALKER_METRES 1.7
 
 /* The command line, with its defaults. */
 typedef struct render_options {
-    const char *camera, *path, *save_path, *output, *stats;
+    const char *input, *camera, *path, *save_path, *output, *stats;
     uint64_t frames, seed, supersample, memory_bytes, gpu_memory_bytes;
     uint32_t size[2];
     double error_px, fps;
-    bool full, realtime, depth, wireframe, flat, no_occlusion;
+    bool full, realtime, depth, wireframe, flat, no_occlusion, frames_given;
     int backend, debug;
 } render_options;
 
@@ -47,26 +49,27 @@ static strl_status probe(void *context, const strl_camera *camera, float *depth,
     return status == STRL_OK ? strl_renderer_read_depth(self->renderer, depth, err) : status;
 }
 
-static double metres_of(const char *unit)
-{
-    static const struct {
-        const char *name;
-        double metres;
-    } units[] = {{"m", 1}, {"km", 1000}, {"cm", 0.01}, {"mm", 0.001}, {"in", 0.0254}, {"ft", 0.3048}, {"um", 1e-6}, {"dm", 0.1}};
-    for (size_t u = 0; u < sizeof units / sizeof *units; u++)
-        if (strcmp(units[u].name, unit) == 0)
-            return units[u].metres;
-    return 0;
-}
-
 static strl_path_site make_site(const strl_render_model *model, prober *looks)
 {
     strl_path_site site = {.up_axis = model->up_axis, .probe = probe, .context = looks};
-    double centre[3], radius, metres = metres_of(model->unit);
+    double centre[3], radius, metres = strl_cli_unit_metres(model->unit);
     memcpy(site.bounds, model->bounds, sizeof site.bounds);
     strl_path_sphere(site.bounds, centre, &radius);
     site.eye_height = metres > 0 ? WALKER_METRES / metres : radius / 50;
     return site;
+}
+
+static bool is_named_path(const char *path)
+{
+    return strcmp(path, "orbit") == 0 || strcmp(path, "walk") == 0 || strcmp(path, "flythrough") == 0;
+}
+
+static strl_status load_path(const char *file, strl_camera_path *path, strl_error *err)
+{
+    strl_status status = strl_path_load(file, path, err);
+    if (status == STRL_ERR_IO)
+        return strl__fail_context(err, status, "--path is orbit, walk, flythrough or a path file");
+    return status;
 }
 
 /* A named path shows the model's surface to the probe: any size the renderer had is restored. */
@@ -85,7 +88,7 @@ static strl_status make_path(const render_options *o, strl_render_model *model, 
     else if (strcmp(o->path, "flythrough") == 0)
         status = strl_path_flythrough(&site, o->frames, o->seed, path, err);
     else
-        status = strl_path_load(o->path, path, err);
+        status = load_path(o->path, path, err);
     if (status == STRL_OK)
         status = strl_renderer_resize(renderer, o->size[0], o->size[1], err);
     return status;
@@ -112,14 +115,16 @@ static strl_status render_frames(const render_options *o, strl_render_model *mod
                                  const strl_camera_path *path, strl_cli_progress *progress, strl_error *err)
 {
     strl_render_output output;
-    const strl_render_output_desc desc = {.path = o->backend == BACKEND_NULL ? NULL : o->output, .stats = o->stats, .depth = o->depth,
-                                          .realtime = o->realtime, .size = {o->size[0], o->size[1]}, .cameras = path};
     strl_draw_options options = draw_options(o, model);
+    strl_render_output_desc desc = {.path = o->output, .stats = o->stats, .depth = o->depth,
+                                    .realtime = o->realtime, .size = {o->size[0], o->size[1]}, .cameras = path};
+    memcpy(desc.background, options.background, sizeof desc.background);
     strl_status status = strl_render_output_init(&output, &desc, err);
     if (status != STRL_OK)
         return status;
     uint64_t start = strl_clock_ns();
     strl_image_stats stats = {0};
+    strl_cli_coarse coarse = {0};
     for (size_t f = 0; status == STRL_OK && f < path->count; f++) {
         strl_camera camera = strl_path_camera(path, f, o->size);
         stats = (strl_image_stats){0};
@@ -127,6 +132,7 @@ static strl_status render_frames(const render_options *o, strl_render_model *mod
         status = model->klass->draw(model, renderer, &camera, &options, &stats, err);
         if (status == STRL_OK)
             status = strl_render_output_add(&output, f, renderer, &stats, err);
+        strl_cli_coarse_add(&coarse, o->error_px, stats.allowed_error_px, stats.max_error_px);
         strl_cli_progress_update(progress, "render", f + 1, path->count, "frames");
     }
     if (status == STRL_OK)
@@ -134,7 +140,10 @@ static strl_status render_frames(const render_options *o, strl_render_model *mod
     strl_render_output_deinit(&output);
     strl_cli_progress_end(progress);
     if (status == STRL_OK && stats.faults > 0)
-        fprintf(stderr, "stroll: %" PRIu64 " reads failed and their nodes stayed coarse, the last because %s\n", stats.faults, stats.last_fault);
+        fprintf(stderr, "stroll: %s: %" PRIu64 " read%s failed and what they were for stayed coarse, the last because %s\n", o->input, stats.faults,
+                strl_cli_plural(stats.faults), stats.last_fault);
+    if (status == STRL_OK)
+        strl_cli_coarse_report(&coarse, o->memory_bytes);
     return status;
 }
 
@@ -147,18 +156,20 @@ static strl_status open_renderer(const render_options *o, strl_renderer **render
     return strl_renderer_create(&desc, renderer, err);
 }
 
-static strl_status render(const render_options *o, const char *input, strl_cli_progress *progress, strl_error *err)
+/* *camera_wrong: it is the specification of the camera that fails. */
+static strl_status render(const render_options *o, strl_cli_progress *progress, bool *camera_wrong, strl_error *err)
 {
     strl_render_model *model = NULL;
     strl_renderer *renderer = NULL;
     strl_camera_path path = {0};
-    const strl_render_model_desc desc = {.path = input, .full = o->full, .realtime = o->realtime, .error_px = o->error_px,
+    const strl_render_model_desc desc = {.path = o->input, .full = o->full, .realtime = o->realtime, .error_px = o->error_px,
                                          .memory_bytes = o->memory_bytes, .progress = progress};
     strl_status status = open_renderer(o, &renderer, err);
     if (status == STRL_OK)
         status = strl_render_model_open(&desc, &model, err);
     if (status == STRL_OK)
         status = make_path(o, model, renderer, &path, err);
+    *camera_wrong = o->camera && status == STRL_ERR_ARGUMENT;
     if (status == STRL_OK && o->save_path)
         status = strl_path_save(&path, o->save_path, err);
     if (status == STRL_OK)
@@ -178,6 +189,11 @@ static int check(const strl_cli_args *args, const render_options *o)
         return strl_cli_usage_error(args, "--camera and --path exclude each other");
     if (!o->output && !o->stats && !o->save_path)
         return strl_cli_usage_error(args, "nothing to write: give -o, --stats or --save-path");
+    if (o->frames_given && !(o->path && is_named_path(o->path)))
+        return strl_cli_usage_error(args, "--frames says how many frames --path orbit, walk or flythrough gets; %s",
+                                    o->path ? "a path file has its own" : "there is no such path here");
+    if (o->backend == BACKEND_NULL && o->output)
+        return strl_cli_usage_error(args, "the null backend draws no image for -o %s: leave -o out or choose another backend", o->output);
     if (o->backend == BACKEND_NULL && o->path && (strcmp(o->path, "walk") == 0 || strcmp(o->path, "flythrough") == 0))
         return strl_cli_usage_error(args, "the null backend sees no surface to go along: save the path with another one and load it");
     if (o->full && o->realtime)
@@ -193,7 +209,7 @@ static int run(strl_cli_args *args)
         {.name = "camera", .kind = STRL_CLI_STRING, .value = &o.camera, .argument = "SPEC",
          .help = "one image: \"eye x y z target x y z up x y z fov DEG\" (the orbit's first frame)"},
         {.name = "path", .kind = STRL_CLI_STRING, .value = &o.path, .argument = "FILE|orbit|walk|flythrough", .help = "many images"},
-        {.name = "frames", .kind = STRL_CLI_COUNT, .value = &o.frames, .help = "of a named path (60)", .least = 1, .most = 1e6},
+        {.name = "frames", .kind = STRL_CLI_COUNT, .value = &o.frames, .given = &o.frames_given, .help = "of a named path (60)", .least = 1, .most = 1e6},
         {.name = "seed", .kind = STRL_CLI_COUNT, .value = &o.seed, .help = "of a named path (1)"},
         {.name = "save-path", .kind = STRL_CLI_STRING, .value = &o.save_path, .argument = "FILE",
          .help = "write the cameras as JSON, for --path of another render"},
@@ -206,9 +222,9 @@ static int run(strl_cli_args *args)
          .help = "never wait for bytes; keep this rate (60)", .least = 1e-3, .most = 1e6},
         {.name = "no-occlusion", .kind = STRL_CLI_FLAG, .value = &o.no_occlusion, .help = "draw hidden nodes too (always so in this version)"},
         {.name = "memory", .letter = 'm', .kind = STRL_CLI_BYTES, .value = &o.memory_bytes, .help = "decoded nodes held (512M)",
-         .least = 1 << 20, .most = 1e15},
+         .least = 1 << 20, .most = 0x1p50},
         {.name = "gpu-memory", .kind = STRL_CLI_BYTES, .value = &o.gpu_memory_bytes, .help = "buffers of nodes (512M)",
-         .least = STRL_RENDERER_LEAST_GPU_BYTES, .most = 1e15},
+         .least = STRL_RENDERER_LEAST_GPU_BYTES, .most = 0x1p50},
         {.name = "supersample", .kind = STRL_CLI_COUNT, .value = &o.supersample, .argument = "K",
          .help = "draw K times wider and higher, filter in linear light (1)", .least = 1, .most = 8},
         {.name = "depth", .kind = STRL_CLI_FLAG, .value = &o.depth,
@@ -223,7 +239,9 @@ static int run(strl_cli_args *args)
     };
     const strl_cli_usage usage = {.positional = "MODEL", .least = 1, .most = 1, .options = options,
                                   .option_count = STRL_CLI_COUNT_OF(options),
-                                  .notes = "MODEL is a container, or with --full also a PLY, STL or OBJ file."};
+                                  .notes = "MODEL is a container, or with --full also a PLY, STL or OBJ file. In the lines of --stats max_error_px is the\n"
+                                           "largest pixel error of what was drawn, and null where the eye is inside a node's box: no pixel error\n"
+                                           "bounds what is that near."};
     strl_cli_list inputs;
     int stop = strl_cli_parse(args, &usage, &inputs);
     if (stop < 0)
@@ -233,8 +251,12 @@ static int run(strl_cli_args *args)
     strl_cli_progress progress;
     strl_error err = {0};
     strl_cli_progress_init(&progress, args->quiet);
-    strl_status status = render(&o, inputs.items[0], &progress, &err);
+    bool camera_wrong = false;
+    o.input = inputs.items[0];
+    strl_status status = render(&o, &progress, &camera_wrong, &err);
     strl_cli_progress_end(&progress);
+    if (camera_wrong)
+        return strl_cli_usage_error(args, "%s", err.message);
     return status == STRL_OK ? 0 : strl_cli_fail(&err);
 }
 

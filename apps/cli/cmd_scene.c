@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "interrupt.h"
 #include "jobs/pool.h"
 #include "options.h"
 #include "platform/thread.h"
@@ -12,7 +13,7 @@
 static bool show_progress(void *context, const char *phase, uint64_t done, uint64_t total)
 {
     strl_cli_progress_update(context, phase, done, total, "steps");
-    return true;
+    return !strl_cli_interrupted();
 }
 
 static int write_scene(strl_cli_args *args, strl_scene_desc *desc, uint64_t jobs)
@@ -20,6 +21,7 @@ static int write_scene(strl_cli_args *args, strl_scene_desc *desc, uint64_t jobs
     strl_error err;
     strl_scene_result result;
     strl_cli_progress line;
+    strl_cli_catch_interrupts();
     strl_status status = strl_pool_create((unsigned)jobs - 1, &desc->pool, &err); /* the caller works too */
     if (status == STRL_OK) {
         strl_cli_progress_init(&line, args->quiet);
@@ -31,8 +33,8 @@ static int write_scene(strl_cli_args *args, strl_scene_desc *desc, uint64_t jobs
     if (status != STRL_OK)
         return strl_cli_fail(&err);
     if (!args->quiet)
-        printf("%s: %" PRIu64 " triangles, %" PRIu64 " vertices, %" PRIu64 " bytes\n", desc->path, result.triangles,
-               result.vertices, result.bytes);
+        printf("%s: %" PRIu64 " triangle%s, %" PRIu64 " vertices, %" PRIu64 " bytes\n", desc->path, result.triangles,
+               strl_cli_plural(result.triangles), result.vertices, result.bytes);
     return 0;
 }
 

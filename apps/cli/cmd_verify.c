@@ -7,6 +7,7 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "interrupt.h"
 #include "options.h"
 #include "platform/file.h"
 #include "progress.h"
@@ -15,7 +16,7 @@
 static bool show_progress(void *context, const char *stage, uint64_t done, uint64_t total)
 {
     strl_cli_progress_update(context, stage, done, total, "steps");
-    return true;
+    return !strl_cli_interrupted();
 }
 
 /* ---- for people ---- */
@@ -133,16 +134,18 @@ static strl_status print_json(const strl_verify_report *report, strl_error *err)
 
 /* ---- running ---- */
 
-/* Beside the model, where there is room for what belongs to it. */
-static strl_status make_scratch(const char *model, const char *wanted, char **folder, strl_error *err)
+/* Where files without names go: the user's folder, which is made where it is missing, or the model's, where there is
+ * room for what belongs to it. */
+static strl_status find_scratch(const char *model, const char *wanted, char **folder, bool *made, strl_error *err)
 {
-    size_t size = strlen(model) + sizeof ".verify.tmp";
-    *folder = wanted ? strl__strdup(wanted) : strl__alloc(size, 1);
+    const char *slash = strrchr(model, '/');
+    *folder = strl__strdup(wanted ? wanted : slash ? model : ".");
     if (!*folder)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
-    if (!wanted)
-        snprintf(*folder, size, "%s.verify.tmp", model);
-    return strl_path_make_directory(*folder, err);
+    if (!wanted && slash)
+        (*folder)[slash == model ? 1 : slash - model] = 0;
+    *made = wanted && !strl_path_exists(wanted);
+    return wanted ? strl_path_make_directory(wanted, err) : STRL_OK;
 }
 
 static strl_status verify(strl_cli_args *args, strl_verify_desc *desc, const char *scratch, strl_verify_report *report,
@@ -150,7 +153,9 @@ static strl_status verify(strl_cli_args *args, strl_verify_desc *desc, const cha
 {
     strl_cli_progress line;
     char *folder = NULL;
-    strl_status status = desc->input_count ? make_scratch(desc->model, scratch, &folder, err) : STRL_OK;
+    bool made = false;
+    strl_status status = desc->input_count ? find_scratch(desc->model, scratch, &folder, &made, err) : STRL_OK;
+    strl_cli_catch_interrupts();
     strl_cli_progress_init(&line, args->quiet);
     desc->scratch_dir = folder;
     desc->progress = show_progress;
@@ -158,8 +163,8 @@ static strl_status verify(strl_cli_args *args, strl_verify_desc *desc, const cha
     if (status == STRL_OK)
         status = strl_verify_run(desc, report, err);
     strl_cli_progress_end(&line);
-    if (folder && !scratch)
-        strl_path_remove_directory(folder, NULL);
+    if (made)
+        strl_path_remove_if_empty(folder);
     strl__free(folder);
     return status;
 }
@@ -203,7 +208,7 @@ static int run(strl_cli_args *args)
          .value = &memory,
          .help = "peak memory (1G)",
          .least = (double)STRL_VERIFY_LEAST_MEMORY,
-         .most = 0x1p60},
+         .most = 0x1p50},
         {.name = "jobs",
          .letter = 'j',
          .kind = STRL_CLI_COUNT,
@@ -222,11 +227,14 @@ static int run(strl_cli_args *args)
          .kind = STRL_CLI_STRING,
          .value = &scratch,
          .argument = "DIR",
-         .help = "folder for --against (MODEL.verify.tmp)"},
+         .help = "folder for temporary files of --against, made for the time where it is missing (beside MODEL)"},
         {.name = "json", .kind = STRL_CLI_FLAG, .value = &json, .help = "print one JSON object"},
     };
     const strl_cli_usage usage = {
-        .positional = "MODEL", .least = 1, .most = 1, .options = options, .option_count = STRL_CLI_COUNT_OF(options)};
+        .positional = "MODEL", .least = 1, .most = 1, .options = options, .option_count = STRL_CLI_COUNT_OF(options),
+        .notes = "--against takes all words up to the next option: put MODEL before it, or after \"--\":\n"
+                 "  stroll verify MODEL --against INPUT...\n"
+                 "  stroll verify --against INPUT... -- MODEL"};
     int stop = strl_cli_parse(args, &usage, &models);
     if (stop >= 0)
         return stop;

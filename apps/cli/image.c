@@ -124,7 +124,8 @@ strl_status strl_depth_read(float **depth, uint32_t *width, uint32_t *height, co
     return status;
 }
 
-strl_status strl_contact_sheet_init(strl_contact_sheet *sheet, uint32_t frames, uint32_t width, uint32_t height, strl_error *err)
+strl_status strl_contact_sheet_init(strl_contact_sheet *sheet, uint32_t frames, uint32_t width, uint32_t height,
+                                    const uint8_t background[3], strl_error *err)
 {
     uint32_t columns = (uint32_t)ceil(sqrt(frames)), rows = (frames + columns - 1) / columns;
     uint32_t most_width = MOST_SHEET_SIDE / columns < CELL_WIDTH ? MOST_SHEET_SIDE / columns : CELL_WIDTH;
@@ -135,7 +136,10 @@ strl_status strl_contact_sheet_init(strl_contact_sheet *sheet, uint32_t frames, 
     sheet->cell_height = (height + factor - 1) / factor;
     if ((uint64_t)sheet->cell_width * columns > MOST_SIDE || (uint64_t)sheet->cell_height * rows > MOST_SIDE)
         return strl__fail(err, STRL_ERR_LIMIT, "%" PRIu32 " frames are too many for one contact sheet", frames);
-    return strl_image_init(&sheet->image, sheet->cell_width * columns, sheet->cell_height * rows, err);
+    strl_status status = strl_image_init(&sheet->image, sheet->cell_width * columns, sheet->cell_height * rows, err);
+    for (size_t p = 0; status == STRL_OK && p < (size_t)sheet->image.width * sheet->image.height; p++)
+        memcpy(sheet->image.rgb + 3 * p, background, 3);
+    return status;
 }
 
 /* The mean in linear light of the frame's pixels that one sheet pixel stands for. */

@@ -30,7 +30,9 @@ typedef struct strl_contact_sheet {
     uint32_t cell_width, cell_height;
 } strl_contact_sheet;
 
-strl_status strl_contact_sheet_init(strl_contact_sheet *sheet, uint32_t frames, uint32_t width, uint32_t height, strl_error *err);
+/* background: where there is no frame, sRGB. */
+strl_status strl_contact_sheet_init(strl_contact_sheet *sheet, uint32_t frames, uint32_t width, uint32_t height,
+                                    const uint8_t background[3], strl_error *err);
 void strl_contact_sheet_add(strl_contact_sheet *sheet, uint32_t frame, const strl_image *image);
 void strl_contact_sheet_deinit(strl_contact_sheet *sheet);
 

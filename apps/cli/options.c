@@ -1,7 +1,6 @@
 /* The command line of every command: parse, help and usage errors. See options.h. */
 #include "options.h"
 
-#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -48,9 +47,16 @@ int strl_cli_usage_error(const strl_cli_args *args, const char *format, ...)
 int strl_cli_fail(const strl_error *err)
 {
     const char *sentence = err->message[0] ? err->message : strl_status_name(err->status);
+    if (err->status == STRL_ERR_CANCELLED) /* whatever the work was: commands are stopped by signals alone */
+        sentence = "interrupted";
     fflush(stdout); /* what was said before stands before, through a pipe too */
     fprintf(stderr, "stroll: %s\n", sentence);
     return 1;
+}
+
+const char *strl_cli_plural(uint64_t count)
+{
+    return count == 1 ? "" : "s";
 }
 
 static void print_option(char letter, const char *name, const char *argument, bool value_optional, const char *help)
@@ -97,18 +103,12 @@ static int read_enum(const strl_cli_args *args, const strl_cli_option *option, c
     return strl_cli_usage_error(args, "--%s is one of %s, not \"%s\"", option->name, argument_of(option), word);
 }
 
-/* A bound as somebody would type it: 64M, not 6.71089e+07. */
 static void format_bound(char text[32], const strl_cli_option *option, double bound)
 {
-    const char *suffix = "KMGT";
-    double thousand = option->kind == STRL_CLI_BYTES ? 1024 : 1000;
-    int power = 0;
-    if (option->kind != STRL_CLI_REAL)
-        while (power < 4 && bound >= thousand && fmod(bound, thousand) == 0) {
-            bound /= thousand;
-            power++;
-        }
-    snprintf(text, 32, "%.15g%.*s", bound, power > 0, suffix + (power > 0 ? power - 1 : 0));
+    if (option->kind == STRL_CLI_REAL)
+        snprintf(text, 32, "%.15g", bound);
+    else
+        strl_cli_format_scaled(text, bound, option->kind == STRL_CLI_BYTES ? 1024 : 1000);
 }
 
 static int check_bounds(const strl_cli_args *args, const strl_cli_option *option, double value, const char *word)

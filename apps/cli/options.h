@@ -100,6 +100,9 @@ typedef struct strl_cli_usage {
  * word or after "="; short flags may be joined; "--" ends options. */
 int strl_cli_parse(strl_cli_args *args, const strl_cli_usage *usage, strl_cli_list *positional);
 
+/* "s" where a noun after this count has one: "1 node", "2 nodes". */
+const char *strl_cli_plural(uint64_t count);
+
 /* For rules that a declaration cannot say: prints "stroll COMMAND: sentence" and where help is; returns 2. */
 int strl_cli_usage_error(const strl_cli_args *args, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
@@ -108,6 +111,10 @@ int strl_cli_fail(const strl_error *err);
 
 /* The same parsers for words inside a specification. False where the whole word is not such a value; 1.5 is no count, 1.5K is. */
 bool strl_cli_read_scaled(const char *word, unsigned thousand, uint64_t *value); /* thousand: 1000 or 1024 */
+/* As somebody would type it: 64M, not 67108864; exact for whole numbers up to 10^15. */
+void strl_cli_format_scaled(char text[32], double value, unsigned thousand);
+/* For people: 1234567 as "1.23 M". */
+void strl_cli_format_amount(char text[16], double amount);
 bool strl_cli_read_real(const char *word, double *value);
 bool strl_cli_read_size(const char *word, uint32_t size[2]);
 

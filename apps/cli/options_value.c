@@ -2,6 +2,7 @@
 #include <ctype.h>
 #include <errno.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -63,6 +64,29 @@ bool strl_cli_read_scaled(const char *word, unsigned thousand, uint64_t *value)
         return false;
     *value = whole * scale;
     return true;
+}
+
+void strl_cli_format_scaled(char text[32], double value, unsigned thousand)
+{
+    static const char *const suffixes[] = {"", "K", "M", "G", "T"};
+    unsigned power = 0;
+    while (power < 4 && value >= thousand && fmod(value, thousand) == 0) {
+        value /= thousand;
+        power++;
+    }
+    snprintf(text, 32, "%.15g%s", value, suffixes[power]);
+}
+
+void strl_cli_format_amount(char text[16], double amount)
+{
+    static const char *const scales[] = {"", " K", " M", " G", " T"};
+    unsigned scale = 0;
+    while (amount >= 1000 && scale < 4) {
+        amount /= 1000;
+        scale++;
+    }
+    int digits = scale == 0 || amount >= 100 ? 0 : amount >= 10 ? 1 : 2;
+    snprintf(text, 16, "%.*f%s", digits, amount > 99999 ? 99999 : amount, scales[scale]);
 }
 
 bool strl_cli_read_real(const char *word, double *value)

@@ -6,25 +6,13 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include "options.h"
 #include "platform/thread.h"
 
 enum { BAR_MOST = 30, LINE_BYTES = 256, REDRAW_NS = 100000000 };
 
 /* A stage that has just begun has no rate yet, and what it says of the time left would be noise. */
 #define LEAST_RATE_SECONDS 0.1
-
-/* 1234567 as "1.23 M". */
-static void format_amount(char text[16], double amount)
-{
-    static const char *const scales[] = {"", " K", " M", " G", " T"};
-    unsigned scale = 0;
-    while (amount >= 1000 && scale < 4) {
-        amount /= 1000;
-        scale++;
-    }
-    int digits = scale == 0 || amount >= 100 ? 0 : amount >= 10 ? 1 : 2;
-    snprintf(text, 16, "%.*f%s", digits, amount > 99999 ? 99999 : amount, scales[scale]);
-}
 
 static void format_time(char text[24], double seconds)
 {
@@ -38,7 +26,7 @@ static void format_time(char text[24], double seconds)
 static void format_rate(char text[40], double rate, const char *unit)
 {
     char amount[16];
-    format_amount(amount, rate);
+    strl_cli_format_amount(amount, rate);
     snprintf(text, 40, "  %s%s%.16s/s", amount, *unit ? " " : "", unit);
 }
 
@@ -48,7 +36,7 @@ void strl_cli_progress_format(char *text, unsigned size, const char *stage, uint
     char amount[16], rate[40] = "", left[24] = "";
     char bar[BAR_MOST + 1] = "";
     bool known = done > 0 && seconds >= LEAST_RATE_SECONDS;
-    format_amount(amount, (double)done);
+    strl_cli_format_amount(amount, (double)done);
     if (known)
         format_rate(rate, (double)done / seconds, total ? unit : "");
     if (total == 0) {

@@ -35,7 +35,7 @@ static strl_status allocate(strl_render_output *output, strl_error *err)
     if (status == STRL_OK && (!output->rgba || !output->depth))
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for an image of %" PRIu32 "x%" PRIu32 " pixels", size[0], size[1]);
     if (status == STRL_OK && output->folder && frames > 1 && frames <= MOST_SHEET_FRAMES)
-        status = strl_contact_sheet_init(&output->sheet, (uint32_t)frames, size[0], size[1], err);
+        status = strl_contact_sheet_init(&output->sheet, (uint32_t)frames, size[0], size[1], output->desc.background, err);
     return status;
 }
 

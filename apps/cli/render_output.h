@@ -14,6 +14,7 @@ typedef struct strl_render_output_desc {
     bool depth;
     bool realtime;     /* say so in the statistics */
     uint32_t size[2];
+    uint8_t background[3]; /* sRGB, of the contact sheet where it has no frame */
     const strl_camera_path *cameras; /* borrowed */
 } strl_render_output_desc;
 

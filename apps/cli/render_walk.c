@@ -21,6 +21,7 @@ typedef struct walk_model {
     strl_walk *walk;
     strl_pool *pool;
     strl_executor executor;
+    const char *path; /* borrowed, for sentences */
     bool realtime;
 } walk_model;
 
@@ -33,6 +34,12 @@ static strl_status fail_unsettled(const strl_walk_stats *stats, strl_error *err)
 {
     return strl__fail(err, STRL_ERR_IO, "the front does not become resident: %" PRIu32 " nodes are missing%s%.200s", stats->missing_nodes,
                       stats->last_fault[0] ? ", last fault: " : " and nothing arrives", stats->last_fault);
+}
+
+/* What reads ranges knows offsets, not names. */
+static strl_status name_file(const char *path, strl_status status, strl_error *err)
+{
+    return status == STRL_OK || strstr(err->message, path) ? status : strl__fail_context(err, status, "%s", path);
 }
 
 /* Selects until nothing is missing. */
@@ -76,7 +83,7 @@ static strl_status walk_draw(strl_render_model *model, strl_renderer *renderer, 
     uint64_t start = strl_clock_ns();
     strl_status status = settle(self, camera, &list, stats, err);
     if (status != STRL_OK)
-        return status;
+        return name_file(self->path, status, err);
     fill_stats(strl_walk_get_stats(self->walk), stats);
     uint64_t selected = strl_clock_ns();
     strl_render_stats drawn;
@@ -139,7 +146,8 @@ strl_status strl_render_walk_open(const strl_render_model_desc *desc, strl_rende
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a model");
     self->base.klass = &walk_class;
     self->realtime = desc->realtime;
-    strl_status status = open_walk(self, desc, err);
+    self->path = desc->path;
+    strl_status status = name_file(desc->path, open_walk(self, desc, err), err);
     if (status != STRL_OK) {
         walk_close(&self->base);
         return status;

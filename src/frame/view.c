@@ -47,49 +47,66 @@ static bool normalise(double v[3])
     return true;
 }
 
-static bool init_basis(strl_view *view, const strl_camera *camera)
+/* The two below return what is wrong, NULL = nothing. */
+static const char *init_basis(strl_view *view, const strl_camera *camera)
 {
     double up[3];
     for (int i = 0; i < 3; i++) {
-        if (!isfinite(camera->eye[i]))
-            return false;
+        if (!isfinite(camera->eye[i]) || !isfinite(camera->target[i]) || !isfinite(camera->up[i]))
+            return "a coordinate of eye, target or up is not finite";
         view->eye[i] = camera->eye[i];
         view->forward[i] = camera->target[i] - camera->eye[i];
         up[i] = camera->up[i];
     }
-    if (!normalise(view->forward) || !normalise(up))
-        return false;
+    if (!normalise(view->forward))
+        return "eye and target are the same point, or farther apart than numbers reach";
+    if (!normalise(up))
+        return "up is zero";
     cross(view->forward, up, view->right);
     /* Below this angle between up and view the roll of the image is rounding noise. */
     if (dot(view->right, view->right) < 1e-20 || !normalise(view->right))
-        return false;
+        return "up is along the line from eye to target";
     cross(view->right, view->forward, view->up);
-    return true;
+    return NULL;
 }
 
-bool strl_view_init(strl_view *view, const strl_camera *camera)
+static const char *init_view(strl_view *view, const strl_camera *camera)
 {
     memset(view, 0, sizeof *view);
-    if (camera->width == 0 || camera->height == 0 || !init_basis(view, camera))
-        return false;
+    if (camera->width == 0 || camera->height == 0)
+        return "the image has no pixels";
+    const char *fault = init_basis(view, camera);
+    if (fault)
+        return fault;
     double aspect = (double)camera->width / camera->height;
     view->orthographic = camera->fov_y_deg == 0;
     if (view->orthographic) {
         if (!(camera->ortho_height > 0) || !isfinite(camera->ortho_height))
-            return false;
+            return "the height of an orthographic image is not above 0";
         view->half_height = camera->ortho_height / 2;
         view->half_width = view->half_height * aspect;
         view->focal_px = camera->height / camera->ortho_height;
         view->corner = 1;
-        return true;
+        return NULL;
     }
     if (!(camera->fov_y_deg > 0 && camera->fov_y_deg < 180))
-        return false;
+        return "fov is not between 0 and 180 degrees";
     view->tan_y = tan(camera->fov_y_deg * (M_PI / 360));
     view->tan_x = view->tan_y * aspect;
     view->focal_px = camera->height / (2 * view->tan_y);
     view->corner = sqrt(1 + view->tan_x * view->tan_x + view->tan_y * view->tan_y);
-    return true;
+    return NULL;
+}
+
+bool strl_view_init(strl_view *view, const strl_camera *camera)
+{
+    return !init_view(view, camera);
+}
+
+const char *strl_view_fault(const strl_camera *camera)
+{
+    strl_view view;
+    return init_view(&view, camera);
 }
 
 /* The least and largest of dot(axis, p - eye) over the box. */

@@ -25,6 +25,8 @@ typedef struct strl_box {
 
 /* False where the camera is degenerate (not finite, eye = target, up parallel to the view, empty image). */
 bool strl_view_init(strl_view *view, const strl_camera *camera);
+/* Why it is: half a sentence, such as "up is zero"; NULL where strl_view_init succeeds. */
+const char *strl_view_fault(const strl_camera *camera);
 /* Conservative: false only where the box is certainly outside the image (or wholly behind the eye). */
 bool strl_view_sees(const strl_view *view, const strl_box *box);
 /* The largest displacement in pixels, anywhere in the image, that a length `error` (world units) can cause at a point of the box that lies in front of

@@ -238,6 +238,26 @@ static void an_orthographic_error_does_not_depend_on_the_distance(void **state)
     assert_true(fabs(least - 49) < 1e-12 && fabs(largest - 51) < 1e-12);
 }
 
+static void what_is_wrong_with_a_camera_is_named(void **state)
+{
+    (void)state;
+    strl_camera camera = a_camera();
+    assert_null(strl_view_fault(&camera));
+    memcpy(camera.target, camera.eye, sizeof camera.eye);
+    assert_non_null(strstr(strl_view_fault(&camera), "eye and target"));
+    camera = a_camera();
+    memset(camera.up, 0, sizeof camera.up);
+    assert_string_equal(strl_view_fault(&camera), "up is zero");
+    camera.up[2] = 3;
+    assert_string_equal(strl_view_fault(&camera), "up is along the line from eye to target");
+    camera = a_camera();
+    camera.target[1] = INFINITY;
+    assert_non_null(strstr(strl_view_fault(&camera), "not finite"));
+    camera = a_camera();
+    camera.fov_y_deg = 180;
+    assert_non_null(strstr(strl_view_fault(&camera), "fov"));
+}
+
 static void degenerate_cameras_are_refused(void **state)
 {
     (void)state;
@@ -274,6 +294,7 @@ int main(void)
         cmocka_unit_test(a_box_that_passes_below_the_eye_is_bounded_by_what_the_image_shows_of_it),
         cmocka_unit_test(an_orthographic_error_does_not_depend_on_the_distance),
         cmocka_unit_test(degenerate_cameras_are_refused),
+        cmocka_unit_test(what_is_wrong_with_a_camera_is_named),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

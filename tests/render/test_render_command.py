@@ -137,8 +137,8 @@ class Test:
                 ((self.model, "--backend", "null", "--path", "walk", "--stats", "x"), 2, "null backend"),
                 ((self.model, "-o", self.root + "/x.png"), 1, "is not a container"),
                 ((self.model, "--full", "--path", "orbit", "-o", self.root + "/x.png"), 1, "need a folder"),
-                ((self.model, "--full", "--camera", "eye 1 2 nose", "-o", self.root + "/x.png"), 1, "expected a number"),
-                ((self.model, "--full", "--camera", "eye 1 1 1 target 1 1 1", "-o", self.root + "/x.png"), 1, "do not make a view"),
+                ((self.model, "--full", "--camera", "eye 1 2 nose", "-o", self.root + "/x.png"), 2, "expected a number"),
+                ((self.model, "--full", "--camera", "eye 1 1 1 target 1 1 1", "-o", self.root + "/x.png"), 2, "same point"),
                 ((self.model, "--full", "--path", self.model, "-o", self.root + "/x"), 1, "path file"),
                 ((self.root + "/none.ply", "--full", "-o", self.root + "/x.png"), 1, "none.ply")):
             result = self.run("render", *words)
