@@ -72,10 +72,11 @@ static void print_text(const strl_build_result *r, const char *output)
                (unsigned long long)r->dropped_degenerate, (unsigned long long)r->dropped_lines,
                strl_cli_plural(r->dropped_lines), (unsigned long long)r->dropped_points,
                strl_cli_plural(r->dropped_points));
-    if (r->missing_libraries + r->coarse_lattices)
-        printf("warnings: %llu material librar%s that cannot be read, %u lattice%s coarser than a sixteenth of a short edge\n",
-               (unsigned long long)r->missing_libraries, r->missing_libraries == 1 ? "y" : "ies", r->coarse_lattices,
-               strl_cli_plural(r->coarse_lattices));
+    if (r->missing_libraries)
+        printf("missing: %llu material librar%s, whose materials are white\n", (unsigned long long)r->missing_libraries,
+               r->missing_libraries == 1 ? "y" : "ies");
+    if (r->coarse_lattices)
+        printf("the lattice is coarser than a sixteenth of the short edges\n");
     printf("%.1f s, %s triangles a second (%s a second of processor), peak memory %.0f MB, scratch %.0f MB\n",
            r->seconds, rate, processor_rate, (double)r->peak_rss_bytes / 1e6, (double)r->scratch_bytes / 1e6);
 }

@@ -277,8 +277,7 @@ strl_status strl__distribute(strl_build_context *context, strl_reader *const *re
     for (size_t i = 0; i < ingest->palette_count && !status; i++)
         ingest->palette[i].rgba = ingest->materials.rgba[ingest->palette[i].material];
     if (!status && ingest->triangle_count == 0)
-        status = strl__fail(err, STRL_ERR_FORMAT, "%s: no triangle is left: all %llu collapse on the lattice of step %g",
-                            context->desc->inputs[0], (unsigned long long)context->result->triangles_in, ingest->step);
+        status = strl__ingest_refuse_collapsed(context, ingest, survey->triangles, err);
     strl__free(d.batch);
     strl__free(d.table.slots);
     return status;

@@ -78,7 +78,8 @@ strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, st
     context->result->triangles_in = survey.triangles;
     note_drops(context, readers);
     context->progress.triangles_in = survey.triangles;
-    status = check_disk(context, survey.triangles, err);
+    status = survey.triangles ? check_disk(context, survey.triangles, err)
+                              : strl__ingest_refuse_empty(context, readers, err);
     if (status)
         goto done;
     ingest->has_normals = survey.any_normal;
@@ -90,6 +91,7 @@ strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, st
     status = strl__distribute(context, readers, &survey, ingest, &buckets, err);
     if (status)
         goto done;
+    strl__ingest_warn(context, readers, ingest); /* not before: of a refused model only the refusal is told */
     for (uint32_t i = 0; i < context->desc->input_count; i++) {
         strl_reader_close(readers[i]);
         readers[i] = NULL;

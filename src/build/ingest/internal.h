@@ -20,9 +20,21 @@ typedef struct model_survey {
 
 strl_status strl__survey_run(strl_build_context *context, strl_reader *const *readers, model_survey *survey, strl_error *err);
 void strl__survey_deinit(model_survey *survey);
-/* Sets origin, step, curve_shift, leaf_error. */
+/* Sets origin, step and what is said about it, curve_shift, leaf_error. */
 strl_status strl__survey_choose_lattice(const strl_build_context *context, const model_survey *survey, strl_ingest *ingest,
                                         strl_error *err);
+
+/* Sentences (report.c). Long enough for most; what is longer is cut. */
+#define STRL_INPUTS_NAME_BYTES 200u
+/* "a.ply", or "a.ply and 2 more". */
+void strl__ingest_name_inputs(const strl_build_desc *desc, char *text, size_t size);
+/* No triangle was read: what was, by kind. The result has the drops. */
+strl_status strl__ingest_refuse_empty(const strl_build_context *context, strl_reader *const *readers, strl_error *err);
+/* All `collapsed` triangles that were read have two corners in one lattice cell. */
+strl_status strl__ingest_refuse_collapsed(const strl_build_context *context, const strl_ingest *ingest,
+                                          uint64_t collapsed, strl_error *err);
+/* Tells and counts what is built although something is amiss. */
+void strl__ingest_warn(strl_build_context *context, strl_reader *const *readers, const strl_ingest *ingest);
 
 /* Position on the curve of a lattice point. */
 uint64_t strl__curve_key(const strl_ingest *ingest, const uint32_t position[3]);

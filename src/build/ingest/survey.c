@@ -8,18 +8,21 @@
 #include "build/ingest/internal.h"
 
 #define SAMPLE_CAPACITY 65536u
-/* Bins of a squared length by the top bits of its float pattern: 8 bins an octave of the square, 16 an octave of length. */
-#define EDGE_BIN_SHIFT 20
-#define EDGE_BINS (1u << (31 - EDGE_BIN_SHIFT))
+/* Bins of a squared length by the top bits of its pattern: 8 bins an octave of the square, 16 an octave of length. */
+#define EDGE_BIN_SHIFT 49
+#define EDGE_BINS (1u << (63 - EDGE_BIN_SHIFT))
+/* Lattice steps across the extent, at most: positions are 32-bit, and their differences must be too. */
+#define STEPS_EXPONENT 30
+#define LEAST_EXTENT 1e-140 /* steps below 2^-512 are not of the container's format */
+#define MOST_COORDINATE 1e150 /* nor those above 2^512; and squares of lengths stay finite */
 
 static void count_edges(model_survey *survey, const strl_triangle *triangle)
 {
     for (int c = 0; c < 3; c++) {
         const double *a = triangle->position[c], *b = triangle->position[c == 2 ? 0 : c + 1];
         double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2], length2 = x * x + y * y + z * z;
-        float value = (float)length2;
-        uint32_t bits;
-        memcpy(&bits, &value, sizeof bits);
+        uint64_t bits;
+        memcpy(&bits, &length2, sizeof bits);
         if (length2 > 0)
             survey->edge_histogram[bits >> EDGE_BIN_SHIFT]++;
     }
@@ -92,8 +95,6 @@ strl_status strl__survey_run(strl_build_context *context, strl_reader *const *re
         strl_reader_info_get(readers[i], &info);
         bytes_before += info.file_bytes;
     }
-    if (survey->triangles == 0)
-        status = strl__fail(err, STRL_ERR_FORMAT, "%s holds no triangle that could be built", context->desc->inputs[0]);
 done:
     strl__free(batch);
     return status;
@@ -115,8 +116,8 @@ static double short_edge(const model_survey *survey)
     for (uint32_t i = 0; i < EDGE_BINS; i++) {
         seen += survey->edge_histogram[i];
         if (seen > total / 100) {
-            uint32_t bits = i << EDGE_BIN_SHIFT;
-            float value;
+            uint64_t bits = (uint64_t)i << EDGE_BIN_SHIFT;
+            double value;
             memcpy(&value, &bits, sizeof value);
             return sqrt(value);
         }
@@ -131,6 +132,49 @@ static double power_of_two_below(double value)
     return ldexp(1, exponent - 1);
 }
 
+/* What no lattice can hold, or doubles cannot tell apart. */
+static strl_status check_extent(const strl_build_context *context, const model_survey *survey, double extent, double largest,
+                                strl_error *err)
+{
+    char inputs[STRL_INPUTS_NAME_BYTES];
+    strl__ingest_name_inputs(context->desc, inputs, sizeof inputs);
+    if (largest > MOST_COORDINATE)
+        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected coordinates of at most %g, found %g", inputs, MOST_COORDINATE,
+                          largest);
+    if (!(extent > 0))
+        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected a model with an extent, found all corners at one point, %.9g %.9g %.9g",
+                          inputs, survey->min[0], survey->min[1], survey->min[2]);
+    if (extent < LEAST_EXTENT)
+        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected an extent of at least %g, found %g", inputs, LEAST_EXTENT, extent);
+    if (!(extent > largest * 1e-13))
+        return strl__fail(err, STRL_ERR_FORMAT, "%s: the extent of %g is lost in the rounding of coordinates as large as %g: "
+                          "move the model towards the origin", inputs, extent, largest);
+    return STRL_OK;
+}
+
+/* A step that was asked for is kept or refused; the chosen one may have to be coarser than it should. */
+static strl_status choose_step(const strl_build_context *context, double extent, strl_ingest *ingest, strl_error *err)
+{
+    const double asked = context->desc->grid;
+    ingest->finest_step = 2 * power_of_two_below(ldexp(extent, -STEPS_EXPONENT));
+    if (asked > 0) {
+        ingest->step = power_of_two_below(asked);
+        if (ingest->step >= ingest->finest_step)
+            return STRL_OK;
+        char inputs[STRL_INPUTS_NAME_BYTES];
+        strl__ingest_name_inputs(context->desc, inputs, sizeof inputs);
+        return strl__fail(err, STRL_ERR_LIMIT, "%s: --grid %g asks for a lattice step of %g, finer than the %g that the extent of %g "
+                          "allows: ask for %g or more, or build what lies far apart into files of its own", inputs, asked,
+                          ingest->step, ingest->finest_step, extent, ingest->finest_step);
+    }
+    double wanted = ldexp(extent, -20);
+    if (ingest->short_edge > 0)
+        wanted = fmin(wanted, ingest->short_edge / 16);
+    ingest->step = fmax(power_of_two_below(wanted), ingest->finest_step);
+    ingest->is_coarse = ingest->short_edge > 0 && ingest->step * 16 > ingest->short_edge;
+    return STRL_OK;
+}
+
 strl_status strl__survey_choose_lattice(const strl_build_context *context, const model_survey *survey, strl_ingest *ingest,
                                         strl_error *err)
 {
@@ -139,15 +183,12 @@ strl_status strl__survey_choose_lattice(const strl_build_context *context, const
         extent = fmax(extent, survey->max[k] - survey->min[k]);
         largest = fmax(largest, fmax(fabs(survey->min[k]), fabs(survey->max[k])));
     }
-    if (!(extent > largest * 1e-13) || !(extent < 1e150) || !(extent > 1e-150))
-        return strl__fail(err, STRL_ERR_FORMAT, "the model's extent %g cannot be put on a lattice at coordinates of %g",
-                          extent, largest);
-    double wanted = context->desc->grid > 0 ? context->desc->grid : ldexp(extent, -20);
-    double edge = short_edge(survey);
-    if (!(context->desc->grid > 0) && edge > 0)
-        wanted = fmin(wanted, edge / 16);
-    double finest = 2 * power_of_two_below(ldexp(extent, -30)); /* coordinates stay below 2^31 */
-    ingest->step = fmax(power_of_two_below(wanted), finest);
+    ingest->short_edge = short_edge(survey);
+    strl_status status = check_extent(context, survey, extent, largest, err);
+    if (!status)
+        status = choose_step(context, extent, ingest, err);
+    if (status)
+        return status;
     for (int k = 0; k < 3; k++)
         ingest->origin[k] = floor(survey->min[k] / ingest->step) * ingest->step;
     while (extent / ingest->step + 2 >= ldexp(1, 21 + (int)ingest->curve_shift))
