@@ -9,6 +9,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "platform/file.h"
+#include "platform/output.h"
 
 _Static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "records are copied as they lie in memory");
 
@@ -16,20 +17,19 @@ enum { HEADER_BYTES = 512, BUFFER_BYTES = 1 << 20, FACE_BYTES = 13 };
 
 typedef struct stream {
     strl_file *file;
-    char *path;
     uint8_t *buffer;
     size_t used;
     uint64_t offset; /* in the file, of the buffer's first byte */
 } stream;
 
 struct strl__ply_writer {
-    stream vertices; /* becomes the output */
-    stream faces;
+    strl_output *output;
+    stream vertices; /* becomes the output, whose file it has */
+    stream faces;    /* has a file without a name */
     char *path;
     strl__ply_layout layout;
     uint64_t vertex_count;
     uint64_t triangle_count;
-    bool finished;
 };
 
 static size_t record_bytes(strl__ply_layout layout)
@@ -37,15 +37,12 @@ static size_t record_bytes(strl__ply_layout layout)
     return layout == STRL__PLY_POSITION ? 12 : layout == STRL__PLY_POSITION_NORMAL ? 24 : 15;
 }
 
-static strl_status stream_open(stream *out, const char *path, const char *suffix, strl_error *err)
+static strl_status stream_init(stream *out, const char *path, strl_error *err)
 {
-    size_t bytes = strlen(path) + strlen(suffix) + 1;
-    out->path = strl__alloc(bytes, 1);
     out->buffer = strl__alloc(BUFFER_BYTES, 1);
-    if (!out->path || !out->buffer)
+    if (!out->buffer)
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for an output buffer of %d bytes", path, BUFFER_BYTES);
-    snprintf(out->path, bytes, "%s%s", path, suffix);
-    return strl_file_create(out->path, &out->file, err);
+    return STRL_OK;
 }
 
 static strl_status stream_flush(stream *out, strl_error *err)
@@ -77,17 +74,6 @@ static strl_status stream_write(stream *out, const void *data, uint64_t bytes, s
     return STRL_OK;
 }
 
-/* Closes the file and, unless it became the output, removes it. */
-static void stream_close(stream *out, bool keep)
-{
-    bool created = out->file != NULL;
-    strl_file_close(out->file, NULL);
-    if (created && !keep)
-        strl_path_remove(out->path, NULL);
-    strl__free(out->path);
-    strl__free(out->buffer);
-}
-
 strl_status strl__ply_create(const char *path, strl__ply_layout layout, strl__ply_writer **writer, strl_error *err)
 {
     *writer = NULL;
@@ -98,13 +84,18 @@ strl_status strl__ply_create(const char *path, strl__ply_layout layout, strl__pl
     self->path = strl__strdup(path);
     strl_status status = self->path ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for the path", path);
     if (status == STRL_OK)
-        status = stream_open(&self->vertices, path, ".tmp", err);
+        status = stream_init(&self->vertices, path, err);
     if (status == STRL_OK)
-        status = stream_open(&self->faces, path, ".faces.tmp", err);
+        status = stream_init(&self->faces, path, err);
+    if (status == STRL_OK)
+        status = strl_output_open(path, NULL, &self->output, err);
+    if (status == STRL_OK)
+        status = strl_output_spill(self->output, &self->faces.file, err);
     if (status != STRL_OK) {
         strl__ply_destroy(self);
         return status;
     }
+    self->vertices.file = strl_output_file(self->output);
     self->vertices.offset = HEADER_BYTES;
     *writer = self;
     return STRL_OK;
@@ -114,8 +105,10 @@ void strl__ply_destroy(strl__ply_writer *writer)
 {
     if (!writer)
         return;
-    stream_close(&writer->vertices, writer->finished);
-    stream_close(&writer->faces, false);
+    strl_output_close(writer->output);
+    strl_file_close(writer->faces.file, NULL);
+    strl__free(writer->vertices.buffer);
+    strl__free(writer->faces.buffer);
     strl__free(writer->path);
     strl__free(writer);
 }
@@ -179,7 +172,7 @@ static strl_status write_header(strl__ply_writer *writer, strl_error *err)
     return strl_file_write(writer->vertices.file, 0, header, HEADER_BYTES, err);
 }
 
-static strl_status append_faces(strl__ply_writer *writer, strl_error *err)
+static strl_status append_faces(strl__ply_writer *writer, strl__ply_report report, void *context, strl_error *err)
 {
     stream *from = &writer->faces;
     stream *to = &writer->vertices;
@@ -189,6 +182,8 @@ static strl_status append_faces(strl__ply_writer *writer, strl_error *err)
         strl_status status = strl_file_read(from->file, at, from->buffer, part, err);
         if (status == STRL_OK)
             status = strl_file_write(to->file, to->offset, from->buffer, part, err);
+        if (status == STRL_OK && report)
+            status = report(context, at + part, from->offset, err);
         if (status != STRL_OK)
             return status;
         to->offset += part;
@@ -197,25 +192,18 @@ static strl_status append_faces(strl__ply_writer *writer, strl_error *err)
     return STRL_OK;
 }
 
-strl_status strl__ply_finish(strl__ply_writer *writer, uint64_t *bytes, strl_error *err)
+strl_status strl__ply_finish(strl__ply_writer *writer, strl__ply_report report, void *context, uint64_t *bytes,
+                             strl_error *err)
 {
     strl_status status = stream_flush(&writer->vertices, err);
     if (status == STRL_OK)
         status = stream_flush(&writer->faces, err);
     if (status == STRL_OK)
-        status = append_faces(writer, err);
+        status = append_faces(writer, report, context, err);
     if (status == STRL_OK)
         status = write_header(writer, err);
-    if (status == STRL_OK) {
-        /* A full disk may show only here. */
-        status = strl_file_close(writer->vertices.file, err);
-        writer->vertices.file = NULL;
-        if (status == STRL_OK)
-            status = strl_path_rename(writer->vertices.path, writer->path, err);
-        if (status != STRL_OK)
-            strl_path_remove(writer->vertices.path, NULL);
-    }
-    writer->finished = status == STRL_OK;
+    if (status == STRL_OK)
+        status = strl_output_finish(writer->output, false, err);
     if (bytes)
         *bytes = writer->vertices.offset;
     return status;

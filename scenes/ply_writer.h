@@ -27,7 +27,10 @@ strl_status strl__ply_vertices(strl__ply_writer *writer, const void *records, ui
 strl_status strl__ply_triangles(strl__ply_writer *writer, const uint32_t *corners, uint64_t count, strl_error *err);
 uint64_t strl__ply_vertex_count(const strl__ply_writer *writer);
 uint64_t strl__ply_triangle_count(const strl__ply_writer *writer);
-strl_status strl__ply_finish(strl__ply_writer *writer, uint64_t *bytes, strl_error *err);
+/* report: called now and then with bytes of faces, and what it returns ends the work; may be NULL. */
+typedef strl_status (*strl__ply_report)(void *context, uint64_t done, uint64_t total, strl_error *err);
+strl_status strl__ply_finish(strl__ply_writer *writer, strl__ply_report report, void *context, uint64_t *bytes,
+                             strl_error *err);
 void strl__ply_destroy(strl__ply_writer *writer); /* NULL is legal */
 
 #endif

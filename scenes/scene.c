@@ -67,6 +67,11 @@ static strl_status find_scene(const strl_scene_desc *desc, const scene_entry **e
     return STRL_OK;
 }
 
+static strl_status report_faces(void *context, uint64_t done, uint64_t total, strl_error *err)
+{
+    return strl__scene_report(context, "faces", done, total, err);
+}
+
 static strl_status generate(const scene_entry *entry, strl__scene_run *run, strl_scene_result *result, strl_error *err)
 {
     strl_scene_result made = {0};
@@ -76,7 +81,7 @@ static strl_status generate(const scene_entry *entry, strl__scene_run *run, strl
     if (status == STRL_OK)
         status = entry->generate(run, err);
     if (status == STRL_OK)
-        status = strl__ply_finish(run->writer, &made.bytes, err);
+        status = strl__ply_finish(run->writer, report_faces, run, &made.bytes, err);
     if (status == STRL_OK && result) {
         made.vertices = strl__ply_vertex_count(run->writer);
         made.triangles = strl__ply_triangle_count(run->writer);

@@ -13,7 +13,7 @@
 /* What to write. Zero-initialise: every 0 takes its default. */
 typedef struct strl_scene_desc {
     const char *name;   /* one of strl_scene_info's names */
-    const char *path;   /* the output; replaced by the final rename only, OUT.tmp and OUT.faces.tmp stand beside it */
+    const char *path;   /* the output; appears, or replaces an older file, when it is whole (platform/output.h) */
     uint64_t triangles; /* wanted; 0 = 1,000,000. strl_scene_info says how closely a scene keeps to it */
     uint64_t seed;
     uint64_t memory_bytes; /* budget of the buffers; 0 = 256 MiB */

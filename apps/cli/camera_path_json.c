@@ -8,6 +8,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "camera_path.h"
+#include "platform/output.h"
 
 #define MOST_FRAMES 1000000u
 
@@ -78,7 +79,18 @@ strl_status strl_path_save(const strl_camera_path *path, const char *file, strl_
                                                 vector_of(frame->up)));
     }
     json_t *root = json_pack("{s:f,s:o}", "fov_y_deg", path->fov_y_deg, "frames", frames);
-    int failed = !root || json_array_size(frames) != path->count || json_dump_file(root, file, JSON_COMPACT | JSON_REAL_PRECISION(17)) != 0;
+    strl_output *output = NULL;
+    FILE *stream = NULL;
+    strl_status status = root && json_array_size(frames) == path->count
+                             ? strl_output_open(file, NULL, &output, err)
+                             : strl__fail(err, STRL_ERR_MEMORY, "no memory to write the path file %s", file);
+    if (status == STRL_OK)
+        status = strl_output_stream(output, &stream, err);
+    if (status == STRL_OK && json_dumpf(root, stream, JSON_COMPACT | JSON_REAL_PRECISION(17)) != 0)
+        status = strl__fail(err, STRL_ERR_IO, "cannot write the path file %s", file);
+    if (status == STRL_OK)
+        status = strl_output_finish(output, false, err);
+    strl_output_close(output);
     json_decref(root);
-    return failed ? strl__fail(err, STRL_ERR_IO, "cannot write the path file %s", file) : STRL_OK;
+    return status;
 }

@@ -7,6 +7,7 @@
 #include "base/fail.h"
 #include "camera_path.h"
 #include "coarse.h"
+#include "interrupt.h"
 #include "options.h"
 #include "platform/thread.h"
 #include "progress.h"
@@ -134,6 +135,8 @@ static strl_status render_frames(const render_options *o, strl_render_model *mod
             status = strl_render_output_add(&output, f, renderer, &stats, err);
         strl_cli_coarse_add(&coarse, o->error_px, stats.allowed_error_px, stats.max_error_px);
         strl_cli_progress_update(progress, "render", f + 1, path->count, "frames");
+        if (status == STRL_OK)
+            status = strl_cli_check_interrupt(err);
     }
     if (status == STRL_OK)
         status = strl_render_output_finish(&output, err);
@@ -144,6 +147,17 @@ static strl_status render_frames(const render_options *o, strl_render_model *mod
                 strl_cli_plural(stats.faults), stats.last_fault);
     if (status == STRL_OK)
         strl_cli_coarse_report(&coarse, o->memory_bytes);
+    return status;
+}
+
+/* Before anything is read or drawn. */
+static strl_status check_outputs(const render_options *o, strl_error *err)
+{
+    strl_status status = strl_render_output_check(o->output, err);
+    if (status == STRL_OK && o->stats)
+        status = strl_output_check(o->stats, err);
+    if (status == STRL_OK && o->save_path)
+        status = strl_output_check(o->save_path, err);
     return status;
 }
 
@@ -164,7 +178,10 @@ static strl_status render(const render_options *o, strl_cli_progress *progress, 
     strl_camera_path path = {0};
     const strl_render_model_desc desc = {.path = o->input, .full = o->full, .realtime = o->realtime, .error_px = o->error_px,
                                          .memory_bytes = o->memory_bytes, .progress = progress};
-    strl_status status = open_renderer(o, &renderer, err);
+    strl_cli_catch_interrupts();
+    strl_status status = check_outputs(o, err);
+    if (status == STRL_OK)
+        status = open_renderer(o, &renderer, err);
     if (status == STRL_OK)
         status = strl_render_model_open(&desc, &model, err);
     if (status == STRL_OK)

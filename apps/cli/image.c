@@ -10,6 +10,7 @@
 #include "base/memory.h"
 #include "geometry/colour.h"
 #include "platform/file.h"
+#include "platform/output.h"
 
 #define MOST_SIDE 16384u
 #define MOST_SHEET_SIDE 8192u
@@ -33,9 +34,17 @@ void strl_image_deinit(strl_image *image)
 strl_status strl_image_write_png(const strl_image *image, const char *path, strl_error *err)
 {
     png_image png = {.version = PNG_IMAGE_VERSION, .width = image->width, .height = image->height, .format = PNG_FORMAT_RGB};
-    if (png_image_write_to_file(&png, path, 0, image->rgb, 0, NULL))
-        return STRL_OK;
-    return strl__fail(err, STRL_ERR_IO, "cannot write the image %s: %s", path, png.message);
+    strl_output *output = NULL;
+    FILE *stream = NULL;
+    strl_status status = strl_output_open(path, NULL, &output, err);
+    if (status == STRL_OK)
+        status = strl_output_stream(output, &stream, err);
+    if (status == STRL_OK && !png_image_write_to_stdio(&png, stream, 0, image->rgb, 0, NULL))
+        status = strl__fail(err, STRL_ERR_IO, "cannot write the image %s: %s", path, png.message);
+    if (status == STRL_OK)
+        status = strl_output_finish(output, false, err);
+    strl_output_close(output);
+    return status;
 }
 
 strl_status strl_image_read_png(strl_image *image, const char *path, strl_error *err)
@@ -61,17 +70,20 @@ strl_status strl_image_read_png(strl_image *image, const char *path, strl_error 
 
 strl_status strl_depth_write(const float *depth, uint32_t width, uint32_t height, const char *path, strl_error *err)
 {
-    strl_file *file = NULL;
+    strl_output *output = NULL;
     char head[PFM_HEAD_BYTES];
     int head_bytes = snprintf(head, sizeof head, "Pf\n%" PRIu32 " %" PRIu32 "\n-1.0\n", width, height);
     size_t row_bytes = (size_t)width * sizeof *depth;
-    strl_status status = strl_file_create(path, &file, err);
+    strl_status status = strl_output_open(path, NULL, &output, err);
+    strl_file *file = status == STRL_OK ? strl_output_file(output) : NULL;
     if (status == STRL_OK)
         status = strl_file_write(file, 0, head, (size_t)head_bytes, err);
     for (uint32_t row = 0; status == STRL_OK && row < height; row++)
         status = strl_file_write(file, (uint64_t)head_bytes + row * row_bytes, depth + (size_t)(height - 1 - row) * width, row_bytes, err);
-    strl_status closed = strl_file_close(file, status == STRL_OK ? err : NULL);
-    return status != STRL_OK ? status : closed;
+    if (status == STRL_OK)
+        status = strl_output_finish(output, false, err);
+    strl_output_close(output);
+    return status;
 }
 
 /* Reads the three lines; *at is where the floats begin. */

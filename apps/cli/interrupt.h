@@ -1,11 +1,16 @@
-/* Ctrl-C and termination as a question that long work asks between two steps. */
+/* Ctrl-C, termination and the end of the terminal as a question that long work asks between two steps. Work that hears
+ * yes removes what it has not finished and fails with STRL_ERR_CANCELLED, which strl_cli_fail tells as "interrupted". */
 #ifndef STROLL_CLI_INTERRUPT_H
 #define STROLL_CLI_INTERRUPT_H
 
 #include <stdbool.h>
 
-/* From now on SIGINT and SIGTERM only set what strl_cli_interrupted tells. */
+#include "stroll/error.h"
+
+/* From now on SIGINT, SIGTERM, SIGHUP and SIGQUIT only set what the others tell. */
 void strl_cli_catch_interrupts(void);
 bool strl_cli_interrupted(void);
+/* STRL_ERR_CANCELLED once there was a signal. */
+strl_status strl_cli_check_interrupt(strl_error *err);
 
 #endif

@@ -24,13 +24,13 @@ static const strl_cli_command *find_command(const char *name)
     return NULL;
 }
 
-/* A full disk behind standard output must not look like success. */
+/* A full disk behind standard output must not look like success. A command that failed has said its sentence. */
 static int flush_output(int status)
 {
-    if (fflush(stdout) == 0 && !ferror(stdout))
+    if ((fflush(stdout) == 0 && !ferror(stdout)) || status)
         return status;
     fprintf(stderr, "stroll: cannot write to standard output: %s\n", strerror(errno));
-    return status ? status : 1;
+    return 1;
 }
 
 static int run_command(const strl_cli_command *command, int argc, char **argv)

@@ -8,6 +8,7 @@
 #include "container/cut.h"
 #include "frame/view.h"
 #include "geometry/colour.h"
+#include "interrupt.h"
 #include "platform/thread.h"
 #include "render_container.h"
 #include "render_model.h"
@@ -107,6 +108,9 @@ static strl_status draw_placement(full_draw *draw, uint64_t index, strl_error *e
         strl_node record;
         status = strl_cut_next(&cut, &id, &record, err);
         if (status != STRL_OK || id == STRL_NONE)
+            return status;
+        status = strl_cli_check_interrupt(err);
+        if (status != STRL_OK)
             return status;
         strl_box box;
         strl_render_world_box(tree, placement.transform, record.box_min, record.box_max, &box);

@@ -1,10 +1,11 @@
 #include "render_output.h"
 
-#include <errno.h>
+#include <ctype.h>
 #include <inttypes.h>
 #include <jansson.h>
 #include <math.h>
 #include <string.h>
+#include <strings.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
@@ -15,14 +16,63 @@
 static bool ends_in_png(const char *path)
 {
     size_t length = strlen(path);
-    return length > 4 && strcmp(path + length - 4, ".png") == 0;
+    return length > 4 && strcasecmp(path + length - 4, ".png") == 0;
 }
 
-static strl_status check_path(const strl_render_output_desc *desc, bool folder, strl_error *err)
+/* Whether the name's end looks like that of another kind of file: a dot and two to six letters and digits, not digits alone. */
+static bool has_extension(const char *path)
 {
-    if (!folder && desc->cameras->count > 1)
+    const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path, *dot = strrchr(name, '.');
+    size_t length = dot && dot > name ? strlen(dot + 1) : 0;
+    if (length < 2 || length > 6)
+        return false;
+    bool letter = false;
+    for (const char *at = dot + 1; *at; at++) {
+        if (!isalnum((unsigned char)*at))
+            return false;
+        letter |= isalpha((unsigned char)*at) != 0;
+    }
+    return letter;
+}
+
+/* A folder that is there takes the frames; of one that is not, its own folder must be there. */
+static strl_status check_folder(const char *path, strl_error *err)
+{
+    strl_file_info info;
+    if (strl_path_stat(path, &info, NULL) == STRL_OK && info.is_directory) {
+        char *first = strl_path_join(path, "frame_00000.png");
+        strl_status status = first ? strl_output_check(first, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
+        strl__free(first);
+        return status;
+    }
+    if (strl_path_exists(path))
+        return strl__fail(err, STRL_ERR_ARGUMENT, "%s is not a folder: images go to NAME.png or into a folder", path);
+    if (has_extension(path))
+        return strl__fail(err, STRL_ERR_ARGUMENT, "images go to NAME.png or into a folder, found %s (a new folder with a dot in its "
+                          "name is %s/)", path, path);
+    size_t length = strlen(path);
+    char *name = strl__strdup(path);
+    if (!name)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
+    while (length > 1 && name[length - 1] == '/')
+        name[--length] = 0;
+    strl_status status = strl_output_check(name, err);
+    strl__free(name);
+    return status;
+}
+
+strl_status strl_render_output_check(const char *path, strl_error *err)
+{
+    return !path ? STRL_OK : *path && !ends_in_png(path) ? check_folder(path, err) : strl_output_check(path, err);
+}
+
+static strl_status make_folder(strl_render_output *output, strl_error *err)
+{
+    const strl_render_output_desc *desc = &output->desc;
+    if (!output->folder && desc->cameras->count > 1)
         return strl__fail(err, STRL_ERR_ARGUMENT, "%zu frames need a folder to go to, found the file name %s", desc->cameras->count, desc->path);
-    return folder ? strl_path_make_directory(desc->path, err) : STRL_OK;
+    output->made_folder = output->folder && !strl_path_exists(desc->path);
+    return output->folder ? strl_path_make_directory(desc->path, err) : STRL_OK;
 }
 
 static strl_status allocate(strl_render_output *output, strl_error *err)
@@ -42,14 +92,15 @@ static strl_status allocate(strl_render_output *output, strl_error *err)
 strl_status strl_render_output_init(strl_render_output *output, const strl_render_output_desc *desc, strl_error *err)
 {
     *output = (strl_render_output){.desc = *desc, .folder = desc->path && !ends_in_png(desc->path)};
-    strl_status status = desc->path ? check_path(desc, output->folder, err) : STRL_OK;
+    strl_status status = strl_render_output_check(desc->path, err);
+    if (status == STRL_OK && desc->path)
+        status = make_folder(output, err);
     if (status == STRL_OK)
         status = allocate(output, err);
-    if (status == STRL_OK && desc->stats) {
-        output->stats = fopen(desc->stats, "w");
-        if (!output->stats)
-            status = strl__fail(err, STRL_ERR_IO, "cannot create %s: %s", desc->stats, strerror(errno));
-    }
+    if (status == STRL_OK && desc->stats)
+        status = strl_output_open(desc->stats, NULL, &output->stats, err);
+    if (status == STRL_OK && desc->stats)
+        status = strl_output_stream(output->stats, &output->stats_stream, err);
     if (status != STRL_OK)
         strl_render_output_deinit(output);
     return status;
@@ -125,7 +176,7 @@ static strl_status write_stats(strl_render_output *output, size_t frame, const s
     failed |= json_object_set_new(line, "allowed_error_px", real_or_null(s->allowed_error_px));
     failed |= json_object_set_new(line, "last_fault", json_string(s->last_fault));
     if (!failed)
-        failed = json_dumpf(line, output->stats, JSON_COMPACT | JSON_REAL_PRECISION(8)) != 0 || fputc('\n', output->stats) == EOF;
+        failed = json_dumpf(line, output->stats_stream, JSON_COMPACT | JSON_REAL_PRECISION(8)) != 0 || fputc('\n', output->stats_stream) == EOF;
     json_decref(line);
     return failed ? strl__fail(err, STRL_ERR_IO, "cannot write %s", output->desc.stats) : STRL_OK;
 }
@@ -162,19 +213,14 @@ strl_status strl_render_output_finish(strl_render_output *output, strl_error *er
         strl__free(sheet);
         strl__free(cameras);
     }
-    if (output->stats) {
-        int failed = fclose(output->stats);
-        output->stats = NULL;
-        if (failed && status == STRL_OK)
-            status = strl__fail(err, STRL_ERR_IO, "cannot write %s: %s", output->desc.stats, strerror(errno));
-    }
-    return status;
+    return status == STRL_OK && output->stats ? strl_output_finish(output->stats, false, err) : status;
 }
 
 void strl_render_output_deinit(strl_render_output *output)
 {
-    if (output->stats)
-        fclose(output->stats);
+    strl_output_close(output->stats);
+    if (output->made_folder)
+        strl_path_remove_if_empty(output->desc.path);
     strl_image_deinit(&output->image);
     strl_contact_sheet_deinit(&output->sheet);
     strl__free(output->rgba);

@@ -6,10 +6,11 @@
 
 #include "camera_path.h"
 #include "image.h"
+#include "platform/output.h"
 #include "render_model.h"
 
 typedef struct strl_render_output_desc {
-    const char *path;  /* a PNG file or a folder, which is made; NULL = no images */
+    const char *path;  /* NAME.png or a folder, which is made; NULL = no images */
     const char *stats; /* NULL = none */
     bool depth;
     bool realtime;     /* say so in the statistics */
@@ -21,13 +22,17 @@ typedef struct strl_render_output_desc {
 typedef struct strl_render_output {
     strl_render_output_desc desc;
     bool folder;
-    FILE *stats;
+    bool made_folder; /* by us: removed again where nothing came into it */
+    strl_output *stats;
+    FILE *stats_stream; /* onto stats; borrowed */
     strl_image image;
     uint8_t *rgba;
     float *depth;
     strl_contact_sheet sheet;
 } strl_render_output;
 
+/* Whether images could go to `path` (NULL = none), for before the work. */
+strl_status strl_render_output_check(const char *path, strl_error *err);
 /* On failure nothing is left to release. */
 strl_status strl_render_output_init(strl_render_output *output, const strl_render_output_desc *desc, strl_error *err);
 /* Reads the renderer's image back and writes what is wanted of frame `frame`. */
@@ -35,6 +40,7 @@ strl_status strl_render_output_add(strl_render_output *output, size_t frame, str
                                    strl_error *err);
 /* Writes what belongs to all frames together. */
 strl_status strl_render_output_finish(strl_render_output *output, strl_error *err);
+/* After finish, or instead of it: then the images so far stay, each of which is whole, and the rest is removed. */
 void strl_render_output_deinit(strl_render_output *output);
 
 #endif

@@ -12,6 +12,7 @@
 #include "frame/view.h"
 #include "geometry/colour.h"
 #include "geometry/octahedral.h"
+#include "interrupt.h"
 #include "platform/thread.h"
 #include "readers/reader.h"
 #include "render_model.h"
@@ -66,6 +67,8 @@ static strl_status read_pass(soup_load *load, const char *stage, soup_take take,
         for (size_t t = 0; status == STRL_OK && t < count; t++, load->triangles++)
             status = take(load, &triangles[t], err);
         strl_cli_progress_update(load->progress, stage, strl_reader_bytes_done(load->reader), load->file_bytes, "bytes");
+        if (status == STRL_OK)
+            status = strl_cli_check_interrupt(err);
     }
     strl__free(triangles);
     return status;

@@ -5,6 +5,7 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "interrupt.h"
 #include "jobs/pool.h"
 #include "platform/thread.h"
 #include "render_container.h"
@@ -54,6 +55,9 @@ static strl_status settle(walk_model *self, const strl_camera *camera, strl_draw
         stats->bytes_read += now->bytes_read;
         stats->select_ns = now->select_ns;
         if (status != STRL_OK || self->realtime || strl_walk_settled(self->walk))
+            return status;
+        status = strl_cli_check_interrupt(err);
+        if (status != STRL_OK)
             return status;
         bool busy = now->bytes_read || now->splits || now->collapses || now->vertex_splits || now->vertex_collapses;
         idle = busy ? 0 : idle + 1;

@@ -7,6 +7,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "platform/file.h"
+#include "platform/output.h"
 
 #define MOST_SCREENSHOTS 100000u
 
@@ -37,9 +38,17 @@ static void drop_alpha(uint8_t *pixels, size_t count)
 static strl_status write_png(uint8_t *rgb, uint32_t width, uint32_t height, const char *path, strl_error *err)
 {
     png_image png = {.version = PNG_IMAGE_VERSION, .width = width, .height = height, .format = PNG_FORMAT_RGB};
-    if (png_image_write_to_file(&png, path, 0, rgb, 0, NULL))
-        return STRL_OK;
-    return strl__fail(err, STRL_ERR_IO, "cannot write the image %s: %s", path, png.message);
+    strl_output *output = NULL;
+    FILE *stream = NULL;
+    strl_status status = strl_output_open(path, NULL, &output, err);
+    if (status == STRL_OK)
+        status = strl_output_stream(output, &stream, err);
+    if (status == STRL_OK && !png_image_write_to_stdio(&png, stream, 0, rgb, 0, NULL))
+        status = strl__fail(err, STRL_ERR_IO, "cannot write the image %s: %s", path, png.message);
+    if (status == STRL_OK)
+        status = strl_output_finish(output, false, err);
+    strl_output_close(output);
+    return status;
 }
 
 strl_status strl_screenshot_write(strl_renderer *renderer, uint32_t width, uint32_t height, const char *folder,

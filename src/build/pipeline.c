@@ -1,4 +1,4 @@
-/* What every build does round its stages: check the request, lock scratch, clean up, count. */
+/* What every build does round its stages: check the request, make scratch, clean up, count. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
@@ -7,6 +7,8 @@
 #include "base/memory.h"
 #include "build/context.h"
 #include "platform/file.h"
+#include "platform/output.h"
+#include "platform/scratch.h"
 #include "platform/thread.h"
 
 strl_status strl__build_report(strl_build_context *context, uint64_t done, uint64_t total, strl_error *err)
@@ -25,58 +27,54 @@ void strl__build_stage(strl_build_context *context, const char *stage)
     context->progress.done = context->progress.total = 0;
 }
 
-static strl_status check_request(const strl_build_desc *desc, strl_error *err)
+/* What the build puts into its scratch folder: the streams of the stages, a reader's, and the unfinished container. */
+static const char *const scratch_names[] = {"*" STRL_SPILL_SUFFIX, "*.part", NULL};
+
+static strl_status check_inputs(const strl_build_desc *desc, const char *target, strl_error *err)
 {
+    strl_file_info output, input;
+    bool exists = strl_path_exists(target);
+    strl_status status = exists ? strl_path_stat(target, &output, err) : STRL_OK;
+    for (uint32_t i = 0; i < desc->input_count && status == STRL_OK; i++) {
+        if (!*desc->inputs[i])
+            return strl__fail(err, STRL_ERR_ARGUMENT, "an input's name is empty, expected the name of a file to read");
+        status = strl_path_stat(desc->inputs[i], &input, err);
+        if (status == STRL_OK && exists && input.device == output.device && input.inode == output.inode)
+            return strl__fail(err, STRL_ERR_ARGUMENT, "the output %s is the input %s: choose another name", desc->output,
+                              desc->inputs[i]);
+    }
+    return status;
+}
+
+/* *target: the file that the output's name stands for, owned by the caller. */
+static strl_status check_request(const strl_build_desc *desc, char **target, strl_error *err)
+{
+    *target = NULL;
     if (desc->input_count == 0 || !desc->output)
         return strl__fail(err, STRL_ERR_ARGUMENT, "a build needs at least one input and an output");
     if (desc->memory_bytes && desc->memory_bytes < STRL_BUILD_LEAST_MEMORY)
         return strl__fail(err, STRL_ERR_ARGUMENT, "--memory %" PRIu64 " is below the least that a build needs, %llu",
                           desc->memory_bytes, STRL_BUILD_LEAST_MEMORY);
-    strl_file_info output, input;
-    bool exists = strl_path_exists(desc->output);
-    if (exists) {
-        strl_status status = strl_path_stat(desc->output, &output, err);
-        if (status)
-            return status;
-        if (output.is_directory)
-            return strl__fail(err, STRL_ERR_ARGUMENT, "%s is a folder, expected the name of a file to write", desc->output);
-    }
-    for (uint32_t i = 0; i < desc->input_count; i++) {
-        strl_status status = strl_path_stat(desc->inputs[i], &input, err);
-        if (status)
-            return status;
-        if (exists && input.device == output.device && input.inode == output.inode)
-            return strl__fail(err, STRL_ERR_ARGUMENT, "the output %s is the input %s: choose another name", desc->output,
-                              desc->inputs[i]);
-    }
-    return STRL_OK;
+    strl_status status = strl_output_target(desc->output, target, err);
+    return status == STRL_OK ? check_inputs(desc, *target, err) : status;
 }
 
-/* The folder is locked by a file in it, so that two builds of one output do not meet. */
-static strl_status open_scratch(const strl_build_desc *desc, char **directory, strl_lock **lock, strl_error *err)
+/* A folder of our own, in the user's where there is one: two builds of one output do not meet, and nobody else's files
+ * are in it. */
+static strl_status open_scratch(const strl_build_desc *desc, const char *target, strl_scratch **scratch, strl_error *err)
 {
-    const char *slash = strrchr(desc->output, '/'), *name = slash ? slash + 1 : desc->output;
-    size_t size = strlen(desc->scratch ? desc->scratch : "") + strlen(desc->output) + sizeof "/.tmp";
-    char *lock_path;
-    *directory = strl__alloc(size, 1);
-    if (!*directory)
+    const char *slash = strrchr(target, '/'), *name = slash ? slash + 1 : target;
+    size_t size = strlen(desc->scratch ? desc->scratch : "") + strlen(target) + sizeof "/.tmp";
+    char *path = strl__alloc(size, 1);
+    if (!path)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
-    if (desc->scratch) /* a folder of our own in the user's, because ours is cleared */
-        snprintf(*directory, size, "%s/%s.tmp", desc->scratch, name);
+    if (desc->scratch)
+        snprintf(path, size, "%s/%s.tmp", desc->scratch, name);
     else
-        snprintf(*directory, size, "%s.tmp", desc->output);
-    lock_path = strl_path_join(*directory, "lock");
-    if (!lock_path)
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
-    bool was_there = strl_path_exists(*directory);
-    strl_status status = desc->scratch ? strl_path_make_directory(desc->scratch, err) : STRL_OK;
-    if (!status)
-        status = strl_path_make_directory(*directory, err);
-    if (!status)
-        status = strl_lock_acquire(lock_path, lock, err);
-    if (status == STRL_ERR_MEMORY && !was_there) /* nobody else has locked it yet */
-        strl_path_remove_directory(*directory, NULL);
-    strl__free(lock_path);
+        snprintf(path, size, "%s.tmp", target);
+    const strl_scratch_desc wanted = {.path = path, .parent = desc->scratch, .names = scratch_names};
+    strl_status status = strl_scratch_create(&wanted, scratch, err);
+    strl__free(path);
     return status;
 }
 
@@ -92,35 +90,38 @@ static unsigned count_workers(const strl_build_desc *desc, uint64_t memory_bytes
     return wanted < fed ? wanted : (unsigned)fed;
 }
 
+/* Everything between a checked request and its end. */
+static strl_status run(strl_build_context *context, const char *target, strl_error *err)
+{
+    const strl_build_desc *desc = context->desc;
+    strl_scratch *scratch = NULL;
+    strl_status status = open_scratch(desc, target, &scratch, err);
+    if (!status)
+        status = strl_pool_create(count_workers(desc, context->memory_bytes) - 1, &context->pool, err);
+    if (!status)
+        status = strl_spill_set_create(strl_scratch_path(scratch), 0, &context->spills, err);
+    if (!status) {
+        context->scratch_dir = strl_scratch_path(scratch);
+        status = strl__clusters_run(context, err);
+        context->result->scratch_bytes = strl_spill_set_peak_bytes(context->spills);
+    }
+    strl_spill_set_destroy(context->spills);
+    strl_pool_destroy(context->pool);
+    strl_scratch_destroy(scratch);
+    return status;
+}
+
 strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err)
 {
-    char *directory = NULL;
-    strl_lock *lock = NULL;
+    char *target = NULL;
     uint64_t started = strl_clock_ns(), cpu_started = strl_clock_cpu_ns();
     strl_build_context context = {.desc = desc, .result = result,
                                   .memory_bytes = desc->memory_bytes ? desc->memory_bytes : 1ull << 30};
     *result = (strl_build_result){.inputs = desc->input_count};
-    strl_status status = check_request(desc, err);
-    if (status)
-        return status;
-    unsigned jobs = count_workers(desc, context.memory_bytes);
-    status = open_scratch(desc, &directory, &lock, err);
+    strl_status status = check_request(desc, &target, err);
     if (!status)
-        status = strl_pool_create(jobs - 1, &context.pool, err);
-    if (!status)
-        status = strl_spill_set_create(directory, 0, &context.spills, err);
-    if (!status) {
-        context.scratch_dir = directory;
-        status = strl__clusters_run(&context, err);
-        result->scratch_bytes = strl_spill_set_peak_bytes(context.spills);
-    }
-    strl_spill_set_destroy(context.spills);
-    strl_pool_destroy(context.pool);
-    if (lock) { /* ours to clear */
-        strl_path_remove_directory(directory, NULL);
-        strl_lock_release(lock);
-    }
-    strl__free(directory);
+        status = run(&context, target, err);
+    strl__free(target);
     result->seconds = (double)(strl_clock_ns() - started) * 1e-9;
     result->cpu_seconds = (double)(strl_clock_cpu_ns() - cpu_started) * 1e-9;
     result->peak_rss_bytes = strl_process_peak_rss_bytes();

@@ -1,4 +1,4 @@
-/* The writer's life: PATH.part and a spill of node records, tables, header last, then the name. */
+/* The writer's life: an unfinished file and a spill of node records, tables, header last, then the name. */
 #include "container/writer.h"
 
 #include <inttypes.h>
@@ -9,18 +9,6 @@
 #include "container/names.h"
 #include "container/writing.h"
 #include "platform/file.h"
-
-/* path + suffix, owned by the caller; NULL without memory. */
-static char *path_with(const char *path, const char *suffix)
-{
-    size_t length = strlen(path), more = strlen(suffix) + 1;
-    char *joined = strl__alloc(length + more, 1);
-    if (joined) {
-        memcpy(joined, path, length);
-        memcpy(joined + length, suffix, more);
-    }
-    return joined;
-}
 
 static strl_status check_desc(const strl_container_writer_desc *desc, strl_error *err)
 {
@@ -34,32 +22,16 @@ static strl_status check_desc(const strl_container_writer_desc *desc, strl_error
     return STRL_OK;
 }
 
-/* Takes the name over where the file is there afterwards, because destroy removes what the writer names. */
-static strl_status create_file(char **name, strl_file **file, char **kept, strl_error *err)
-{
-    strl_status status = strl_file_create(*name, file, err);
-    if (status == STRL_OK || status == STRL_ERR_MEMORY) { /* without memory it fails after creating the file */
-        *kept = *name;
-        *name = NULL;
-    }
-    return status;
-}
-
 static strl_status open_files(strl_container_writer *writer, const strl_container_writer_desc *desc, strl_error *err)
 {
     writer->path = strl__strdup(desc->path);
-    char *part_path = path_with(desc->path, ".part");
-    char *spill_path = strl_path_join(desc->scratch_dir, "container-nodes.spill");
-    strl_status status = STRL_OK;
-    if (!writer->path || !part_path || !spill_path)
-        status = strl__fail(err, STRL_ERR_MEMORY, "no memory to create %s", desc->path);
-    if (status == STRL_OK)
-        status = create_file(&part_path, &writer->sink.file, &writer->part_path, err);
-    if (status == STRL_OK)
-        status = create_file(&spill_path, &writer->spill, &writer->spill_path, err);
-    strl__free(part_path);
-    strl__free(spill_path);
-    return status;
+    if (!writer->path)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory to create %s", desc->path);
+    strl_status status = strl_output_open(desc->path, desc->scratch_dir, &writer->output, err);
+    if (status != STRL_OK)
+        return status;
+    writer->sink.file = strl_output_file(writer->output);
+    return strl_file_create_nameless(desc->scratch_dir, &writer->spill, err);
 }
 
 strl_status strl_container_writer_create(const strl_container_writer_desc *desc, strl_container_writer **writer,
@@ -247,14 +219,7 @@ static strl_status finish(strl_container_writer *writer, strl_error *err)
     strl__header_encode(&writer->header, bytes);
     status = strl_file_write(writer->sink.file, 0, bytes, sizeof bytes, err);
     if (status == STRL_OK)
-        status = strl_file_sync(writer->sink.file, err);
-    strl_file *file = writer->sink.file;
-    if (status == STRL_OK) {
-        writer->sink.file = NULL;
-        status = strl_file_close(file, err);
-    }
-    if (status == STRL_OK)
-        status = strl_path_rename(writer->part_path, writer->path, err);
+        status = strl_output_finish(writer->output, true, err);
     writer->renamed = status == STRL_OK;
     return status;
 }
@@ -271,19 +236,13 @@ void strl_container_writer_destroy(strl_container_writer *writer)
 {
     if (!writer)
         return;
-    strl_file_close(writer->sink.file, NULL);
+    strl_output_close(writer->output);
     strl_file_close(writer->spill, NULL);
-    if (writer->part_path && !writer->renamed)
-        strl_path_remove(writer->part_path, NULL);
-    if (writer->spill_path)
-        strl_path_remove(writer->spill_path, NULL);
     strl__page_table_writer_destroy(writer->placements);
     strl__page_table_writer_destroy(writer->parts);
     strl__page_table_writer_destroy(writer->materials);
     strl__free(writer->trees);
     strl__free(writer->page.data);
     strl__free(writer->path);
-    strl__free(writer->part_path);
-    strl__free(writer->spill_path);
     strl__free(writer);
 }

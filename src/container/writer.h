@@ -1,5 +1,5 @@
 /* Writes a container in one pass, in constant memory: nodes in id order, then names, then finish. The file appears under its
- * name only when whole (write to PATH.part, sync, rename). */
+ * name only when whole (platform/output.h). */
 #ifndef STRL_CONTAINER_WRITER_H
 #define STRL_CONTAINER_WRITER_H
 
@@ -9,7 +9,8 @@ typedef struct strl_container_writer strl_container_writer;
 
 typedef struct strl_container_writer_desc {
     const char *path;         /* final name; borrowed during create */
-    const char *scratch_dir;  /* an existing folder for node records until they are placed; borrowed during create */
+    const char *scratch_dir;  /* an existing folder for node records until they are placed, and for the unfinished file
+                                 where the folder is beside it; borrowed during create */
     strl_container_info info; /* version, file_bytes, model_id, bounds and all counts but those of input and drops are
                                  filled in by the writer */
 } strl_container_writer_desc;

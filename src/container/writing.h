@@ -5,6 +5,7 @@
 #include "container/record.h"
 #include "container/table.h"
 #include "container/writer.h"
+#include "platform/output.h"
 
 typedef struct strl__written_tree {
     strl_tree facts;
@@ -12,9 +13,10 @@ typedef struct strl__written_tree {
 } strl__written_tree;
 
 struct strl_container_writer {
-    char *path, *part_path, *spill_path; /* owned */
-    strl__sink sink;                     /* PATH.part */
-    strl_file *spill;                    /* node records of the tree at hand, by id */
+    char *path;          /* owned */
+    strl_output *output; /* owned; the sink's file is its */
+    strl__sink sink;
+    strl_file *spill; /* node records of the tree at hand, by id; owned */
     strl__header header;
     strl__page_table_writer *placements, *parts, *materials;
     strl__written_tree *trees; /* [tree_count], owned, up to STRL__MAX_TREES */

@@ -21,6 +21,8 @@ typedef struct strl_file_info {
 
 strl_status strl_file_open(const char *path, strl_file **file, strl_error *err);   /* read only; a regular file */
 strl_status strl_file_create(const char *path, strl_file **file, strl_error *err); /* read and write; truncates */
+/* Read and write; without a name in `folder`, so that nothing of it is left when it is closed or the process ends. */
+strl_status strl_file_create_nameless(const char *folder, strl_file **file, strl_error *err);
 strl_status strl_file_close(strl_file *file, strl_error *err); /* NULL is legal; reports a late write error */
 
 const char *strl_file_path(const strl_file *file); /* borrowed */
@@ -46,6 +48,8 @@ strl_status strl_path_remove(const char *path, strl_error *err);                
 strl_status strl_path_make_directory(const char *path, strl_error *err);         /* existing is not an error */
 /* A new folder of this process alone; `pattern` ends in XXXXXX, which becomes its name. */
 strl_status strl_path_make_temporary(char *pattern, strl_error *err);
+/* A folder with anything in it stays. */
+void strl_path_remove_if_empty(const char *path);
 /* With the files in it; a folder in it is a failure. A missing folder is not an error. */
 strl_status strl_path_remove_directory(const char *path, strl_error *err);
 strl_status strl_path_free_bytes(const char *path, uint64_t *bytes, strl_error *err);

@@ -3,6 +3,7 @@
 #include <inttypes.h>
 #include <stdatomic.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/fail.h"
@@ -13,6 +14,7 @@
 #define DEFAULT_BUFFER_BYTES ((size_t)256 << 10)
 /* A multiple of every common block size, and large enough to keep punching off the profile. */
 #define DROP_STEP_BYTES ((uint64_t)16 << 10)
+#define MOST_NAME_BYTES 200
 
 struct strl_spill_set {
     char *directory; /* owned */
@@ -155,7 +157,7 @@ static void unlink_stream(strl_spill_set *set, const strl_spill *spill)
 /* A linked stream without a file yet; its name is taken from then on. */
 static strl_status new_stream(strl_spill_set *set, const char *name, strl_spill **spill, strl_error *err)
 {
-    if (!*name || strchr(name, '/') || name[0] == '.')
+    if (!*name || strchr(name, '/') || name[0] == '.' || strlen(name) > MOST_NAME_BYTES)
         return strl__fail(err, STRL_ERR_ARGUMENT, "\"%.300s\" is no name for a scratch file", name);
     strl_spill *made = strl__alloc_zero(1, sizeof *made);
     char *copy = strl__strdup(name);
@@ -180,7 +182,9 @@ static strl_status new_stream(strl_spill_set *set, const char *name, strl_spill 
 static strl_status with_path(strl_spill *spill,
                              strl_status (*call)(strl_spill *spill, const char *path, strl_error *err), strl_error *err)
 {
-    char *path = strl_path_join(spill->set->directory, spill->name);
+    char file[MOST_NAME_BYTES + sizeof STRL_SPILL_SUFFIX];
+    snprintf(file, sizeof file, "%s" STRL_SPILL_SUFFIX, spill->name);
+    char *path = strl_path_join(spill->set->directory, file);
     strl_status status = path ? call(spill, path, err)
                               : strl__fail(err, STRL_ERR_MEMORY, "no memory for the scratch file %.300s", spill->name);
     strl__free(path);

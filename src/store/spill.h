@@ -21,7 +21,10 @@ void strl_spill_set_destroy(strl_spill_set *set);
 uint64_t strl_spill_set_bytes(strl_spill_set *set);      /* on disk now, over all streams */
 uint64_t strl_spill_set_peak_bytes(strl_spill_set *set); /* the most there ever were */
 
-/* An empty stream in the file `name` of the set's folder; a file left there by an earlier run is overwritten, a name
+/* The files of all streams end in this, which tells them from others in their folder. */
+#define STRL_SPILL_SUFFIX ".spill"
+
+/* An empty stream in the file `name`.spill of the set's folder; a file left there by an earlier run is overwritten, a name
  * that is open in this set is refused. buffer_bytes: 0 = 256 KiB; the buffer exists from the first append to the next
  * flush. */
 strl_status strl_spill_open(strl_spill_set *set, const char *name, size_t buffer_bytes, strl_spill **spill,

@@ -363,11 +363,8 @@ strl_status strl__v_input_read(strl__model *model, const strl__vtree *tree, strl
     uint64_t slice_triangles = model->memory_bytes / 8 / strl_pool_workers(model->pool) / SLICE_TRIANGLE_BYTES;
     uint64_t wanted = tree->triangle_count / (slice_triangles / 2) + 1;
     strl__regions regions = {0};
-    *input = (strl__vinput){.rounding = rounding_of(tree),
-                            .path = strl_path_join(model->desc->scratch_dir, "verify-chunks")};
-    strl_status status = input->path ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
-    if (status == STRL_OK)
-        status = strl_file_create(input->path, &input->file, err);
+    *input = (strl__vinput){.rounding = rounding_of(tree)};
+    strl_status status = strl_file_create_nameless(model->desc->scratch_dir, &input->file, err);
     if (status == STRL_OK)
         status = strl__v_regions_create(model, tree, wanted > 512 ? 512 : (uint32_t)wanted, &regions, err);
     if (status == STRL_OK)
@@ -384,9 +381,6 @@ void strl__v_input_deinit(strl__vinput *input)
     strl__free(input->offset);
     strl__free(input->bytes);
     strl_file_close(input->file, NULL);
-    if (input->path)
-        strl_path_remove(input->path, NULL);
-    strl__free(input->path);
     *input = (strl__vinput){0};
 }
 

@@ -14,7 +14,6 @@ typedef struct strl__vinput {
     double rounding;       /* lattice units: what doubles cannot tell apart at these coordinates */
     strl__surface surface; /* of the kept triangles */
     strl_file *file;       /* of chunks */
-    char *path;
     uint64_t *offset; /* [surface.count] of a chunk in the file */
     uint64_t *bytes;  /* [surface.count] */
 } strl__vinput;
@@ -53,7 +52,6 @@ typedef struct strl__regions {
     uint32_t block_triangles;
     uint32_t blocks; /* in the file */
     strl_file *file;
-    char *path;
 } strl__regions;
 
 #define STRL__SOUP_BYTES (9 * sizeof(double))

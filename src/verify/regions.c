@@ -111,12 +111,11 @@ strl_status strl__v_regions_create(const strl__model *model, const strl__vtree *
                                                                 : (uint32_t)block};
     regions->splits = strl__alloc(count, sizeof *regions->splits);
     regions->items = strl__alloc_zero(count, sizeof *regions->items);
-    regions->path = strl_path_join(model->desc->scratch_dir, "verify-soup");
     strl_status status = STRL_OK;
-    if (!items || !regions->splits || !regions->items || !regions->path)
+    if (!items || !regions->splits || !regions->items)
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for %u regions", count);
     if (status == STRL_OK)
-        status = strl_file_create(regions->path, &regions->file, err);
+        status = strl_file_create_nameless(model->desc->scratch_dir, &regions->file, err);
     if (status == STRL_OK) {
         uint32_t top = divide(regions, items, leaf_count, 0, count);
         if (top & STRL__REGION) /* nothing to divide: both sides are that region */
@@ -172,8 +171,5 @@ void strl__v_regions_destroy(strl__regions *regions)
     strl__free(regions->items);
     strl__free(regions->splits);
     strl_file_close(regions->file, NULL);
-    if (regions->path)
-        strl_path_remove(regions->path, NULL);
-    strl__free(regions->path);
     *regions = (strl__regions){0};
 }

@@ -51,7 +51,9 @@ static strl_spill *must_open(strl_spill_set *set, const char *name, size_t buffe
 
 static bool on_disk(const char *name)
 {
-    char *path = strl_path_join(folder, name);
+    char file[64];
+    snprintf(file, sizeof file, "%s" STRL_SPILL_SUFFIX, name);
+    char *path = strl_path_join(folder, file);
     bool exists = strl_path_exists(path);
     strl__free(path);
     return exists;
@@ -146,7 +148,7 @@ static void the_set_counts_what_is_on_disk_now_and_at_most(void **state)
     assert_int_equal(strl_spill_close_and_delete(a, NULL), STRL_OK);
     assert_int_equal(strl_spill_set_bytes(set), 256 * KIB);
     assert_int_equal(strl_spill_set_peak_bytes(set), 512 * KIB);
-    char *path = strl_path_join(folder, "b");
+    char *path = strl_path_join(folder, "b" STRL_SPILL_SUFFIX);
     struct stat facts;
     strl_spill_drop(b, 90 * KIB, 40 * KIB); /* 96 to 128 KiB are whole steps of it */
     strl_spill_drop(b, 1 * KIB, 89 * KIB);  /* all but the first */

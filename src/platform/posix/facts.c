@@ -10,6 +10,8 @@
 const char *strl__path_shown(const char *path)
 {
     size_t length = strlen(path);
+    if (length == 0)
+        return "\"\"";
     return length > PATH_SHOWN_BYTES ? path + (length - PATH_SHOWN_BYTES) : path;
 }
 

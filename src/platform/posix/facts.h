@@ -13,6 +13,15 @@ strl_status strl__fail_system(strl_error *err, int code, const char *verb, const
 /* The part of path that a sentence shows; borrowed from it. */
 const char *strl__path_shown(const char *path);
 
+/* The folder that holds path, owned by the caller; NULL without memory. */
+char *strl__path_parent(const char *path);
+
+/* A file that nobody else has: the eight characters of `path` from random_at on are replaced until there is nothing of
+ * that name. Its sentences name `shown`. */
+strl_status strl__file_create_unique(char *path, size_t random_at, const char *shown, strl_file **file,
+                                     strl_error *err);
+int strl__file_descriptor(const strl_file *file); /* borrowed */
+
 void strl__file_info_fill(strl_file_info *info, const struct stat *facts);
 
 #endif

@@ -5,7 +5,10 @@
 #include <fcntl.h>
 #include <inttypes.h>
 #include <stdatomic.h>
+#include <string.h>
+#include <sys/random.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "base/fail.h"
@@ -99,6 +102,64 @@ strl_status strl_file_create(const char *path, strl_file **file, strl_error *err
     if (descriptor < 0)
         return strl__fail_system(err, errno, "create", path);
     return wrap(descriptor, 0, path, file, err);
+}
+
+#define RANDOM_CHARACTERS 8u
+#define MOST_NAMES_TRIED 100
+
+static void put_random(char *at)
+{
+    static const char letters[] = "0123456789abcdefghijkmnpqrstuvwx";
+    static _Atomic uint64_t turn;
+    uint64_t bits = 0;
+    if (getrandom(&bits, sizeof bits, GRND_NONBLOCK) != (ssize_t)sizeof bits) {
+        struct timespec now = {0};
+        clock_gettime(CLOCK_REALTIME, &now);
+        bits = ((uint64_t)now.tv_nsec << 20) ^ (uint64_t)getpid() ^ atomic_fetch_add(&turn, 1) * 0x9e3779b97f4a7c15u;
+    }
+    for (unsigned i = 0; i < RANDOM_CHARACTERS; i++)
+        at[i] = letters[bits >> 5 * i & 31];
+}
+
+strl_status strl__file_create_unique(char *path, size_t random_at, const char *shown, strl_file **file,
+                                     strl_error *err)
+{
+    *file = NULL;
+    int descriptor = -1;
+    errno = EEXIST;
+    for (int i = 0; i < MOST_NAMES_TRIED && descriptor < 0 && errno == EEXIST; i++) {
+        put_random(path + random_at);
+        descriptor = open_retrying(path, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_NOCTTY);
+    }
+    if (descriptor < 0)
+        return strl__fail_system(err, errno, "create", shown);
+    strl_status status = wrap(descriptor, 0, shown, file, err);
+    if (status != STRL_OK)
+        unlink(path);
+    return status;
+}
+
+strl_status strl_file_create_nameless(const char *folder, strl_file **file, strl_error *err)
+{
+    *file = NULL;
+    static const char name[] = "stroll.XXXXXXXX.spill";
+    char *path = strl_path_join(folder, name);
+    if (!path)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a scratch file in %s", strl__path_shown(folder));
+    strl_status status = strl__file_create_unique(path, strlen(path) - strlen("XXXXXXXX.spill"), folder, file, err);
+    if (status == STRL_OK)
+        status = strl_path_remove(path, err);
+    if (status != STRL_OK) {
+        strl_file_close(*file, NULL);
+        *file = NULL;
+    }
+    strl__free(path);
+    return status;
+}
+
+int strl__file_descriptor(const strl_file *file)
+{
+    return file->descriptor;
 }
 
 strl_status strl_file_close(strl_file *file, strl_error *err)

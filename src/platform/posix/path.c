@@ -30,8 +30,7 @@ bool strl_path_exists(const char *path)
     return stat(path, &facts) == 0;
 }
 
-/* The folder that holds path, owned by the caller; NULL without memory. */
-static char *parent_of(const char *path)
+char *strl__path_parent(const char *path)
 {
     const char *slash = strrchr(path, '/');
     if (!slash)
@@ -61,7 +60,7 @@ static strl_status sync_folder(const char *folder, strl_error *err)
 strl_status strl_path_rename(const char *from, const char *to, strl_error *err)
 {
     /* Before the rename: without memory nothing shall have happened. */
-    char *folder = parent_of(to);
+    char *folder = strl__path_parent(to);
     if (!folder)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to rename %s", strl__path_shown(from));
     strl_status status;
@@ -94,6 +93,11 @@ strl_status strl_path_make_directory(const char *path, strl_error *err)
 strl_status strl_path_make_temporary(char *pattern, strl_error *err)
 {
     return mkdtemp(pattern) ? STRL_OK : strl__fail_system(err, errno, "create folder", pattern);
+}
+
+void strl_path_remove_if_empty(const char *path)
+{
+    rmdir(path);
 }
 
 /* Removes what is not a folder from an open folder; a folder in it is left for rmdir to refuse. */

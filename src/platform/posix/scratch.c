@@ -1,0 +1,215 @@
+#include "platform/scratch.h"
+
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <fnmatch.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "platform/posix/facts.h"
+
+#define LOCK_NAME "lock"
+/* What the lock file says: the folder is ours to clear. */
+#define SIGNATURE "stroll scratch folder: the next run of the same output clears it\n"
+#define MOST_ATTEMPTS 100
+
+struct strl_scratch {
+    char *path, *lock_path; /* owned */
+    char *made_parent;      /* owned; NULL = it was there before */
+    const char *const *names;
+    strl_lock *lock; /* NULL until the folder is ours */
+};
+
+static bool is_ours(const strl_scratch *scratch, int folder, const char *name)
+{
+    struct stat facts;
+    if (fstatat(folder, name, &facts, AT_SYMLINK_NOFOLLOW) != 0 || !S_ISREG(facts.st_mode))
+        return false;
+    for (const char *const *pattern = scratch->names; *pattern; pattern++)
+        if (fnmatch(*pattern, name, FNM_PERIOD) == 0)
+            return true;
+    return false;
+}
+
+/* Calls visit for every file but the lock, until it returns false. False where the folder cannot be read, too. */
+static bool each_file(strl_scratch *scratch, bool (*visit)(strl_scratch *scratch, int folder, const char *name,
+                                                           strl_error *err), strl_error *err)
+{
+    int descriptor = open(scratch->path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    DIR *folder = descriptor < 0 ? NULL : fdopendir(descriptor);
+    if (!folder) {
+        strl__fail_system(err, errno, "open folder", scratch->path);
+        if (descriptor >= 0)
+            close(descriptor);
+        return false;
+    }
+    bool good = true;
+    const struct dirent *entry;
+    while (good && (entry = readdir(folder)) != NULL)
+        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0 &&
+            strcmp(entry->d_name, LOCK_NAME) != 0)
+            good = visit(scratch, dirfd(folder), entry->d_name, err);
+    closedir(folder);
+    return good;
+}
+
+static strl_status refuse(const strl_scratch *scratch, strl_error *err, const char *why)
+{
+    return strl__fail(err, STRL_ERR_ARGUMENT, "the scratch folder %s cannot be made: %s (remove or rename it, or name "
+                      "another place by --scratch)", strl__path_shown(scratch->path), why);
+}
+
+static bool must_be_ours(strl_scratch *scratch, int folder, const char *name, strl_error *err)
+{
+    char why[128];
+    if (is_ours(scratch, folder, name))
+        return true;
+    snprintf(why, sizeof why, "there is one, and it holds %.60s, which is not a scratch file", name);
+    refuse(scratch, err, why);
+    return false;
+}
+
+static bool remove_ours(strl_scratch *scratch, int folder, const char *name, strl_error *err)
+{
+    if (is_ours(scratch, folder, name) && unlinkat(folder, name, 0) != 0 && errno != ENOENT) {
+        strl__fail_system(err, errno, "remove a scratch file in", scratch->path);
+        return false;
+    }
+    return true;
+}
+
+static bool is_signed(const strl_scratch *scratch)
+{
+    char text[sizeof SIGNATURE];
+    struct stat facts;
+    strl_file *file = NULL;
+    size_t got = 0;
+    if (lstat(scratch->lock_path, &facts) != 0 || !S_ISREG(facts.st_mode) ||
+        strl_file_open(scratch->lock_path, &file, NULL) != STRL_OK)
+        return false;
+    bool same = strl_file_read_some(file, 0, text, sizeof text, &got, NULL) == STRL_OK &&
+                got == sizeof SIGNATURE - 1 && memcmp(text, SIGNATURE, got) == 0;
+    strl_file_close(file, NULL);
+    return same;
+}
+
+static strl_status sign(const strl_scratch *scratch, strl_error *err)
+{
+    strl_file *file = NULL;
+    strl_status status = strl_file_create(scratch->lock_path, &file, err);
+    if (status == STRL_OK)
+        status = strl_file_write(file, 0, SIGNATURE, sizeof SIGNATURE - 1, err);
+    strl_status closed = strl_file_close(file, status == STRL_OK ? err : NULL);
+    return status != STRL_OK ? status : closed;
+}
+
+/* The folder is there. Nothing in it is touched before all of it is known to be ours. */
+static strl_status take_over(strl_scratch *scratch, strl_error *err)
+{
+    struct stat facts;
+    if (lstat(scratch->path, &facts) == 0 && !S_ISDIR(facts.st_mode))
+        return refuse(scratch, err, "there is something of that name, and it is not a folder");
+    if (!is_signed(scratch))
+        return refuse(scratch, err, "there is one, and it was not made by a build");
+    strl_status status = strl_lock_acquire(scratch->lock_path, &scratch->lock, err);
+    if (status != STRL_OK)
+        return status;
+    strl_error inner = {.status = STRL_ERR_IO};
+    bool good = each_file(scratch, must_be_ours, &inner) && each_file(scratch, remove_ours, &inner);
+    /* Signed anew: its last holder may have removed the lock file just before we made it again. */
+    if (good)
+        return sign(scratch, err);
+    strl_lock_release(scratch->lock);
+    scratch->lock = NULL;
+    return strl__fail(err, inner.status, "%s", inner.message);
+}
+
+static strl_status lock_new(strl_scratch *scratch, strl_error *err)
+{
+    strl_status status = strl_lock_acquire(scratch->lock_path, &scratch->lock, err);
+    if (status != STRL_OK) {
+        unlink(scratch->lock_path); /* created before memory ended */
+        rmdir(scratch->path);
+        return status;
+    }
+    return sign(scratch, err);
+}
+
+static strl_status make(strl_scratch *scratch, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    for (int attempt = 0; attempt < MOST_ATTEMPTS; attempt++) {
+        struct stat facts;
+        if (mkdir(scratch->path, 0777) == 0)
+            return lock_new(scratch, err);
+        if (errno != EEXIST)
+            return strl__fail_system(err, errno, "create folder", scratch->path);
+        status = take_over(scratch, err);
+        /* Gone meanwhile: its holder ended. */
+        if (status == STRL_OK || scratch->lock || lstat(scratch->path, &facts) == 0)
+            return status;
+    }
+    return status;
+}
+
+static strl_status make_parent(strl_scratch *scratch, const char *parent, strl_error *err)
+{
+    char *copy = strl__strdup(parent);
+    if (!copy)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
+    if (mkdir(parent, 0777) == 0) {
+        scratch->made_parent = copy;
+        return STRL_OK;
+    }
+    strl__free(copy);
+    return strl_path_make_directory(parent, err);
+}
+
+strl_status strl_scratch_create(const strl_scratch_desc *desc, strl_scratch **scratch, strl_error *err)
+{
+    *scratch = NULL;
+    strl_scratch *made = strl__alloc_zero(1, sizeof *made);
+    if (!made)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a scratch folder");
+    made->names = desc->names;
+    made->path = strl__strdup(desc->path);
+    made->lock_path = strl_path_join(desc->path, LOCK_NAME);
+    strl_status status = made->path && made->lock_path ? STRL_OK
+                                                       : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
+    if (status == STRL_OK && desc->parent)
+        status = make_parent(made, desc->parent, err);
+    if (status == STRL_OK)
+        status = make(made, err);
+    if (status != STRL_OK)
+        strl_scratch_destroy(made);
+    else
+        *scratch = made;
+    return status;
+}
+
+const char *strl_scratch_path(const strl_scratch *scratch)
+{
+    return scratch->path;
+}
+
+void strl_scratch_destroy(strl_scratch *scratch)
+{
+    if (!scratch)
+        return;
+    if (scratch->lock) {
+        each_file(scratch, remove_ours, NULL);
+        unlink(scratch->lock_path);
+        rmdir(scratch->path); /* refused where somebody else's files came: they stay */
+        strl_lock_release(scratch->lock);
+    }
+    if (scratch->made_parent)
+        rmdir(scratch->made_parent);
+    strl__free(scratch->made_parent);
+    strl__free(scratch->lock_path);
+    strl__free(scratch->path);
+    strl__free(scratch);
+}
