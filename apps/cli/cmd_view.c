@@ -1,9 +1,45 @@
 /* stroll view: a window on a container. */
+#include <inttypes.h>
+#include <math.h>
 #include <stdio.h>
 
+#include "coarse.h"
 #include "options.h"
 #include "stroll/render.h"
 #include "viewer/viewer.h"
+
+/* All frames of a session. */
+typedef struct session {
+    uint64_t frames, total_ns, longest_ns, select_ns;
+    strl_viewer_frame last;
+    strl_cli_coarse coarse;
+} session;
+
+static void add_frame(void *context, const strl_viewer_frame *frame)
+{
+    session *all = context;
+    all->frames++;
+    all->total_ns += frame->frame_ns;
+    all->select_ns += frame->select_ns;
+    if (frame->frame_ns > all->longest_ns)
+        all->longest_ns = frame->frame_ns;
+    all->last = *frame;
+    strl_cli_coarse_add(&all->coarse, frame->asked_px, frame->allowed_px, frame->max_error_px);
+}
+
+static void print_session(const session *all)
+{
+    double frames = (double)all->frames;
+    printf("%" PRIu64 " frame%s: mean %.2f ms, longest %.2f ms, selecting %.3f ms\n", all->frames,
+           strl_cli_plural(all->frames), (double)all->total_ns * 1e-6 / frames, (double)all->longest_ns * 1e-6,
+           (double)all->select_ns * 1e-6 / frames);
+    printf("last frame: %" PRIu64 " triangle%s, %" PRIu32 " missing node%s, ", all->last.triangles,
+           strl_cli_plural(all->last.triangles), all->last.missing_nodes, strl_cli_plural(all->last.missing_nodes));
+    if (isfinite(all->last.max_error_px))
+        printf("errors up to %.3g pixels\n", all->last.max_error_px);
+    else
+        printf("the eye inside a node's box\n");
+}
 
 static int run(strl_cli_args *args)
 {
@@ -33,6 +69,12 @@ static int run(strl_cli_args *args)
          .help = "buffers of nodes (512M)",
          .least = STRL_RENDERER_LEAST_GPU_BYTES,
          .most = 0x1p50},
+        {.name = "frames",
+         .kind = STRL_CLI_COUNT,
+         .value = &desc.frames,
+         .help = "close the window after N frames and print how long they took (when it is closed)",
+         .least = 1,
+         .most = 1e9},
         {.name = "screenshots",
          .kind = STRL_CLI_STRING,
          .value = &desc.screenshots,
@@ -59,7 +101,15 @@ static int run(strl_cli_args *args)
     strl_error err = {0};
     desc.path = inputs.items[0];
     desc.backend = backends[backend];
-    return strl_viewer_run(&desc, &err) == STRL_OK ? 0 : strl_cli_fail(&err);
+    session all = {0};
+    desc.shown = add_frame;
+    desc.context = &all;
+    if (strl_viewer_run(&desc, &err) != STRL_OK)
+        return strl_cli_fail(&err);
+    if (desc.frames > 0 && all.frames > 0 && !args->quiet)
+        print_session(&all);
+    strl_cli_coarse_report(&all.coarse, desc.memory_bytes);
+    return 0;
 }
 
 STRL_CLI_COMMAND(view, "walk through a container in a window", run);

@@ -61,6 +61,7 @@ typedef struct viewer {
     uint32_t size[2];
     frame_clock clock;
     uint32_t frames_left; /* to draw before resting */
+    uint64_t frames_shown;
     bool resting;
     char message[320];
     uint64_t message_end_ns;
@@ -100,7 +101,10 @@ static void toggle_debug(viewer *v, strl_debug_colour colour)
 
 static void scale_error(viewer *v, float factor)
 {
-    v->controls.error_px = fminf(fmaxf(v->controls.error_px * factor, STRL_GUI_LEAST_ERROR_PX), STRL_GUI_MOST_ERROR_PX);
+    /* --error may lie outside the slider's range: a key then leads no further out, and not to the other side. */
+    float error_px = v->controls.error_px, least = fminf(error_px, STRL_GUI_LEAST_ERROR_PX);
+    float most = fmaxf(error_px, STRL_GUI_MOST_ERROR_PX);
+    v->controls.error_px = fminf(fmaxf(error_px * factor, least), most);
 }
 
 /* True: quit. */
@@ -222,6 +226,13 @@ static strl_draw_options draw_options(const viewer *v)
     return options;
 }
 
+/* What reads ranges knows offsets, not names. */
+static strl_status name_file(const viewer *v, strl_status status, strl_error *err)
+{
+    bool named = status == STRL_OK || strstr(err->message, v->desc.path);
+    return named ? status : strl__fail_context(err, status, "%s", v->desc.path);
+}
+
 /* While frozen, the walk goes on for the camera as it was, and the list is seen by another. */
 static strl_status select_nodes(viewer *v, strl_draw_list *list, strl_error *err)
 {
@@ -233,7 +244,7 @@ static strl_status select_nodes(viewer *v, strl_draw_list *list, strl_error *err
     strl_walk_set_error_px(v->model.walk, v->controls.error_px);
     strl_status status = strl_walk_frame(v->model.walk, v->controls.frozen ? &v->frozen : &v->camera, list, err);
     if (status != STRL_OK)
-        return status;
+        return name_file(v, status, err);
     v->clock.select_ns += strl_walk_get_stats(v->model.walk)->select_ns;
     v->frozen_far = list->count > 0 ? list->far_distance : v->navigator.radius;
     if (v->controls.frozen && !strl_viewer_set_range(list, &v->camera))
@@ -283,8 +294,25 @@ static void show_panel(viewer *v, const strl_render_stats *drawn)
     strl_window_set_taken(v->window, strl_gui_takes_mouse(v->gui), strl_gui_takes_keyboard(v->gui));
 }
 
+static void tell(viewer *v, uint64_t start_ns, double asked_px, uint64_t triangles)
+{
+    const strl_walk_stats *walk = strl_walk_get_stats(v->model.walk);
+    const strl_viewer_frame frame = {.frame_ns = strl_clock_ns() - start_ns,
+                                     .select_ns = walk->select_ns,
+                                     .triangles = triangles,
+                                     .missing_nodes = walk->missing_nodes,
+                                     .asked_px = asked_px,
+                                     .allowed_px = walk->allowed_error_px,
+                                     .max_error_px = walk->max_error_px};
+    v->frames_shown++;
+    if (v->desc.shown)
+        v->desc.shown(v->desc.context, &frame);
+}
+
 static strl_status draw_frame(viewer *v, strl_error *err)
 {
+    uint64_t start_ns = strl_clock_ns();
+    double asked_px = v->controls.error_px; /* the panel may change it for the next frame */
     strl_draw_list list;
     strl_render_stats drawn;
     strl_draw_options options = draw_options(v);
@@ -301,6 +329,7 @@ static strl_status draw_frame(viewer *v, strl_error *err)
     v->controls.screenshot = false;
     show_panel(v, &drawn);
     strl_window_swap(v->window);
+    tell(v, start_ns, asked_px, drawn.triangles);
     return STRL_OK;
 }
 
@@ -309,7 +338,8 @@ static strl_status draw_frame(viewer *v, strl_error *err)
 /* Rests when the picture is the wanted one and nothing has happened for a few frames. */
 static double decide_wait(viewer *v, bool drawable)
 {
-    if (!drawable || (strl_walk_settled(v->model.walk) && v->frames_left == 0)) {
+    bool still = v->desc.frames == 0 && v->frames_left == 0 && strl_walk_settled(v->model.walk);
+    if (!drawable || still) {
         v->resting = true;
         v->clock.last_ns = 0;
         return IDLE_SECONDS;
@@ -338,6 +368,7 @@ static strl_status run_loop(viewer *v, strl_error *err)
             move(v, &input, seconds);
             status = draw_frame(v, err);
         }
+        quit = quit || (v->desc.frames > 0 && v->frames_shown >= v->desc.frames);
         wait = decide_wait(v, drawable);
     }
     return status;
@@ -386,7 +417,7 @@ strl_status strl_viewer_run(const strl_viewer_desc *desc, strl_error *err)
         return strl__fail(err, STRL_ERR_ARGUMENT, "the null renderer draws nothing that a window could show");
     strl_status status = strl_viewer_model_open(&v.model, v.desc.path, v.desc.memory_bytes, v.desc.error_px, err);
     if (status != STRL_OK)
-        return status;
+        return name_file(&v, status, err);
     reset(&v);
     status = open_window(&v, err);
     if (status == STRL_OK)

@@ -7,6 +7,15 @@
 #include "stroll/error.h"
 #include "stroll/render.h"
 
+/* One frame that has been shown. */
+typedef struct strl_viewer_frame {
+    uint64_t frame_ns, select_ns; /* frame: from the camera to the swap of the window's buffers */
+    uint64_t triangles;
+    uint32_t missing_nodes;
+    double asked_px, allowed_px;  /* pixel error: of the panel; more where memory is tight */
+    double max_error_px;          /* of what was drawn; infinite where the eye is inside a node's box */
+} strl_viewer_frame;
+
 /* Zero-initialise: every 0 but path takes its default. Strings are borrowed for the call. */
 typedef struct strl_viewer_desc {
     const char *path;          /* a container */
@@ -16,6 +25,9 @@ typedef struct strl_viewer_desc {
     double error_px;           /* 0 = 1 */
     uint64_t memory_bytes;     /* of decoded nodes; 0 = 512 MiB */
     uint64_t gpu_memory_bytes; /* of buffers of nodes; 0 = 512 MiB */
+    uint64_t frames;           /* the window closes after as many, and never rests till then; 0 = when it is told to */
+    void (*shown)(void *context, const strl_viewer_frame *frame); /* after each frame; may be NULL */
+    void *context;
 } strl_viewer_desc;
 
 /* Runs until the window is closed. On the program's first thread; STRL_ERR_UNSUPPORTED where there is no display. */

@@ -192,6 +192,23 @@ def check_window(stroll, display, model, folder, *options):
             viewer.process.wait()
 
 
+def check_frames(stroll, display, model):
+    """A window that closes by itself: for scripts."""
+    def view(*options):
+        done = subprocess.run([stroll, "view", model, "--size", f"{SIZE[0]}x{SIZE[1]}", *options], env=display.environment, text=True,
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=PATIENCE_S)
+        assert done.returncode == 0, f"view {options} ended with {done.returncode}: {done.stderr}"
+        return done
+
+    done = view("--frames", "40", "--error", "0.05")
+    lines = done.stdout.splitlines()
+    assert len(lines) == 2 and lines[0].startswith("40 frames: mean ") and " triangles, " in lines[1], done.stdout
+    assert "--memory" not in done.stderr, done.stderr
+    assert view("--frames", "1", "--quiet").stdout == ""
+    tight = view("--frames", "200", "--error", "0.01", "--memory", "1M")
+    assert "--memory 1M holds too little for a pixel error of 0.01: " in tight.stderr, tight.stderr
+
+
 def check_refusals(stroll, scene, model):
     without = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
     refusals = [([model], without, "no window"), ([scene], without, "build"),
@@ -216,6 +233,7 @@ def main():
             print("skipped: there is no " + " and no ".join(missing))
             return SKIPPED
         with Display() as display:
+            check_frames(stroll, display, model)
             check_window(stroll, display, model, folder / "auto")
             check_window(stroll, display, model, folder / "gl3", "--backend", "gl3", "--error", "2")
     print("view: window, mouse, keys and pictures work")
