@@ -351,6 +351,10 @@ def parse_options():
     for part in options.parts:
         if part not in PARTS:
             parser.error(f"there is no part {part}; they are {', '.join(PARTS)}")
+    if not options.data.is_dir():
+        parser.error(f"--data {options.data} is no folder")
+    if not options.stroll.is_file():
+        parser.error(f"--stroll {options.stroll} is no program")
     return options
 
 

@@ -2,6 +2,8 @@
 
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 PATHS = ("orbit", "flythrough")
+# What a part's records are called where it is not as the part.
+MEASURES = {"images": ("images_orbit", "images_flythrough"), "psnr": ("psnr_orbit", "psnr_flythrough"), "roots": ("root",)}
 MOST_ROOT_TRIANGLES = 16384
 
 
@@ -23,11 +25,11 @@ def mebibytes(value):
     return f"{value / 2**20:,.0f} MiB"
 
 
-def table(part, title, header, rows):
+def table(part, title, header, rows, origin):
     """The command stands with its table: whoever doubts a figure can take it again."""
     if not rows:
         return []
-    lines = [f"### {title}", "", f"`bench/must_show.py --data DIR --parts {part}`", "",
+    lines = [f"### {title}", "", f"`bench/must_show.py --data DIR --parts {part}`, {origin}", "",
              "| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
     lines += ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
     return lines + [""]
@@ -134,18 +136,39 @@ def closing_lines(records):
     lines = list(growth_lines(records))
     for record in records_of(records, "bytes"):
         jobs = ", ".join(str(jobs) for jobs in record["digests"])
-        lines.append(f"Same bytes for `--jobs` {jobs} ({record['model']}, `--parts bytes`): {number(record['holds'])}.")
+        lines.append(f"Same bytes for `--jobs` {jobs} ({record['model']}, `--parts bytes`, commit {record['commit']}): "
+                     f"{number(record['holds'])}.")
     return [text for line in lines for text in (line, "")]
 
 
-def machine_lines(records):
-    machines = []
-    for record in records.values():
-        line = (f"{record['cpu']}, {record['cores']} cores, {record['memory_gib']} GiB, {record['system']}, "
-                f"Linux {record['kernel']}, commit {record['commit']}")
-        if line not in machines:
-            machines.append(line)
-    return [text for line in machines for text in (f"Machine: {line}.", "")]
+def machine_of(record):
+    return (f"{record['cpu']}, {record['cores']} cores, {record['memory_gib']} GiB, {record['system']}, "
+            f"Linux {record['kernel']}")
+
+
+def machines_of(records):
+    """Each machine's name. Where there is but one, it needs none."""
+    machines = list(dict.fromkeys(machine_of(record) for _, record in sorted(records.items())))
+    if len(machines) == 1:
+        return {machines[0]: ""}
+    return {machine: f"machine {number}" for number, machine in enumerate(machines, 1)}
+
+
+def machine_lines(machines):
+    lines = [f"{name.capitalize() or 'Machine'}: {machine}." for machine, name in machines.items()]
+    return [text for line in lines for text in (line, "")]
+
+
+def origin_of(records, names, machines):
+    """Of which commit the measures' figures are, and of which machine: "commit a (model, model), b (model)"."""
+    models = {}
+    for (name, model), record in sorted(records.items()):
+        if name in names:
+            place = " on ".join(filter(None, (record["commit"], machines[machine_of(record)])))
+            models.setdefault(place, dict.fromkeys([]))[model] = None
+    if len(models) == 1:
+        return f"commit {next(iter(models))}"
+    return "commits " + ", ".join(f"{place} ({', '.join(of)})" for place, of in models.items())
 
 
 TABLES = (
@@ -172,9 +195,11 @@ TABLES = (
 
 def markdown(records):
     """records: as Log.latest gives them, by (measure, model)."""
-    lines = machine_lines(records)
+    machines = machines_of(records)
+    lines = machine_lines(machines)
     for part, title, header, rows_of in TABLES:
-        lines += table(part, title, header, list(rows_of(records)))
+        origin = origin_of(records, MEASURES.get(part, (part,)), machines)
+        lines += table(part, title, header, list(rows_of(records)), origin)
     return "\n".join(lines + closing_lines(records)).rstrip() + "\n"
 
 

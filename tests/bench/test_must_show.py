@@ -65,6 +65,23 @@ class Test:
         counted = [line.split(",")[0] for line in self.counts.read_text().splitlines()[1:]]
         self.check("counts are written", counted == ["isosurface", "isosurface", "plane"], counted)
 
+    def test_origins(self):
+        """One line a machine; a table says of which commit it is, and of which models where they differ."""
+        def record(model, commit, cores):
+            report = {"dropped": {"nonfinite": 0, "degenerate": 0}, "triangles_in": 1, "nodes": 1, "levels": 1, "root_triangles": 1}
+            return {"model": model, "commit": commit, "cpu": "CPU", "cores": cores, "memory_gib": 1, "system": "S", "kernel": "K",
+                    "report": report, "bytes_per_triangle": 1, "system_peak_rss_bytes": 1, "seconds": 1, "holds": True, "said": ""}
+
+        records = {("build", "a"): record("a", "c1", 2), ("build", "b"): record("b", "c2", 2), ("build", "c"): record("c", "c1", 2),
+                   ("root", "a"): record("a", "c1", 2)}
+        text = tables.markdown(records)
+        self.check("one machine stands once", text.count("Machine") == 1 and text.startswith("Machine: CPU, 2 cores, "), text)
+        self.check("a table names its commits with their models", "--parts build`, commits c1 (a, c), c2 (b)\n" in text, text)
+        self.check("and one commit alone", "--parts roots`, commit c1\n" in text, text)
+        text = tables.markdown({**records, ("root", "b"): record("b", "c1", 4)})
+        self.check("two machines get names", "Machine 1: CPU, 2 cores" in text and "Machine 2: CPU, 4 cores" in text and
+                   "--parts roots`, commits c1 on machine 1 (a), c1 on machine 2 (b)\n" in text, text)
+
     def test_sheet(self):
         rows = sheets.read_png(self.folder / "scratch" / "sheets" / f"{MODELS[0]}_orbit.png")
         width = len(rows[0]) // 9  # three pictures of three bytes a pixel
@@ -95,13 +112,17 @@ class Test:
         self.check("a model that is not there is named", result.returncode == 1 and "missing.ply" in result.stderr, result.stderr)
         result = self.must_show("--parts", "sprint")
         self.check("an unknown part is wrong usage", result.returncode == 2, result.stderr)
+        lines = len(self.log.read_text().splitlines())
+        result = self.must_show("--parts", "build", "--again", "--data", self.folder / "nowhere")
+        self.check("a folder that is not there is wrong usage, and nothing is measured", result.returncode == 2 and
+                   "nowhere is no folder" in result.stderr and len(self.log.read_text().splitlines()) == lines, result.stderr)
 
 
 def main():
     program = os.path.abspath(sys.argv[1])
     with tempfile.TemporaryDirectory() as folder:
         test = Test(program, pathlib.Path(folder))
-        for part in (test.test_parts, test.test_tables, test.test_sheet, test.test_png, test.test_resume, test.test_refusals):
+        for part in (test.test_parts, test.test_tables, test.test_origins, test.test_sheet, test.test_png, test.test_resume, test.test_refusals):
             part()
         return 1 if test.failures else 0
 
