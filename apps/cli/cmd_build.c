@@ -103,7 +103,7 @@ static int run(strl_cli_args *args)
          .help = "largest lattice step, model units; one below a 2^30th of the extent is refused (chosen from the model)",
          .least = 1e-300, .most = 1e300},
         {.name = "up", .kind = STRL_CLI_ENUM, .value = &desc.up_axis, .argument = "auto|x|y|z",
-         .help = "which axis points up; stored, never applied (auto: what the format says)"},
+         .help = "which axis points up; stored, never applied (auto: y for OBJ, z for PLY and STL)"},
         {.name = "unit", .kind = STRL_CLI_ENUM, .value = &unit, .given = &unit_given, .argument = STRL_CLI_UNITS,
          .help = "length unit; stored, never applied (unknown)"},
         {.name = "no-dependencies", .kind = STRL_CLI_FLAG, .value = &desc.no_dependencies,

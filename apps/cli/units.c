@@ -7,7 +7,7 @@ typedef struct unit {
     double metres;
 } unit;
 
-static const unit units[] = {{"um", 1e-6}, {"mm", 0.001}, {"cm", 0.01},   {"dm", 0.1},    {"m", 1},
+static const unit units[] = {{"um", 1e-6}, {"mm", 0.001},  {"cm", 0.01},   {"dm", 0.1},    {"m", 1},
                              {"km", 1000}, {"in", 0.0254}, {"ft", 0.3048}, {"yd", 0.9144}, {"mi", 1609.344}};
 
 const char *strl_cli_unit_name(int number)

@@ -12,8 +12,8 @@ typedef struct strl_viewer_frame {
     uint64_t frame_ns, select_ns; /* frame: from the camera to the swap of the window's buffers */
     uint64_t triangles;
     uint32_t missing_nodes;
-    double asked_px, allowed_px;  /* pixel error: of the panel; more where memory is tight */
-    double max_error_px;          /* of what was drawn; infinite where the eye is inside a node's box */
+    double asked_px, allowed_px; /* pixel error: of the panel; more where memory is tight */
+    double max_error_px;         /* of what was drawn; infinite where the eye is inside a node's box */
 } strl_viewer_frame;
 
 /* Zero-initialise: every 0 but path takes its default. Strings are borrowed for the call. */

@@ -51,6 +51,13 @@ class Test:
             self.refused(2, "--unit is one of um|mm|cm|dm|m|km|in|ft|yd|mi, not", "build", self.scene, "-o", "x", "--unit", unit)
         self.check("nothing was built", not (self.folder / "x").exists())
 
+    def test_up(self):
+        (self.folder / "one.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        for words, axis in ((("one.obj",), "y"), (("one.obj", "--up", "z"), "z"), ((self.scene, ), "z"), ((self.scene, "--up", "y"), "y")):
+            self.run("build", *words, "-o", "up.stroll")
+            up = json.loads(self.run("info", "up.stroll", "--json").stdout)["up"]
+            self.check("up is %s" % axis, up == axis, (words, up))
+
     def test_cameras(self):
         for spec, sentence in (
                 ("eye 1 1 1 target 1 1 1", "camera: eye and target are the same point"), ("up 0 0 0", "camera: up is zero"),
