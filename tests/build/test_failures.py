@@ -134,7 +134,7 @@ def a_full_disk_is_one_sentence(folder):
             out = older_output(disk) if megabytes == 6 else os.path.join(disk, "out.stroll")
             refused(disk, source, "-o", out, *(["--scratch", elsewhere] if scratch_elsewhere else []))
             if scratch_elsewhere:
-                assert os.listdir(elsewhere) == []
+                assert not os.path.exists(elsewhere)  # the build made it
         finally:
             subprocess.run(["umount", disk], check=True)
 
@@ -167,7 +167,7 @@ def start_long_build(folder, out):
 def signals_stop_a_build_cleanly(folder):
     out = older_output(folder)
     stopped = 0
-    for number, wait in ((signal.SIGINT, 0), (signal.SIGTERM, 0.1), (signal.SIGINT, 0.4), (signal.SIGINT, 1),
+    for number, wait in ((signal.SIGINT, 0), (signal.SIGTERM, 0.1), (signal.SIGHUP, 0.4), (signal.SIGQUIT, 1),
                          (signal.SIGTERM, 1.8)):
         child = start_long_build(folder, out)
         time.sleep(wait * SLOW)
@@ -178,7 +178,7 @@ def signals_stop_a_build_cleanly(folder):
             continue
         stopped += 1
         assert child.returncode == 1, (child.returncode, error)
-        assert error.count("\n") == 1 and "cancelled" in error, error
+        assert error.count("\n") == 1 and "interrupted" in error, error
         assert sorted(os.listdir(folder)) == ["long.ply", "out.stroll"], os.listdir(folder)
         assert read(out) == OLDER
     assert stopped >= 3
