@@ -39,9 +39,13 @@ typedef struct strl_mesh {
     uint32_t (*triangle)[3]; /* [triangle_count] wedges, counter-clockwise; three different points */
     strl_drift *drift;       /* [triangle_count] of this piece of surface */
     float start_error;       /* lattice units: distance of the start from the input, to be added to every drift */
+    float most_error;        /* no point can be further from the input than this: both lie in one box of such a diagonal; 0 = not known */
     float *deviation;        /* [triangle_count] how much its attributes have changed so far, 0..1 */
     float *shift;            /* [triangle_count] appearance error so far, lattice units */
 } strl_mesh;
+
+/* The geometric error of a surface that has drifted so far at most: lattice units. */
+float strl_mesh_error(const strl_mesh *mesh, float longest_drift);
 
 /* Allocates all arrays for the given counts (contents undefined, flags zero). False without memory. */
 bool strl_mesh_create(strl_mesh *mesh, uint32_t points, uint32_t wedges, uint32_t triangles, strl_arena *arena);

@@ -132,7 +132,7 @@ static void fill_errors(strl_pm *pm, const strl_mesh *mesh, const strl_simplifie
 {
     float geometric = 0, appearance = 0;
     for (uint32_t t = 0; t < mesh->triangle_count; t++) {
-        geometric = fmaxf(geometric, strl_drift_length(&mesh->drift[t]) + mesh->start_error);
+        geometric = fmaxf(geometric, strl_mesh_error(mesh, strl_drift_length(&mesh->drift[t])));
         appearance = fmaxf(appearance, mesh->shift[t]);
     }
     pm->geometric_error[pm->step_count] = geometric;
@@ -190,6 +190,7 @@ strl_status strl_mesh_after(const strl_mesh *mesh, const strl_simplified *simpli
     if (!strl_mesh_create(base, counts.point_count, counts.wedge_count, counts.triangle_count, arena))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a mesh of %u triangles", counts.triangle_count);
     base->start_error = mesh->start_error;
+    base->most_error = mesh->most_error;
     for (uint32_t p = 0; p < mesh->point_count; p++)
         if (points[p] != NO_INDEX) {
             memcpy(base->position[points[p]], mesh->position[p], sizeof *base->position);

@@ -9,6 +9,7 @@
 #define FREE_DIVISOR 8   /* collapses that add no error go on below the target, down to this part of it */
 #define LADDER_RATIO 4.f /* the first rung gives up where its next collapse costs so many times its middle one */
 #define SMALL_SHARE 5e-4 /* of a piece's diagonal: errors below are never out of proportion */
+#define LARGE_SHARE 0.01 /* of a piece's diagonal: errors above are out of proportion where not even half of what is wanted is done */
 #define LEAST_ERROR 1.f  /* lattice units: below, all errors count as equal */
 
 static void heap_place(simplifier *s, uint32_t at, candidate c)
@@ -112,7 +113,7 @@ void strl__apply_collapse(simplifier *s, const strl_star *star, const collapse_p
     strl__quadric_add(&s->quadrics[v], &s->quadrics[u]);
     s->sites[v].own_cost = strl__quadric_at(&s->quadrics[v], s->sites[v].position);
     s->sites[v].holders |= s->sites[u].holders;
-    result->geometric = strl__larger(result->geometric, strl__larger(plan->geometric, effect->longest + s->mesh->start_error));
+    result->geometric = strl__larger(result->geometric, strl__larger(plan->geometric, strl_mesh_error(s->mesh, effect->longest)));
     result->appearance = strl__larger(result->appearance, plan->shift);
     result->collapses[result->collapse_count++] =
         (strl_collapse){u, v, s->triangles_left, result->geometric, result->appearance};
@@ -185,19 +186,18 @@ static bool wants_more(const simplifier *s, float key)
     return s->triangles_left > desc->target_triangles;
 }
 
-/* An error that is small for a piece of this size, whatever its triangles are like. */
-static float least_middle(const simplifier *s)
+static double diagonal_of(const strl_mesh *mesh)
 {
-    double diagonal2 = 0;
+    double squared = 0;
     for (int k = 0; k < 3; k++) {
-        double least = INFINITY, most = -INFINITY;
-        for (uint32_t p = 0; p < s->mesh->point_count; p++) {
-            least = s->mesh->position[p][k] < least ? s->mesh->position[p][k] : least;
-            most = s->mesh->position[p][k] > most ? s->mesh->position[p][k] : most;
+        int64_t least = INT32_MAX, most = INT32_MIN;
+        for (uint32_t p = 0; p < mesh->point_count; p++) {
+            least = mesh->position[p][k] < least ? mesh->position[p][k] : least;
+            most = mesh->position[p][k] > most ? mesh->position[p][k] : most;
         }
-        diagonal2 += most > least ? (most - least) * (most - least) : 0;
+        squared += most > least ? (double)(most - least) * (double)(most - least) : 0;
     }
-    return strl__larger(LEAST_ERROR, (float)(sqrt(diagonal2) * SMALL_SHARE));
+    return sqrt(squared);
 }
 
 /* Plans the point anew. True where the plan is to be carried out at once: then it is in s->plan[point], s->star and s->effect. */
@@ -239,27 +239,35 @@ static uint32_t next_point(simplifier *s)
     return plan_again(s, point) ? point : NO_INDEX;
 }
 
-/* Collapses on the present rung up to `limit`. *middle: the key at which the first half of what is wanted was done (0 until
- * then); with `adaptive`, stops where keys leave it far behind: then the next rungs do the same for less. */
-static float run_rung(simplifier *s, float limit, bool adaptive, float *middle, strl_simplified *result)
+/* What the first rung may cost: a few times what the first half of its collapses did, and while they are not done, an error that is
+ * no longer small for such a piece or such a start. */
+static float first_rung_limit(const simplifier *s, float start)
+{
+    float large = strl__larger(LADDER_RATIO * start, (float)(LARGE_SHARE * s->diagonal));
+    return smaller(s->desc->error_limit, strl__larger(large, s->desc->even_error));
+}
+
+/* Collapses on the present rung up to `limit`; with `adaptive`, stops where keys leave those of the first half of what is wanted
+ * far behind: then the next rungs do the same for less. Returns the largest key. */
+static float run_rung(simplifier *s, float limit, bool adaptive, strl_simplified *result)
 {
     uint32_t half = s->mesh->triangle_count - (s->mesh->triangle_count - s->desc->target_triangles) / 2;
     float reached = 0;
     push_all(s);
-    while (s->heap_count && wants_more(s, s->heap[0].key)) {
-        if (s->heap[0].key > limit || (adaptive && *middle > 0 && s->heap[0].key > LADDER_RATIO * *middle))
-            break;
+    while (s->heap_count && s->heap[0].key <= limit && wants_more(s, s->heap[0].key)) {
         uint32_t point = next_point(s);
         if (point == NO_INDEX)
             continue;
         float key = s->plan[point].key;
-        bool too_dear = key > limit || (adaptive && *middle > 0 && key > LADDER_RATIO * *middle);
-        if (too_dear || !wants_more(s, key))
+        if (key > limit || !wants_more(s, key))
             break;
         strl__apply_collapse(s, &s->star, &s->plan[point], &s->effect, result);
         reached = strl__larger(reached, key);
-        if (*middle == 0 && s->triangles_left <= half)
-            *middle = strl__larger(reached, least_middle(s));
+        if (adaptive && s->triangles_left <= half) {
+            float middle = strl__larger(strl__larger(reached, LEAST_ERROR), (float)(SMALL_SHARE * s->diagonal));
+            limit = smaller(s->desc->error_limit, LADDER_RATIO * middle);
+            adaptive = false;
+        }
         for (uint32_t i = 0; i < s->star.neighbour_count; i++)
             mark_stale(s, s->star.neighbour[i], key);
     }
@@ -268,24 +276,20 @@ static float run_rung(simplifier *s, float limit, bool adaptive, float *middle, 
     return reached;
 }
 
-/* All rungs up to one error, then all again up to twice that, until the target is met. */
+/* All rungs up to one error, then all again up to twice that, until the target is met. False without memory. */
 static bool climb_ladder(simplifier *s, float start, strl_arena *arena, strl_simplified *result)
 {
-    float limit = start, middle = start;
-    for (int round = 0; round < 64 && s->triangles_left > s->desc->target_triangles; round++) {
-        if (s->triangles_left <= s->desc->soft_triangles || limit > s->desc->error_limit)
-            break;
-        limit = smaller(limit * 2, s->desc->error_limit);
+    float limit = start, most = smaller(s->desc->error_limit, 2 * strl__larger(start, (float)s->diagonal)); /* nothing is further away */
+    while (s->triangles_left > s->desc->target_triangles && s->triangles_left > s->desc->soft_triangles && limit < most) {
+        limit = smaller(limit * 2, most);
         for (int rung = STRL_SIMPLIFY_TOPOLOGY; rung <= STRL_SIMPLIFY_SEAMS; rung++) {
             s->rung = (strl_simplify_rung)rung;
             if (rung <= (int)s->desc->last_rung && s->triangles_left > s->desc->target_triangles)
-                run_rung(s, limit, false, &middle, result);
+                run_rung(s, limit, false, result);
         }
         if (s->desc->last_rung >= STRL_SIMPLIFY_DISJOINT && s->triangles_left > s->desc->target_triangles &&
             !strl__simplify_clustering(s, limit, arena, result))
             return false;
-        if (limit == s->desc->error_limit)
-            break;
     }
     return true;
 }
@@ -302,12 +306,13 @@ strl_status strl_simplify(const strl_mesh *mesh, const strl_simplify_desc *desc,
     if (!strl__simplify_load(s, arena, result))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to simplify %u triangles", mesh->triangle_count);
     s->free_key = strl__larger(result->geometric, result->appearance) * (1 + 1e-5f); /* claims are rounded up */
-    float middle = 0, reached = strl__larger(result->geometric, LEAST_ERROR);
+    s->diagonal = diagonal_of(mesh);
+    float reached = strl__larger(result->geometric, LEAST_ERROR);
     if (s->triangles_left > desc->target_triangles / FREE_DIVISOR)
-        reached = strl__larger(reached, run_rung(s, desc->error_limit, true, &middle, result));
+        reached = strl__larger(reached, run_rung(s, first_rung_limit(s, reached), true, result));
     if (desc->even_error > 0 && desc->last_rung >= STRL_SIMPLIFY_SEAMS && s->triangles_left > desc->least_triangles) {
         s->rung = STRL_SIMPLIFY_SEAMS; /* for the error that the node ends at anyway */
-        reached = strl__larger(reached, run_rung(s, smaller(desc->even_error, desc->error_limit), false, &middle, result));
+        reached = strl__larger(reached, run_rung(s, smaller(desc->even_error, desc->error_limit), false, result));
         s->rung = STRL_SIMPLIFY_TOPOLOGY;
     }
     uint32_t enough = desc->even_error > 0 ? desc->most_triangles : desc->target_triangles;

@@ -6,6 +6,9 @@
 #include "base/hash.h"
 #include "geometry/simplify_plan.h"
 
+/* Cells of the grid, of the error that merging may make: from their corners to their middles it is less far, and what drifted before counts too. */
+#define CELL_SHARE 0.75
+
 typedef struct cell_slot {
     int64_t cell[3];
     uint32_t point; /* the cell's representative; NO_INDEX = free slot */
@@ -78,19 +81,42 @@ static bool is_on_surface(const simplifier *s, uint32_t point)
     return s->sites[point].degree > 0;
 }
 
-/* Kept points first: they cannot move, so they represent their cells. */
+/* Whether the point stays where it is, whatever its cell would like. */
+static bool is_fixed(const simplifier *s, uint32_t point)
+{
+    return (s->mesh->flags[point] & STRL_POINT_KEPT) || s->sites[point].degree > STAR_MAX;
+}
+
+static double squared_from_centre(const cell_slot *slot, const double p[3], double size)
+{
+    double sum = 0;
+    for (int k = 0; k < 3; k++) {
+        double d = p[k] - ((double)slot->cell[k] + 0.5) * size;
+        sum += d * d;
+    }
+    return sum;
+}
+
+/* Points that cannot move represent their cells; elsewhere the one nearest to the middle, to which ways are short. */
 static void choose_representatives(clustering *c, double size)
 {
+    const simplifier *s = c->s;
     for (uint32_t i = 0; i <= c->mask; i++)
         c->slots[i].point = NO_INDEX;
-    for (int kept = 1; kept >= 0; kept--)
-        for (uint32_t p = 0; p < c->s->mesh->point_count; p++) {
-            if (((c->s->mesh->flags[p] & STRL_POINT_KEPT) != 0) != (kept != 0) || !is_on_surface(c->s, p))
-                continue;
-            cell_slot *slot = find_cell(c, c->s->sites[p].position, size);
-            if (slot->point == NO_INDEX)
-                slot->point = p;
+    for (uint32_t p = 0; p < s->mesh->point_count; p++) {
+        if (!is_on_surface(s, p))
+            continue;
+        cell_slot *slot = find_cell(c, s->sites[p].position, size);
+        if (slot->point == NO_INDEX) {
+            slot->point = p;
+            continue;
         }
+        bool fixed = is_fixed(s, p), other_fixed = is_fixed(s, slot->point);
+        if (fixed != other_fixed ? fixed
+                                 : squared_from_centre(slot, s->sites[p].position, size) <
+                                       squared_from_centre(slot, s->sites[slot->point].position, size))
+            slot->point = p;
+    }
 }
 
 static void merge_cells(clustering *c, double size, float limit, bool disjoint_only, strl_simplified *result)
@@ -122,11 +148,12 @@ bool strl__simplify_clustering(simplifier *s, float limit, strl_arena *arena, st
 {
     clustering c;
     strl_arena_mark mark = strl_arena_get_mark(arena);
+    double size = limit * CELL_SHARE;
     if (!prepare(&c, s, arena))
         return false;
-    merge_cells(&c, limit, limit, true, result);
+    merge_cells(&c, size, limit, true, result);
     if (s->desc->last_rung >= STRL_SIMPLIFY_CLUSTERING)
-        merge_cells(&c, limit, limit, false, result);
+        merge_cells(&c, size, limit, false, result);
     strl_arena_rewind(arena, mark);
     return true;
 }

@@ -174,7 +174,7 @@ static void load_triangle(simplifier *s, uint32_t t, strl_simplified *result)
     f->reach.of[REACH_DEVIATION] = mesh->deviation[t];
     f->reach.of[REACH_SHIFT] = mesh->shift[t];
     result->removed_at[t] = UINT32_MAX;
-    result->geometric = strl__larger(result->geometric, strl_drift_length(&mesh->drift[t]) + mesh->start_error);
+    result->geometric = strl__larger(result->geometric, strl_mesh_error(mesh, strl_drift_length(&mesh->drift[t])));
     result->appearance = strl__larger(result->appearance, mesh->shift[t]);
 }
 

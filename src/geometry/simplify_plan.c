@@ -223,13 +223,15 @@ void strl__plan_collapse(const simplifier *s, const strl_star *star, uint32_t to
         longest += (u[i] - v[i]) * (u[i] - v[i]);
     change = strl__larger(change, s->desc->colour_weight * effect->spoke_colour);
     plan->to = to;
-    plan->geometric = nextafterf(effect->longest + s->mesh->start_error, INFINITY);
+    plan->geometric = nextafterf(strl_mesh_error(s->mesh, effect->longest), INFINITY);
     plan->deviation = sqrtf(deviation * deviation + change * change);
     float way = strl__larger((float)sqrt(longest), effect->spoke_colour > 0 ? effect->spoke_reach : 0);
     plan->shift = strl__larger(effect->all.of[REACH_SHIFT], way * fminf(1, plan->deviation));
     plan->shift = strl__larger(plan->shift, SPOKE_WEIGHT * effect->spoke_reach * fminf(1, effect->spoke_normal));
     if (star->on_boundary) /* two rims that meet in the image can both draw back: each may have half */
         plan->shift = strl__larger(plan->shift, RIM_WEIGHT * effect->longest);
+    if (s->mesh->most_error > 0 && plan->shift > s->mesh->most_error)
+        plan->shift = s->mesh->most_error;
     plan->key = strl__larger(plan->geometric, plan->shift);
 }
 

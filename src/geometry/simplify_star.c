@@ -4,6 +4,8 @@
 
 /* Larger than any difference of attributes. */
 #define OTHER_PALETTE 1e6f
+/* So many corners of a point are looked at for a wedge: where ladder moves have gathered thousands, others are no better. */
+#define SCAN_MAX 256u
 
 /* Which neighbour each triangle's next and previous points are. */
 typedef struct sides {
@@ -228,11 +230,13 @@ uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32
     *exact = false;
     uint32_t best = NO_INDEX;
     float least = INFINITY;
-    for (uint32_t corner = s->sites[to].head, next; corner != NO_INDEX; corner = next) {
+    uint32_t scanned = 0;
+    for (uint32_t corner = s->sites[to].head, next; corner != NO_INDEX && scanned < SCAN_MAX; corner = next) {
         uint32_t other = s->corner[corner >> 2][corner & 3];
         next = s->faces[corner >> 2].next[corner & 3];
         if (s->faces[corner >> 2].gone)
             continue;
+        scanned++;
         float difference = attribute_difference(s, wedge, other);
         if (s->mesh->wedge[other].palette != s->mesh->wedge[wedge].palette) {
             if (s->rung < STRL_SIMPLIFY_DISJOINT)

@@ -120,6 +120,7 @@ typedef struct simplifier {
     uint32_t tick;
     uint32_t triangles_left;
     uint64_t moves;         /* of all collapses so far, see strl__moves_of */
+    double diagonal;        /* of the points' box */
     float free_key;         /* the largest key that was claimed before anything collapsed */
     strl_simplify_rung rung;
     /* candidates: a binary heap of points by key */

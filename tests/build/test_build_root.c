@@ -19,6 +19,11 @@
 #define MOST_SECONDS 60
 #endif
 
+/* Claims are rounded up when they are coded. */
+#define CLAIM_ROUNDING 1.05
+/* What nodes of the first two levels may claim where triangles stand so far apart. */
+#define MOST_SPACINGS 4
+
 /* samples: of each cut, each way; few where all triangles overlap, because then every search visits all of them */
 static void build_and_check(const char *input, const char *name, uint32_t samples)
 {
@@ -32,9 +37,17 @@ static void build_and_check(const char *input, const char *name, uint32_t sample
     built_model model;
     strl_error err = {0};
     built_open(&model, built_path("hard.stroll"));
-    for (uint32_t i = 0; i < model.tree.node_count; i++)
+    for (uint32_t i = 0; i < model.tree.node_count; i++) {
+        const strl_node *node = &model.node[i];
+        double diagonal = hypot(hypot((double)(node->group_box_max[0] - node->group_box_min[0]),
+                                      (double)(node->group_box_max[1] - node->group_box_min[1])),
+                                (double)(node->group_box_max[2] - node->group_box_min[2]));
         if (strl_pm_check(&model.mesh[i], &err) != STRL_OK)
             fail_msg("%s: node %u: %s", name, i, err.message);
+        diagonal = 1 + diagonal * CLAIM_ROUNDING;
+        if (node->geometric_max > diagonal || node->appearance_max > diagonal)
+            fail_msg("%s: node %u claims %g and %g in a box of %g", name, i, node->geometric_max, node->appearance_max, diagonal);
+    }
     assert_uniform_cuts_hold(&model, name, 4, samples / SMALLER);
     built_close(&model);
     remove(built_path("hard.stroll"));
@@ -73,6 +86,31 @@ static void a_soup_of_random_triangles(void **state)
         mesh_file_add_face(&mesh, 3 * t, 3 * t + 1, 3 * t + 2);
     }
     check_mesh(&mesh, "soup", 4000);
+}
+
+/* None can be simplified alone, and none may be joined to another but by the ladder: that climbs in small steps. */
+static void separate_triangles_each_a_part_of_its_own(void **state)
+{
+    (void)state;
+    uint32_t columns = 150, rows = 120 / (SMALLER / 5 + 1);
+    FILE *file = fopen(built_path("parts.obj"), "w");
+    assert_non_null(file);
+    for (uint32_t t = 0; t < columns * rows; t++) {
+        uint32_t x = t % columns, y = t / columns;
+        fprintf(file, "o part%u\nv %u %u 0\nv %u.5 %u 0\nv %u %u.5 0\nf -3 -2 -1\n", t, x, y, x, y, x, y);
+    }
+    assert_int_equal(fclose(file), 0);
+    build_and_check(built_path("parts.obj"), "parts", 400);
+    built_model model;
+    built_build_one(built_path("parts.obj"), built_path("hard.stroll"));
+    built_open(&model, built_path("hard.stroll"));
+    double spacing = 1 / model.tree.step;
+    for (uint32_t i = 0; i < model.tree.node_count; i++)
+        if (model.node[i].level < 2 && model.node[i].geometric_max > MOST_SPACINGS * spacing)
+            fail_msg("separate triangles: node %u claims %g spacings", i, model.node[i].geometric_max / spacing);
+    built_close(&model);
+    remove(built_path("parts.obj"));
+    remove(built_path("hard.stroll"));
 }
 
 static void one_fan_of_fifty_thousand(void **state)
@@ -215,6 +253,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(twenty_thousand_boxes),
         cmocka_unit_test(a_soup_of_random_triangles),
+        cmocka_unit_test(separate_triangles_each_a_part_of_its_own),
         cmocka_unit_test(one_fan_of_fifty_thousand),
         cmocka_unit_test(a_book_of_forty_thousand_pages),
         cmocka_unit_test(one_triangle_a_hundred_thousand_times),

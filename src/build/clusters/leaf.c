@@ -56,7 +56,7 @@ static const shared_ref *refs_of(const leaf_stage *stage, uint32_t cluster, size
     }
     for (*count = 0; low + *count < stage->ref_count && stage->refs[low + *count].cluster == cluster;)
         (*count)++;
-    return stage->refs + low;
+    return *count ? stage->refs + low : NULL;
 }
 
 /* The cells that a position of the cluster has outside of it. */

@@ -137,7 +137,23 @@ static bool find_holders(group_work *work, uint32_t *const *point_of, strl_arena
     return true;
 }
 
-static strl_status merge_children(group_work *work, strl_arena *arena, strl_error *err)
+/* The diagonal of the box that holds the group and the input it stands for. */
+static float most_error(const level_stage *stage, const group_work *work)
+{
+    double squared = 0;
+    for (int k = 0; k < 3; k++) {
+        int64_t least = INT64_MAX, most = INT64_MIN;
+        for (uint32_t i = 0; i < work->child_count; i++) {
+            const strl_node *record = &stage->children->nodes[2 * work->member[i / 2] + (i & 1)].record;
+            least = record->box_min[k] < least ? record->box_min[k] : least;
+            most = record->box_max[k] > most ? record->box_max[k] : most;
+        }
+        squared += (double)(most - least) * (double)(most - least);
+    }
+    return nextafterf((float)sqrt(squared) + work->merged.mesh.start_error, INFINITY);
+}
+
+static strl_status merge_children(const level_stage *stage, group_work *work, strl_arena *arena, strl_error *err)
 {
     const strl_node_mesh *list[2 * STRL_GROUP_MAX];
     uint32_t *point_of[2 * STRL_GROUP_MAX];
@@ -146,6 +162,7 @@ static strl_status merge_children(group_work *work, strl_arena *arena, strl_erro
     strl_status status = strl_node_mesh_merge(list, work->child_count, arena, &work->merged, &work->owner, point_of, err);
     if (status)
         return status;
+    work->merged.mesh.most_error = most_error(stage, work);
     for (uint32_t t = 0; t < work->merged.mesh.triangle_count; t++)
         work->owner[t] /= 2;
     if (work->merged.mesh.triangle_count > work->count * CROWDED_TRIANGLES) {
@@ -275,7 +292,7 @@ static strl_status make_group(void *context, uint64_t index, unsigned slot, unsi
     *made = (made_group){.count = work.count};
     strl_status status = read_children(stage, &work, arena, err);
     if (!status)
-        status = merge_children(&work, arena, err);
+        status = merge_children(stage, &work, arena, err);
     if (!status)
         status = simplify_boundary(stage, &work, arena, err);
     if (!status && !recount_holders(&work, arena))

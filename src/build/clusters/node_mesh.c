@@ -131,6 +131,7 @@ strl_status strl_mesh_extract(const strl_mesh *mesh, const uint32_t *owner, uint
     if (!strl_mesh_create(part, points, wedges, triangles, arena))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a part of %u triangles", triangles);
     part->start_error = mesh->start_error;
+    part->most_error = mesh->most_error;
     for (uint32_t p = 0; p < mesh->point_count; p++)
         if (point_of[p] != NO_INDEX)
             memcpy(part->position[point_of[p]], mesh->position[p], sizeof *part->position);
