@@ -115,7 +115,7 @@ static char *frame_path(const strl_render_output *output, size_t frame, const ch
         return strl_path_join(output->desc.path, name);
     }
     char *path = strl__strdup(output->desc.path);
-    if (path)
+    if (path && strcmp(extension, ".png") != 0) /* the image has the name as given, .PNG too */
         memcpy(path + strlen(path) - 4, extension, 4);
     return path;
 }

@@ -20,6 +20,8 @@ char *strl__path_parent(const char *path);
  * that name. Its sentences name `shown`. */
 strl_status strl__file_create_unique(char *path, size_t random_at, const char *shown, strl_file **file,
                                      strl_error *err);
+/* strl_file_create_nameless; its sentences name `shown`. */
+strl_status strl__file_create_nameless(const char *folder, const char *shown, strl_file **file, strl_error *err);
 int strl__file_descriptor(const strl_file *file); /* borrowed */
 
 void strl__file_info_fill(strl_file_info *info, const struct stat *facts);

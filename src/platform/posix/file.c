@@ -139,14 +139,14 @@ strl_status strl__file_create_unique(char *path, size_t random_at, const char *s
     return status;
 }
 
-strl_status strl_file_create_nameless(const char *folder, strl_file **file, strl_error *err)
+strl_status strl__file_create_nameless(const char *folder, const char *shown, strl_file **file, strl_error *err)
 {
     *file = NULL;
     static const char name[] = "stroll.XXXXXXXX.spill";
     char *path = strl_path_join(folder, name);
     if (!path)
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a scratch file in %s", strl__path_shown(folder));
-    strl_status status = strl__file_create_unique(path, strlen(path) - strlen("XXXXXXXX.spill"), folder, file, err);
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a scratch file of %s", strl__path_shown(shown));
+    strl_status status = strl__file_create_unique(path, strlen(path) - strlen("XXXXXXXX.spill"), shown, file, err);
     if (status == STRL_OK)
         status = strl_path_remove(path, err);
     if (status != STRL_OK) {
@@ -155,6 +155,11 @@ strl_status strl_file_create_nameless(const char *folder, strl_file **file, strl
     }
     strl__free(path);
     return status;
+}
+
+strl_status strl_file_create_nameless(const char *folder, strl_file **file, strl_error *err)
+{
+    return strl__file_create_nameless(folder, folder, file, err);
 }
 
 int strl__file_descriptor(const strl_file *file)

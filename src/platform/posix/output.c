@@ -228,7 +228,7 @@ strl_status strl_output_spill(strl_output *output, strl_file **spill, strl_error
 {
     *spill = NULL;
     char *folder = strl__path_parent(output->temporary);
-    strl_status status = folder ? strl_file_create_nameless(folder, spill, err) : fail_memory(output->path, err);
+    strl_status status = folder ? strl__file_create_nameless(folder, output->path, spill, err) : fail_memory(output->path, err);
     strl__free(folder);
     return status;
 }

@@ -1,0 +1,280 @@
+/* Files that appear when they are whole, and scratch folders: no failure leaves or touches anything. */
+#include <setjmp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <dirent.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+#include "base/memory.h"
+#include "platform/output.h"
+#include "platform/scratch.h"
+
+static char folder[64];
+static const char *const names[] = {"*.spill", NULL};
+
+static int set_up(void **state)
+{
+    (void)state;
+    snprintf(folder, sizeof folder, "/tmp/strl-output-XXXXXX");
+    return mkdtemp(folder) ? 0 : -1;
+}
+
+static int tear_down(void **state)
+{
+    (void)state;
+    return strl_path_remove_directory(folder, NULL) == STRL_OK ? 0 : -1;
+}
+
+/* A path in the test's folder, good until the 8th call after. */
+static const char *in_folder(const char *name)
+{
+    static char paths[8][512];
+    static unsigned turn;
+    char *path = paths[turn++ % 8];
+    snprintf(path, sizeof paths[0], "%s/%s", folder, name);
+    return path;
+}
+
+static unsigned count_files(const char *path)
+{
+    unsigned count = 0;
+    DIR *open = opendir(path);
+    assert_non_null(open);
+    for (const struct dirent *entry; (entry = readdir(open)) != NULL;)
+        count += entry->d_name[0] != '.';
+    closedir(open);
+    return count;
+}
+
+static void put(const char *path, const char *text)
+{
+    FILE *file = fopen(path, "w");
+    assert_non_null(file);
+    fputs(text, file);
+    assert_int_equal(fclose(file), 0);
+}
+
+static void assert_holds(const char *path, const char *text)
+{
+    char found[64] = "";
+    FILE *file = fopen(path, "r");
+    assert_non_null(file);
+    size_t got = fread(found, 1, sizeof found - 1, file);
+    fclose(file);
+    found[got] = 0;
+    assert_string_equal(found, text);
+}
+
+/* All that an output does: bytes, a spill, a stream, the name. */
+static strl_status write_all(const char *path, bool durable, strl_error *err)
+{
+    strl_output *output = NULL;
+    strl_file *spill = NULL;
+    FILE *stream = NULL;
+    strl_status status = strl_output_open(path, NULL, &output, err);
+    if (status == STRL_OK)
+        status = strl_output_spill(output, &spill, err);
+    if (status == STRL_OK)
+        status = strl_file_write(spill, 0, "wait", 4, err);
+    if (status == STRL_OK)
+        status = strl_file_write(strl_output_file(output), 0, "new", 3, err);
+    if (status == STRL_OK)
+        status = strl_output_stream(output, &stream, err);
+    if (status == STRL_OK)
+        status = fputs("NEW", stream) >= 0 ? STRL_OK : STRL_ERR_IO;
+    if (status == STRL_OK)
+        status = strl_output_finish(output, durable, err);
+    strl_file_close(spill, NULL);
+    strl_output_close(output);
+    return status;
+}
+
+static void a_file_has_its_name_when_it_is_whole(void **state)
+{
+    (void)state;
+    strl_output *output = NULL;
+    assert_int_equal(strl_output_open(in_folder("a"), NULL, &output, NULL), STRL_OK);
+    assert_int_equal(strl_file_write(strl_output_file(output), 0, "half", 4, NULL), STRL_OK);
+    assert_false(strl_path_exists(in_folder("a")));
+    assert_int_equal(count_files(folder), 1);
+    strl_output_close(output);
+    assert_int_equal(count_files(folder), 0);
+    for (int durable = 0; durable < 2; durable++) {
+        assert_int_equal(write_all(in_folder("a"), durable, NULL), STRL_OK);
+        assert_holds(in_folder("a"), "NEW");
+        assert_int_equal(count_files(folder), 1);
+    }
+    assert_int_equal(strl_path_remove(in_folder("a"), NULL), STRL_OK);
+    strl_output_close(NULL);
+}
+
+static void two_writers_of_one_name_do_not_meet(void **state)
+{
+    (void)state;
+    strl_output *first = NULL, *second = NULL;
+    assert_int_equal(strl_output_open(in_folder("a"), NULL, &first, NULL), STRL_OK);
+    assert_int_equal(strl_output_open(in_folder("a"), NULL, &second, NULL), STRL_OK);
+    assert_int_equal(count_files(folder), 2);
+    assert_int_equal(strl_file_write(strl_output_file(first), 0, "first", 5, NULL), STRL_OK);
+    assert_int_equal(strl_file_write(strl_output_file(second), 0, "2nd", 3, NULL), STRL_OK);
+    assert_int_equal(strl_output_finish(first, false, NULL), STRL_OK);
+    assert_holds(in_folder("a"), "first");
+    assert_int_equal(strl_output_finish(second, false, NULL), STRL_OK);
+    assert_holds(in_folder("a"), "2nd");
+    strl_output_close(first);
+    strl_output_close(second);
+    assert_int_equal(count_files(folder), 1);
+    assert_int_equal(strl_path_remove(in_folder("a"), NULL), STRL_OK);
+}
+
+static void long_names_are_written_or_refused(void **state)
+{
+    (void)state;
+    char name[300];
+    memset(name, 'n', sizeof name);
+    name[255] = 0;
+    assert_int_equal(write_all(in_folder(name), false, NULL), STRL_OK);
+    assert_int_equal(strl_path_remove(in_folder(name), NULL), STRL_OK);
+    name[255] = 'n', name[256] = 0;
+    assert_int_equal(strl_output_check(in_folder(name), NULL), STRL_ERR_IO);
+    assert_int_equal(count_files(folder), 0);
+}
+
+static void the_unfinished_file_lies_in_scratch_where_that_is_beside(void **state)
+{
+    (void)state;
+    strl_output *output = NULL;
+    assert_int_equal(strl_path_make_directory(in_folder("scratch"), NULL), STRL_OK);
+    assert_int_equal(strl_output_open(in_folder("a"), in_folder("scratch"), &output, NULL), STRL_OK);
+    assert_int_equal(count_files(in_folder("scratch")), 1);
+    assert_int_equal(strl_output_finish(output, false, NULL), STRL_OK);
+    strl_output_close(output);
+    assert_true(strl_path_exists(in_folder("a")));
+    assert_int_equal(strl_output_open(in_folder("a"), "/tmp", &output, NULL), STRL_OK);
+    assert_int_equal(count_files(folder), 3);
+    strl_output_close(output);
+    assert_int_equal(strl_path_remove(in_folder("a"), NULL), STRL_OK);
+    assert_int_equal(strl_path_remove_directory(in_folder("scratch"), NULL), STRL_OK);
+}
+
+static strl_status scratch_and_output(strl_error *err)
+{
+    const strl_scratch_desc desc = {.path = in_folder("parent/s.tmp"), .parent = in_folder("parent"), .names = names};
+    strl_scratch *scratch = NULL;
+    strl_status status = strl_scratch_create(&desc, &scratch, err);
+    if (status == STRL_OK)
+        status = write_all(in_folder("a"), true, err);
+    strl_scratch_destroy(scratch);
+    return status;
+}
+
+static void every_injected_failure_leaves_the_folder_as_it_was(void **state)
+{
+    (void)state;
+    void (*const hooks[])(uint64_t) = {strl__alloc_fail_after, strl_file_fail_writes_after};
+    const strl_status expected[] = {STRL_ERR_MEMORY, STRL_ERR_DISK_FULL};
+    for (size_t i = 0; i < 2; i++) {
+        uint64_t budget = 0;
+        strl_status status;
+        do {
+            strl_error err = {0};
+            put(in_folder("a"), "old");
+            hooks[i](++budget);
+            status = scratch_and_output(&err);
+            hooks[i](0);
+            if (status != STRL_OK && status != expected[i])
+                fail_msg("%s", err.message);
+            assert_int_equal(err.status, status);
+            assert_int_equal(count_files(folder), 1);
+            assert_holds(in_folder("a"), status == STRL_OK ? "NEW" : "old");
+        } while (status != STRL_OK);
+        assert_true(budget > 3);
+    }
+    assert_int_equal(strl_path_remove(in_folder("a"), NULL), STRL_OK);
+}
+
+static void a_scratch_folder_is_held_by_one_process(void **state)
+{
+    (void)state;
+    const char *path = in_folder("s.tmp");
+    const strl_scratch_desc desc = {.path = path, .names = names};
+    strl_scratch *first = NULL, *second = NULL;
+    strl_error err = {0};
+    assert_int_equal(strl_scratch_create(&desc, &first, NULL), STRL_OK);
+    put(in_folder("s.tmp/x.spill"), "x");
+    assert_int_equal(strl_scratch_create(&desc, &second, &err), STRL_ERR_IO);
+    assert_null(second);
+    assert_non_null(strstr(err.message, "locked"));
+    assert_int_equal(count_files(path), 2);
+    strl_scratch_destroy(first);
+    assert_false(strl_path_exists(path));
+    strl_scratch_destroy(NULL);
+}
+
+static void what_a_killed_process_left_is_cleared(void **state)
+{
+    (void)state;
+    const strl_scratch_desc desc = {.path = in_folder("s.tmp"), .names = names};
+    strl_scratch *scratch = NULL;
+    pid_t child = fork();
+    assert_true(child >= 0);
+    if (child == 0) {
+        strl_scratch *killed;
+        bool made = strl_scratch_create(&desc, &killed, NULL) == STRL_OK;
+        put(in_folder("s.tmp/x.spill"), "x");
+        _exit(made ? 0 : 1);
+    }
+    int status;
+    assert_int_equal(waitpid(child, &status, 0), child);
+    assert_int_equal(status, 0);
+    assert_int_equal(count_files(desc.path), 2);
+    put(in_folder("s.tmp/letter"), "mine");
+    strl_error err = {0};
+    assert_int_equal(strl_scratch_create(&desc, &scratch, &err), STRL_ERR_ARGUMENT);
+    assert_non_null(strstr(err.message, "letter"));
+    assert_int_equal(count_files(desc.path), 3);
+    assert_int_equal(strl_path_remove(in_folder("s.tmp/letter"), NULL), STRL_OK);
+    assert_int_equal(strl_scratch_create(&desc, &scratch, NULL), STRL_OK);
+    assert_string_equal(strl_scratch_path(scratch), desc.path);
+    assert_int_equal(count_files(desc.path), 1);
+    strl_scratch_destroy(scratch);
+    assert_int_equal(count_files(folder), 0);
+}
+
+static void a_nameless_file_leaves_no_name(void **state)
+{
+    (void)state;
+    strl_file *file = NULL;
+    char text[4] = "";
+    assert_int_equal(strl_file_create_nameless(folder, &file, NULL), STRL_OK);
+    assert_int_equal(count_files(folder), 0);
+    assert_int_equal(strl_file_write(file, 0, "abc", 3, NULL), STRL_OK);
+    assert_int_equal(strl_file_read(file, 0, text, 3, NULL), STRL_OK);
+    assert_string_equal(text, "abc");
+    assert_int_equal(strl_file_close(file, NULL), STRL_OK);
+    assert_int_equal(strl_file_create_nameless(in_folder("none"), &file, NULL), STRL_ERR_IO);
+    assert_null(file);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_file_has_its_name_when_it_is_whole),
+        cmocka_unit_test(two_writers_of_one_name_do_not_meet),
+        cmocka_unit_test(long_names_are_written_or_refused),
+        cmocka_unit_test(the_unfinished_file_lies_in_scratch_where_that_is_beside),
+        cmocka_unit_test(every_injected_failure_leaves_the_folder_as_it_was),
+        cmocka_unit_test(a_scratch_folder_is_held_by_one_process),
+        cmocka_unit_test(what_a_killed_process_left_is_cleared),
+        cmocka_unit_test(a_nameless_file_leaves_no_name),
+    };
+    return cmocka_run_group_tests(tests, set_up, tear_down);
+}
