@@ -115,15 +115,12 @@ static void note_gap_at_u(view *w, double weights[3])
     note_gap(w, a, weights[1] * w->h_of[a] + weights[2] * w->h_of[b] - w->uh);
 }
 
-/* Attributes at a crossing, before and after: on the spoke u-x and on the spoke v-y. */
-typedef struct spokes {
-    const float *u, *x, *v, *y;
-    float along, on_new;
-} spokes;
-
-static float spoke_difference(const spokes *p, unsigned k)
+/* Attributes where the spokes u-x and v-y cross: those of the first less those of the second. */
+static inline void spoke_difference(const float u[4], const float x[4], float along, const float v[4], const float y[4],
+                                    float on_new, float difference[4])
 {
-    return p->u[k] + p->along * (p->x[k] - p->u[k]) - (p->v[k] + p->on_new * (p->y[k] - p->v[k]));
+    for (unsigned k = 0; k < 4; k++)
+        difference[k] = u[k] + along * (x[k] - u[k]) - (v[k] + on_new * (y[k] - v[k]));
 }
 
 /* What is looked at along spokes. */
@@ -139,19 +136,15 @@ static void watch_crossing(const view *w, watch *seen, uint32_t old, uint32_t ne
 {
     const simplifier *s = w->s;
     uint32_t x = seen->wedge[w->v_at + old], y = seen->wedge[w->v_at + new];
+    float d[4];
     if (seen->normals) {
-        spokes p = {s->normal[seen->own], s->normal[x], s->normal[seen->target], s->normal[y], (float)along, (float)on_new};
-        float sum = 0;
-        for (unsigned k = 0; k < 3; k++) {
-            float d = spoke_difference(&p, k);
-            sum += d * d;
-        }
-        seen->normal_squared = strl__larger(seen->normal_squared, sum);
+        spoke_difference(s->normal[seen->own], s->normal[x], (float)along, s->normal[seen->target], s->normal[y], (float)on_new, d);
+        seen->normal_squared = strl__larger(seen->normal_squared, d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     }
     if (seen->colours) {
-        spokes p = {s->colour[seen->own], s->colour[x], s->colour[seen->target], s->colour[y], (float)along, (float)on_new};
+        spoke_difference(s->colour[seen->own], s->colour[x], (float)along, s->colour[seen->target], s->colour[y], (float)on_new, d);
         for (unsigned k = 0; k < 3; k++)
-            effect->spoke_colour = strl__larger(effect->spoke_colour, fabsf(spoke_difference(&p, k)));
+            effect->spoke_colour = strl__larger(effect->spoke_colour, fabsf(d[k]));
     }
 }
 
@@ -191,7 +184,12 @@ static void drift_by_height(const view *w, collapse_effect *effect)
 {
     const strl_star *star = w->star;
     const uint8_t *triangle = &star->fan.triangle[w->v_at];
-    const double *normal = star->fan.axis[2];
+    double up[3], down[3]; /* the normal's positive and negative part: one of each two is 0 */
+    for (unsigned k = 0; k < 3; k++) {
+        double n = star->fan.axis[2][k];
+        up[k] = n > 0 ? n : 0;
+        down[k] = n > 0 ? 0 : -n;
+    }
     reach sum = {{0}};
     for (uint32_t m = w->first; m < w->image; m++) {
         strl__unite(&sum, &w->s->faces[star->triangle[triangle[m]]].reach);
@@ -207,10 +205,10 @@ static void drift_by_height(const view *w, collapse_effect *effect)
         reach *own = &effect->of[triangle[m]];
         if (!star->closed)
             add_way(own, w->moved, 0);
+        double below = -w->least[m], above = w->most[m]; /* neither is negative */
         for (unsigned k = 0; k < 3; k++) {
-            double below = -w->least[m] * normal[k], above = w->most[m] * normal[k];
-            own->of[k] += (float)(normal[k] > 0 ? below : -above);
-            own->of[3 + k] += (float)(normal[k] > 0 ? above : -below);
+            own->of[k] += (float)(below * up[k] + above * down[k]);
+            own->of[3 + k] += (float)(above * up[k] + below * down[k]);
         }
     }
 }

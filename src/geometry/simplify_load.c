@@ -56,7 +56,7 @@ static void add_rim_quadrics(simplifier *s, uint32_t point)
     for (uint32_t i = 0; i < star->count; i++)
         for (int side = 0; side < 2; side++) {
             uint32_t other = side ? star->previous[i] : star->next[i], third = side ? star->next[i] : star->previous[i];
-            if (!(strl__star_uses(star, other) & 1))
+            if (!(strl__star_uses(s, star, other) & 1))
                 continue;
             const double *u = s->sites[point].position, *v = s->sites[other].position, *w = s->sites[third].position;
             double edge[3], to_third[3], along = 0, length2 = 0, across2 = 0;
@@ -145,6 +145,7 @@ static void load_wedges(simplifier *s, strl_simplified *result)
     for (uint32_t w = 0; w < mesh->wedge_count; w++) {
         uint32_t *only = &s->sites[mesh->wedge[w].point].only_wedge;
         *only = *only == NO_INDEX ? w : SEVERAL;
+        s->sites[mesh->wedge[w].point].palette = mesh->wedge[w].palette;
         strl_oct_decode(mesh->wedge[w].normal, s->normal[w]);
         s->normal[w][3] = 0;
         for (unsigned k = 0; k < 4; k++)

@@ -3,19 +3,12 @@
 
 #include <math.h>
 
+#define ROUND_UP (1 + 1.2e-7f) /* a sum of floats is a bound again */
 #define RIM_WEIGHT 2.f
 #define SPOKE_WEIGHT 0.45f /* of a normal's change along a spoke: a dent in the shading as long as the spoke */
 
 /* The second target in quadric order is planned too where its quadric is not so many times worse. */
 #define SECOND_CHOICE 1.5
-
-double strl__quadric_at(const quadric *q, const double p[3])
-{
-    double value = q->xx * p[0] * p[0] + q->yy * p[1] * p[1] + q->zz * p[2] * p[2] +
-                   2 * (q->xy * p[0] * p[1] + q->xz * p[0] * p[2] + q->yz * p[1] * p[2]) +
-                   2 * (q->x * p[0] + q->y * p[1] + q->z * p[2]) + q->c;
-    return value > 0 ? value : 0;
-}
 
 void strl__quadric_add(quadric *to, const quadric *other)
 {
@@ -105,7 +98,7 @@ static bool link_is_disk(const simplifier *s, const strl_star *star, uint32_t to
             }
         }
     }
-    return common == strl__star_uses(star, to);
+    return common == strl__star_uses(s, star, to);
 }
 
 bool strl__leaves_surface_at(const simplifier *s, const strl_star *star, uint32_t to)
@@ -126,8 +119,8 @@ bool strl__leaves_surface_at(const simplifier *s, const strl_star *star, uint32_
 static bool wedges_can_follow(const simplifier *s, const strl_star *u_star, uint32_t to)
 {
     uint32_t seen[STAR_MAX], targets[STAR_MAX], count = 0;
-    uint32_t only = s->sites[u_star->point].only_wedge, other = s->sites[to].only_wedge;
-    if (only != NO_INDEX && other != NO_INDEX && s->mesh->wedge[only].palette == s->mesh->wedge[other].palette)
+    const site *u = &s->sites[u_star->point], *v = &s->sites[to];
+    if (u->only_wedge != NO_INDEX && v->only_wedge != NO_INDEX && u->palette == v->palette)
         return true;
     for (uint32_t i = 0; i < u_star->count; i++) {
         uint32_t wedge = s->corner[u_star->triangle[i]][u_star->corner[i]];
@@ -150,7 +143,7 @@ static bool wedges_can_follow(const simplifier *s, const strl_star *u_star, uint
 
 bool strl__may_collapse(const simplifier *s, const strl_star *star, uint32_t to)
 {
-    unsigned uses = strl__star_uses(star, to);
+    unsigned uses = strl__star_uses(s, star, to);
     const site *u = &s->sites[star->point], *v = &s->sites[to];
     if (strl__crowds(s, star, to))
         return false;
@@ -223,7 +216,7 @@ void strl__plan_collapse(const simplifier *s, const strl_star *star, uint32_t to
         longest += (u[i] - v[i]) * (u[i] - v[i]);
     change = strl__larger(change, s->desc->colour_weight * effect->spoke_colour);
     plan->to = to;
-    plan->geometric = nextafterf(strl_mesh_error(s->mesh, effect->longest), INFINITY);
+    plan->geometric = strl_mesh_error(s->mesh, effect->longest) * ROUND_UP;
     plan->deviation = sqrtf(deviation * deviation + change * change);
     float way = strl__larger((float)sqrt(longest), effect->spoke_colour > 0 ? effect->spoke_reach : 0);
     plan->shift = strl__larger(effect->all.of[REACH_SHIFT], way * fminf(1, plan->deviation));

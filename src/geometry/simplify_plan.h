@@ -4,8 +4,6 @@
 
 #include "geometry/simplify_star.h"
 
-/* Never negative. */
-double strl__quadric_at(const quadric *q, const double p[3]);
 void strl__quadric_add(quadric *to, const quadric *other);
 /* The squared distance to the plane through `on` with unit normal n, times weight. */
 void strl__quadric_add_plane(quadric *q, const double n[3], const double on[3], double weight);

@@ -179,14 +179,6 @@ bool strl__star_gather(simplifier *s, uint32_t point, strl_star *star)
     return true;
 }
 
-unsigned strl__star_uses(const strl_star *star, uint32_t point)
-{
-    for (uint32_t i = 0; i < star->neighbour_count; i++)
-        if (star->neighbour[i] == point)
-            return star->uses[i];
-    return 0;
-}
-
 uint32_t strl__fan_at(const strl_fan *fan, uint32_t point)
 {
     for (uint32_t i = 0; i < fan->n; i++)
@@ -208,11 +200,10 @@ static float attribute_difference(const simplifier *s, uint32_t a, uint32_t b)
 
 uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32_t to, uint32_t wedge, bool *exact)
 {
-    uint32_t only = s->sites[to].only_wedge;
-    if (only != NO_INDEX && s->sites[u_star->point].only_wedge != NO_INDEX &&
-        s->mesh->wedge[only].palette == s->mesh->wedge[wedge].palette && strl__star_uses(u_star, to)) {
+    const site *u = &s->sites[u_star->point], *v = &s->sites[to];
+    if (u->only_wedge != NO_INDEX && v->only_wedge != NO_INDEX && u->palette == v->palette && strl__star_uses(s, u_star, to)) {
         *exact = true;
-        return only;
+        return v->only_wedge;
     }
     for (uint32_t i = 0; i < u_star->count; i++) {
         const uint32_t *corner = s->corner[u_star->triangle[i]];

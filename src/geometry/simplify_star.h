@@ -39,6 +39,7 @@ typedef struct site {
     uint32_t head, tail; /* corners */
     uint32_t degree;     /* its live triangles */
     uint32_t only_wedge; /* its wedge where it has just one; else NO_INDEX */
+    uint32_t palette;    /* of that wedge */
     uint32_t stamp;      /* against `tick` */
     uint32_t heap_at;    /* NO_INDEX = not in the heap */
     uint8_t flags;       /* STRL_POINT_... */
@@ -137,6 +138,14 @@ static inline float strl__larger(float a, float b)
     return a > b ? a : b;
 }
 
+/* Never negative. */
+static inline double strl__quadric_at(const quadric *q, const double p[3])
+{
+    double x = q->xx * p[0] + 2 * (q->xy * p[1] + q->xz * p[2] + q->x), y = q->yy * p[1] + 2 * (q->yz * p[2] + q->y);
+    double value = x * p[0] + y * p[1] + (q->zz * p[2] + 2 * q->z) * p[2] + q->c;
+    return value > 0 ? value : 0;
+}
+
 static inline void strl__unite(reach *to, const reach *other)
 {
     for (unsigned k = 0; k < 8; k++)
@@ -163,8 +172,12 @@ static inline bool strl__crowds(const simplifier *s, const strl_star *star, uint
 
 /* Gathers the star of a point; gone corners met on the way are unlinked. False where it has more than STAR_MAX triangles. */
 bool strl__star_gather(simplifier *s, uint32_t point, strl_star *star);
-/* How many triangles hold the edge to `point` (0 = no neighbour). */
-unsigned strl__star_uses(const strl_star *star, uint32_t point);
+/* How many triangles hold the edge to `point` (0 = no neighbour). The star must be the one gathered last. */
+static inline unsigned strl__star_uses(const simplifier *s, const strl_star *star, uint32_t point)
+{
+    uint32_t stamp = s->sites[point].stamp;
+    return stamp > star->stamp ? star->uses[stamp - star->stamp - 1] : 0;
+}
 /* Where `point` stands in the fan of a manifold star; NO_INDEX where it does not. */
 uint32_t strl__fan_at(const strl_fan *fan, uint32_t point);
 /* The wedge of v that a wedge of u falls onto. *exact: a triangle of the edge says so; else it is the one of v's that looks most
