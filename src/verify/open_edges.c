@@ -139,7 +139,8 @@ static int compare_edges(const void *a, const void *b)
 
 static void visit_odd(collector *self, uint64_t *count)
 {
-    qsort(self->edges, self->count, sizeof *self->edges, compare_edges);
+    if (self->count > 0)
+        qsort(self->edges, self->count, sizeof *self->edges, compare_edges);
     for (size_t i = 0, end; i < self->count; i = end) {
         for (end = i + 1; end < self->count && strl__hash_same(self->edges[i].hash, self->edges[end].hash);)
             end++;
