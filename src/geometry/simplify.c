@@ -103,13 +103,10 @@ void strl__apply_collapse(simplifier *s, const strl_star *star, const collapse_p
         *corner = result->wedge_parent[*corner];
         f->point[star->corner[i]] = v;
         strl__append_corner(s, v, 4 * t + star->corner[i]);
-        f->reach = effect->of[i];
-        f->reach.of[REACH_DEVIATION] = plan->deviation;
-        f->reach.of[REACH_SHIFT] = plan->shift;
     }
+    strl__take_effect(s, star, plan, effect);
     s->sites[u].head = s->sites[u].tail = NO_INDEX;
     s->sites[u].degree = 0;
-    strl__receive_orphans(s, effect);
     strl__quadric_add(&s->quadrics[v], &s->quadrics[u]);
     s->sites[v].own_cost = strl__quadric_at(&s->quadrics[v], s->sites[v].position);
     s->sites[v].holders |= s->sites[u].holders;

@@ -1,6 +1,7 @@
 /* The bound of one collapse (geometry/simplify.h says why it is one). All in double: lattice offsets of a node are below 2^31,
  * so products of two are exact to a relative 2^-52. */
 #include <math.h>
+#include <string.h>
 
 #include "geometry/simplify_star.h"
 
@@ -169,13 +170,25 @@ static void note_crossings(view *w, watch *seen, collapse_effect *effect)
     }
 }
 
-/* Adds a move by t * way, t in [0, 1]; `more` in every direction. */
-static void add_way(reach *drift, const double way[3], double more)
+/* The box of a move by t * way, t in [0, 1]; `more` in every direction. */
+static void box_of_way(const double way[3], double more, float box[6])
 {
     for (unsigned k = 0; k < 3; k++) {
-        drift->of[k] += (float)((way[k] < 0 ? -way[k] : 0) + more);
-        drift->of[3 + k] += (float)((way[k] > 0 ? way[k] : 0) + more);
+        box[k] = (float)((way[k] < 0 ? -way[k] : 0) + more);
+        box[3 + k] = (float)((way[k] > 0 ? way[k] : 0) + more);
     }
+}
+
+static void add_box(float to[6], const float box[6])
+{
+    for (unsigned k = 0; k < 6; k++)
+        to[k] += box[k];
+}
+
+static void unite_boxes(float to[6], const float box[6])
+{
+    for (unsigned k = 0; k < 6; k++)
+        to[k] = strl__larger(to[k], box[k]);
 }
 
 /* A new triangle overlaps the old triangles between v and itself on its side of u; the one that holds u may overlap all.
@@ -190,6 +203,8 @@ static void drift_by_height(const view *w, collapse_effect *effect)
         up[k] = n > 0 ? n : 0;
         down[k] = n > 0 ? 0 : -n;
     }
+    float moved[6];
+    box_of_way(w->moved, 0, moved);
     reach sum = {{0}};
     for (uint32_t m = w->first; m < w->image; m++) {
         strl__unite(&sum, &w->s->faces[star->triangle[triangle[m]]].reach);
@@ -204,7 +219,7 @@ static void drift_by_height(const view *w, collapse_effect *effect)
     for (uint32_t m = 1; m + 1 < w->n; m++) {
         reach *own = &effect->of[triangle[m]];
         if (!star->closed)
-            add_way(own, w->moved, 0);
+            add_box(own->of, moved);
         double below = -w->least[m], above = w->most[m]; /* neither is negative */
         for (unsigned k = 0; k < 3; k++) {
             own->of[k] += (float)(below * up[k] + above * down[k]);
@@ -306,41 +321,74 @@ static double distance(const double a[3], const double b[3])
     return sqrt(x * x + y * y + z * z);
 }
 
-/* A vanishing triangle (u, v, x) falls onto the edge v-x. Where no triangle of the star keeps that edge, another one at v takes
- * its drift over; where none keeps the edge at all, its points are still within |v - x| of v, which the caller knows to stay.
- * Returns the longest such edge. */
-static double find_receivers(const simplifier *s, const strl_star *star, uint32_t to, collapse_effect *effect)
+/* The triangle of the star that stays and keeps the edge to x; NO_INDEX = none. */
+static uint32_t keeper_of(const strl_star *star, uint32_t to, uint32_t x)
 {
-    double most = 0;
+    for (uint32_t k = 0; k < star->count; k++)
+        if (star->next[k] != to && star->previous[k] != to && (star->next[k] == x || star->previous[k] == x))
+            return k;
+    return NO_INDEX;
+}
+
+/* What a triangle has drifted when its corner c has gone that way too. */
+static void pulled_drift(const simplifier *s, uint32_t triangle, unsigned c, const float way[6], float drift[6])
+{
+    const face *f = &s->faces[triangle];
+    memcpy(drift, f->reach.of, 6 * sizeof *drift);
+    if (!f->is_pulled) {
+        add_box(drift, way);
+        return;
+    }
+    const pull *p = &s->pulls[triangle];
+    float most[6];
+    memcpy(most, p->corner[c], sizeof most);
+    add_box(most, way);
+    unite_boxes(most, p->corner[(c + 1) % 3]);
+    unite_boxes(most, p->corner[(c + 2) % 3]);
+    memcpy(drift, p->before, sizeof p->before);
+    add_box(drift, most);
+}
+
+/* Every point of the star goes towards v by a share of the way from u. A vanishing triangle (u, v, x) falls onto the edge v-x. Where
+ * no triangle of the star keeps that edge, another one at v takes its drift over; where none keeps the edge at all, its points
+ * are still within |v - x| of v, which the caller knows to stay. */
+static void drift_straight(const simplifier *s, const strl_star *star, uint32_t to, collapse_effect *effect)
+{
+    double way[3];
+    for (unsigned k = 0; k < 3; k++)
+        way[k] = s->sites[to].position[k] - s->sites[star->point].position[k];
+    box_of_way(way, 0, effect->way);
+    effect->straight = true;
+    effect->orphan = (reach){{0}};
+    for (uint32_t i = 0; i < star->count; i++) {
+        effect->is_mixed[i] = false;
+        effect->of[i] = s->faces[star->triangle[i]].reach;
+        pulled_drift(s, star->triangle[i], star->corner[i], effect->way, effect->of[i].of);
+    }
     for (uint32_t i = 0; i < star->count; i++) {
         if (star->next[i] != to && star->previous[i] != to)
             continue;
-        uint32_t x = star->next[i] == to ? star->previous[i] : star->next[i];
-        bool kept = false, has_edge;
-        for (uint32_t k = 0; k < star->count && !kept; k++)
-            kept = star->next[k] != to && star->previous[k] != to && (star->next[k] == x || star->previous[k] == x);
-        if (kept)
+        uint32_t x = star->next[i] == to ? star->previous[i] : star->next[i], keeper = keeper_of(star, to, x);
+        if (keeper != NO_INDEX) {
+            strl__unite(&effect->of[keeper], &effect->of[i]);
+            effect->is_mixed[keeper] = true;
             continue;
+        }
+        bool has_edge;
         uint32_t receiver = triangle_beside(s, star, to, x, &has_edge);
         if (receiver != NO_INDEX)
             effect->receiver[effect->receivers++] = receiver;
-        if (!has_edge)
-            most = fmax(most, distance(s->sites[to].position, s->sites[x].position));
+        reach lost = effect->of[i];
+        double edge = has_edge ? 0 : distance(s->sites[to].position, s->sites[x].position);
+        for (unsigned k = 0; k < 6; k++)
+            lost.of[k] += (float)edge;
+        strl__unite(&effect->orphan, &lost);
+        if (receiver == NO_INDEX) /* a triangle of the star stays, see strl__leaves_surface_at */
+            for (uint32_t k = 0; k < star->count; k++) {
+                strl__unite(&effect->of[k], &lost);
+                effect->is_mixed[k] = true;
+            }
     }
-    return most;
-}
-
-/* Every point of the star goes towards v by a share of the way from u. */
-static void drift_straight(const simplifier *s, const strl_star *star, uint32_t to, collapse_effect *effect)
-{
-    double way[3], lost = find_receivers(s, star, to, effect);
-    reach all = effect->all;
-    for (unsigned k = 0; k < 3; k++)
-        way[k] = s->sites[to].position[k] - s->sites[star->point].position[k];
-    add_way(&all, way, lost);
-    for (uint32_t i = 0; i < star->count; i++)
-        effect->of[i] = all;
-    effect->orphan = all;
 }
 
 static float find_longest(const simplifier *s, const strl_star *star, uint32_t to, const collapse_effect *effect)
@@ -365,6 +413,7 @@ void strl__collapse_effect(const simplifier *s, const strl_star *star, uint32_t 
     effect->image = NO_INDEX;
     effect->weights[0] = 1, effect->weights[1] = effect->weights[2] = 0;
     effect->receivers = 0;
+    effect->straight = false;
     effect->spoke_colour = effect->spoke_normal = effect->spoke_reach = 0;
     effect->all = (reach){{0}};
     for (uint32_t i = 0; i < star->count; i++)
@@ -386,8 +435,42 @@ void strl__collapse_effect(const simplifier *s, const strl_star *star, uint32_t 
     effect->longest = find_longest(s, star, to, effect);
 }
 
-void strl__receive_orphans(simplifier *s, const collapse_effect *effect)
+/* The pull of a triangle, begun where it has none. */
+static pull *pull_of(simplifier *s, uint32_t triangle)
 {
+    face *f = &s->faces[triangle];
+    pull *p = &s->pulls[triangle];
+    if (!f->is_pulled) {
+        memset(p, 0, sizeof *p);
+        memcpy(p->before, f->reach.of, sizeof p->before);
+        f->is_pulled = true;
+    }
+    return p;
+}
+
+/* What another triangle has drifted counts for all of this one. */
+static void hold_too(simplifier *s, uint32_t triangle, const reach *other)
+{
+    face *f = &s->faces[triangle];
+    strl__unite(&f->reach, other);
+    f->is_pulled = false;
+}
+
+void strl__take_effect(simplifier *s, const strl_star *star, const collapse_plan *plan, const collapse_effect *effect)
+{
+    for (uint32_t i = 0; i < star->count; i++) {
+        uint32_t t = star->triangle[i];
+        face *f = &s->faces[t];
+        if (f->gone)
+            continue;
+        if (effect->straight && !effect->is_mixed[i])
+            add_box(pull_of(s, t)->corner[star->corner[i]], effect->way);
+        else
+            f->is_pulled = false;
+        f->reach = effect->of[i];
+        f->reach.of[REACH_DEVIATION] = plan->deviation;
+        f->reach.of[REACH_SHIFT] = plan->shift;
+    }
     for (uint32_t i = 0; i < effect->receivers; i++)
-        strl__unite(&s->faces[effect->receiver[i]].reach, &effect->orphan);
+        hold_too(s, effect->receiver[i], &effect->orphan);
 }

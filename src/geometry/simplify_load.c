@@ -91,13 +91,14 @@ static bool allocate(simplifier *s, strl_arena *arena)
     uint32_t points = s->mesh->point_count, wedges = s->mesh->wedge_count;
     s->sites = allocate_lines(arena, points);
     s->faces = allocate_lines(arena, s->mesh->triangle_count);
+    s->pulls = strl_arena_alloc(arena, s->mesh->triangle_count, sizeof *s->pulls);
     s->quadrics = strl_arena_alloc_zero(arena, points, sizeof *s->quadrics);
     s->normal = strl_arena_alloc(arena, wedges, sizeof *s->normal);
     s->colour = strl_arena_alloc(arena, wedges, sizeof *s->colour);
     s->normal_sum = strl_arena_alloc_zero(arena, wedges, sizeof *s->normal_sum);
     s->heap = strl_arena_alloc(arena, points, sizeof *s->heap);
     s->plan = strl_arena_alloc_zero(arena, points, sizeof *s->plan);
-    return s->sites && s->faces && s->quadrics && s->normal && s->colour && s->normal_sum && s->heap && s->plan;
+    return s->sites && s->faces && s->pulls && s->quadrics && s->normal && s->colour && s->normal_sum && s->heap && s->plan;
 }
 
 static bool allocate_result(const simplifier *s, strl_simplified *result, strl_arena *arena)
@@ -167,7 +168,7 @@ static void load_triangle(simplifier *s, uint32_t t, strl_simplified *result)
         f->point[c] = mesh->wedge[mesh->triangle[t][c]].point;
         strl__append_corner(s, f->point[c], 4 * t + c);
     }
-    f->gone = f->unused = 0;
+    f->gone = f->is_pulled = false;
     for (unsigned k = 0; k < 3; k++) {
         f->reach.of[k] = -mesh->drift[t].least[k];
         f->reach.of[3 + k] = mesh->drift[t].most[k];

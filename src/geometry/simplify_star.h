@@ -29,9 +29,17 @@ typedef struct face {
     uint32_t point[3];
     uint32_t next[3]; /* per corner: the next corner at the same point */
     reach reach;
-    uint32_t gone;    /* collapses have removed it */
-    uint32_t unused;
+    bool gone;        /* collapses have removed it */
+    bool is_pulled;   /* its drift comes in part from its corners, see pull */
+    uint8_t unused[6];
 } face;
+
+/* A triangle whose corners were moved in straight lines: a point of it goes by the mean of its corners' ways, weighted by where it
+ * lies, so the largest of the three bounds it, not their sum. The triangle's drift is the sum of `before` and that largest. */
+typedef struct pull {
+    float before[6];
+    float corner[3][6];
+} pull;
 
 typedef struct site {
     double position[3];
@@ -91,6 +99,9 @@ typedef struct collapse_plan {
 typedef struct collapse_effect {
     reach of[STAR_MAX];      /* by index in the star, drift only; meaningless for triangles that vanish */
     reach all;               /* of the star before */
+    bool straight;           /* the corners at u go to v in straight lines */
+    float way[6];            /* then: that line's box, */
+    bool is_mixed[STAR_MAX]; /* and which triangles of the star have taken over what others drifted */
     reach orphan;            /* of vanishing triangles that no triangle of the star takes over */
     uint32_t receiver[STAR_MAX], receivers; /* triangles at v that the orphans fall onto: their drifts must hold `orphan` too */
     uint32_t image;          /* index in the star of the triangle whose image holds u's; NO_INDEX = v itself */
@@ -113,6 +124,7 @@ typedef struct simplifier {
     site *sites;            /* per point */
     quadric *quadrics;      /* per point */
     face *faces;            /* per triangle */
+    pull *pulls;            /* per triangle, where is_pulled */
     uint32_t (*corner)[3];  /* per triangle: current wedges */
     float (*normal)[4];     /* per wedge, decoded; the last is 0 */
     float (*colour)[4];     /* per wedge, 0..1; the last is 0 */
@@ -186,7 +198,7 @@ uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32
 
 /* The bound of u -> v and what it does to attributes (simplify_bound.c). */
 void strl__collapse_effect(const simplifier *s, const strl_star *star, uint32_t to, collapse_effect *effect);
-/* Gives the receivers what they take over, once the collapse is carried out. */
-void strl__receive_orphans(simplifier *s, const collapse_effect *effect);
+/* Gives the triangles that stay their new drifts, once the collapse is carried out. */
+void strl__take_effect(simplifier *s, const strl_star *star, const collapse_plan *plan, const collapse_effect *effect);
 
 #endif
