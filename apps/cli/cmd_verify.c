@@ -34,19 +34,16 @@ static void print_checks(const strl_verify_report *report)
     }
 }
 
-static double ratio_of(const strl_verify_cut *cut)
-{
-    double measured = cut->from_input > cut->to_input ? cut->from_input : cut->to_input;
-    return measured > 0 ? cut->claimed / measured : 0;
-}
-
 static void print_cut(const char *name, uint32_t number, const strl_verify_cut *cut)
 {
+    double ratio = strl_verify_ratio(cut);
+    char text[32] = "-"; /* nothing to measure: what was simplified was flat */
+    if (ratio > 0)
+        snprintf(text, sizeof text, "%.3g", ratio);
     printf(
-        "%s %2u: error %.6g, claimed %.6g, measured %.6g from the input and %.6g to it, rms %.6g, ratio %.3g, %" PRIu64
+        "%s %2u: error %.6g, claimed %.6g, measured %.6g from the input and %.6g to it, rms %.6g, ratio %s, %" PRIu64
         " triangles\n",
-        name, number, cut->error, cut->claimed, cut->from_input, cut->to_input, cut->rms, ratio_of(cut),
-        cut->triangles);
+        name, number, cut->error, cut->claimed, cut->from_input, cut->to_input, cut->rms, text, cut->triangles);
 }
 
 static void print_report(const char *model, const strl_verify_report *report)
@@ -92,7 +89,7 @@ static json_t *json_cuts(const strl_verify_cut *cuts, uint32_t count)
         json_array_append_new(
             array, json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:I, s:I, s:I}", "error", cut->error, "claimed",
                              cut->claimed, "measured_from_input", cut->from_input, "measured_to_input", cut->to_input,
-                             "rms", cut->rms, "claimed_over_measured", ratio_of(cut), "nodes", (json_int_t)cut->nodes,
+                             "rms", cut->rms, "claimed_over_measured", strl_verify_ratio(cut), "nodes", (json_int_t)cut->nodes,
                              "triangles", (json_int_t)cut->triangles, "points", (json_int_t)cut->points));
     }
     return array;

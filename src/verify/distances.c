@@ -8,6 +8,9 @@
 
 #include "base/fail.h"
 
+/* Of a claim: a distance so small is the rounding of what measures it. */
+#define NOTHING_SHARE 1e-9
+
 typedef struct comparison {
     strl__model *model;
     const strl__vtree *tree;
@@ -161,14 +164,20 @@ static int compare_doubles(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
+double strl_verify_ratio(const strl_verify_cut *cut)
+{
+    double measured = fmax(cut->from_input, cut->to_input);
+    return measured > NOTHING_SHARE * cut->claimed ? cut->claimed / measured : 0;
+}
+
 static void summarise(strl_verify_report *report)
 {
     double ratio[STRL_VERIFY_UNIFORM_CUTS];
     uint32_t count = 0;
     for (uint32_t i = 0; i < report->uniform_count; i++) {
-        double measured = fmax(report->uniform[i].from_input, report->uniform[i].to_input);
-        if (measured > 0)
-            ratio[count++] = report->uniform[i].claimed / measured;
+        double one = strl_verify_ratio(&report->uniform[i]);
+        if (one > 0)
+            ratio[count++] = one;
     }
     if (count == 0)
         return;

@@ -54,6 +54,9 @@ typedef struct strl_verify_cut {
     uint64_t points; /* measured, both directions */
 } strl_verify_cut;
 
+/* Claimed over measured; 0 where the distance measured is nothing but the rounding of the measurement. */
+double strl_verify_ratio(const strl_verify_cut *cut);
+
 /* Zero-initialise the desc: every 0 takes its default. */
 typedef struct strl_verify_desc {
     const char *model;
@@ -86,7 +89,7 @@ typedef struct strl_verify_report {
     uint32_t uniform_count;  /* 0 without inputs */
     strl_verify_cut *levels; /* owned; [level_count] all nodes of a level in their base state */
     uint32_t level_count;
-    double claimed_over_measured_median; /* of the uniform cuts; 0 without inputs */
+    double claimed_over_measured_median; /* of the uniform cuts where something was measured; 0 = nowhere */
     double worst_claimed_over_measured;  /* the least of the uniform cuts: below 1 is a broken claim */
 } strl_verify_report;
 
