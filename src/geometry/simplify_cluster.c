@@ -119,6 +119,41 @@ static void choose_representatives(clustering *c, double size)
     }
 }
 
+/* Whether some triangle of the star becomes the double of one at `to`, with which it may go (duplicates.c). The star's stamps must be in
+ * force. */
+static bool makes_double(const simplifier *s, const strl_star *star, uint32_t to)
+{
+    uint32_t scanned = 0;
+    for (uint32_t corner = s->sites[to].head, next; corner != NO_INDEX && scanned < SCAN_MAX; corner = next, scanned++) {
+        const face *f = &s->faces[corner >> 2];
+        unsigned c = corner & 3;
+        next = f->next[c];
+        if (!f->gone && s->sites[f->point[(c + 1) % 3]].stamp > star->stamp && s->sites[f->point[(c + 2) % 3]].stamp > star->stamp)
+            return true;
+    }
+    return false;
+}
+
+/* Whether a triangle of the star has another corner in the star's cell: it will vanish when that one comes too. Merging points of triangles
+ * that reach further costs error and takes nothing away. */
+static bool can_take_away(const simplifier *s, const strl_star *star, const cell_slot *slot, double size)
+{
+    for (uint32_t i = 0; i < star->neighbour_count; i++) {
+        const double *p = s->sites[star->neighbour[i]].position;
+        if ((int64_t)floor(p[0] / size) == slot->cell[0] && (int64_t)floor(p[1] / size) == slot->cell[1] &&
+            (int64_t)floor(p[2] / size) == slot->cell[2])
+            return true;
+    }
+    return false;
+}
+
+/* A merge that takes no triangle away must not gather so many that the point cannot move any more: where all points are such hubs,
+ * nothing goes on. */
+static bool makes_hub(const simplifier *s, const strl_star *star, uint32_t to)
+{
+    return s->sites[to].degree + star->count > STAR_MAX && strl__star_uses(s, star, to) == 0;
+}
+
 static void merge_cells(clustering *c, double size, float limit, bool disjoint_only, strl_simplified *result)
 {
     simplifier *s = c->s;
@@ -126,15 +161,22 @@ static void merge_cells(clustering *c, double size, float limit, bool disjoint_o
     for (uint32_t p = 0; p < s->mesh->point_count && s->triangles_left > s->desc->target_triangles; p++) {
         const strl_star *star = &s->star;
         collapse_plan plan;
-        uint32_t to = find_cell(c, s->sites[p].position, size)->point;
+        cell_slot *slot = find_cell(c, s->sites[p].position, size);
+        uint32_t to = slot->point;
         if ((s->mesh->flags[p] & STRL_POINT_KEPT) || to == p || to == NO_INDEX || !is_on_surface(s, p) ||
             !is_on_surface(s, to))
             continue;
         bool same = find_root(c->component, p) == find_root(c->component, to);
         if ((same && disjoint_only) || !strl__star_gather(s, p, &s->star) || star->count == 0)
             continue;
+        if (!can_take_away(s, star, slot, size) && !makes_double(s, star, to))
+            continue;
         s->rung = same ? STRL_SIMPLIFY_CLUSTERING : STRL_SIMPLIFY_DISJOINT;
-        if (strl__crowds(s, star, to) || !strl__leaves_surface_at(s, star, to))
+        if (strl__crowds(s, star, to) || makes_hub(s, star, to)) {
+            slot->point = p; /* the others may still come here */
+            continue;
+        }
+        if (!strl__leaves_surface_at(s, star, to))
             continue;
         strl__plan_collapse(s, star, to, &plan, &s->effect);
         if (plan.key > limit)

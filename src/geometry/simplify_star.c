@@ -4,8 +4,6 @@
 
 /* Larger than any difference of attributes. */
 #define OTHER_PALETTE 1e6f
-/* So many corners of a point are looked at for a wedge: where ladder moves have gathered thousands, others are no better. */
-#define SCAN_MAX 256u
 
 /* Which neighbour each triangle's next and previous points are. */
 typedef struct sides {

@@ -10,6 +10,8 @@
 #define STAR_MAX 64u /* triangles; a point with more is left alone */
 #define RING_MAX (STAR_MAX + 1)
 #define CROWD_MAX 4096u /* triangles that collapses may gather at a point */
+#define SCAN_MAX 256u /* of its corners are looked at in search of a wedge or a face: where ladder moves have gathered thousands, the
+                       * others are no better */
 #define NO_INDEX UINT32_MAX
 
 typedef struct quadric {

@@ -35,8 +35,7 @@ def make(folder, scene):
 
 def triangles_drawn(folder, model, path, frames, *more):
     stats = os.path.join(folder, "stats.jsonl")
-    must("render", model, "--path", path, "--size", SIZE, "--error", "1", "--stats", stats, "-o",
-         os.path.join(folder, "drawn"), "--quiet", *more)
+    must("render", model, "--path", path, "--size", SIZE, "--error", "1", "--stats", stats, "--quiet", *more)
     with open(stats) as file:
         counts = [json.loads(line)["triangles"] for line in file]
     assert len(counts) == frames
@@ -49,7 +48,7 @@ def a_painted_plane_keeps_its_picture(folder):
     reference = os.path.join(folder, "reference")
     must("render", source, "--full", "--path", path, "--size", SIZE, "--supersample", "4", "--depth", "-o",
          reference, "--quiet")
-    counts = triangles_drawn(folder, model, path, frames, "--supersample", "4", "--depth")
+    counts = triangles_drawn(folder, model, path, frames, "--supersample", "4", "--depth", "-o", os.path.join(folder, "drawn"))
     done = run("compare", reference, os.path.join(folder, "drawn"), "--error", "1", "--psnr", "30", "--json")
     print(done.output.strip()[:600], counts, flush=True)
     assert done.code == 0, done

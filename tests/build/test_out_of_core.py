@@ -11,7 +11,7 @@ from building import MIB, check_result, must, run_tests, sanitizers, skip
 
 
 class DiskWatch:
-    """The most bytes that the files of a folder took while it was watched."""
+    """The most bytes that the files of a folder took while it was watched; the unfinished output (*.part) is no scratch."""
 
     def __init__(self, folder):
         self.folder, self.most, self.stop = folder, 0, threading.Event()
@@ -22,7 +22,8 @@ class DiskWatch:
             size = 0
             try:
                 for entry in os.scandir(self.folder):
-                    size += entry.stat().st_blocks * 512
+                    if not entry.name.endswith(".part"):
+                        size += entry.stat().st_blocks * 512
             except OSError:
                 continue
             self.most = max(self.most, size)
