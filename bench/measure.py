@@ -34,8 +34,12 @@ def system_name():
 
 
 def commit_of(root):
-    done = subprocess.run(["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=10"],
-                          stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    """What git calls the checkout; "unknown" where there is no git or no repository."""
+    command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=10"]
+    try:
+        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    except FileNotFoundError:
+        return "unknown"
     return done.stdout.strip() or "unknown"
 
 
