@@ -25,6 +25,9 @@ typedef struct strl_drift {
 /* The longest way in the box. */
 float strl_drift_length(const strl_drift *drift);
 
+/* A sum of two floats times this is not below the true sum, whatever the rounding. */
+#define STRL_ROUND_UP (1 + 2.4e-7f)
+
 /* Point flags. */
 #define STRL_POINT_KEPT 1u    /* must not be removed: another node has it too, or the caller says so */
 /* Known to nodes outside the piece: its attributes stay, and it must not get into parts that do not have it yet. */

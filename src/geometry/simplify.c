@@ -151,7 +151,7 @@ static float estimate_key(const simplifier *s, uint32_t point)
     double weight = q->xx + q->yy + q->zz; /* of unit normals */
     if (weight > 0 && off_planes < INFINITY)
         drift += ESTIMATE_SHARE * (float)sqrt(off_planes / weight);
-    return strl__larger(shift, s->mesh->start_error + drift);
+    return strl__larger(shift, strl_mesh_error(s->mesh, drift));
 }
 
 static void push_all(simplifier *s)
@@ -218,6 +218,8 @@ static bool recall_plan(simplifier *s, uint32_t point)
     if (!strl__star_gather(s, point, &s->star) || s->star.count == 0 || !strl__may_collapse(s, &s->star, s->plan[point].to))
         return false;
     strl__plan_collapse(s, &s->star, s->plan[point].to, &again, &s->effect);
+    again.key = s->plan[point].key; /* what was compared */
+    s->plan[point] = again;
     return true;
 }
 
@@ -248,7 +250,8 @@ static float first_rung_limit(const simplifier *s, float start)
  * far behind: then the next rungs do the same for less. Returns the largest key. */
 static float run_rung(simplifier *s, float limit, bool adaptive, strl_simplified *result)
 {
-    uint32_t half = s->mesh->triangle_count - (s->mesh->triangle_count - s->desc->target_triangles) / 2;
+    uint32_t all = s->mesh->triangle_count, target = s->desc->target_triangles;
+    uint32_t half = all - (all > target ? all - target : 0) / 2;
     float reached = 0;
     push_all(s);
     while (s->heap_count && s->heap[0].key <= limit && wants_more(s, s->heap[0].key)) {

@@ -5,7 +5,8 @@
  * patches are height fields over one polygon along the patch's normal, the bound is their largest difference in height, which
  * is attained at u or where an old spoke crosses a new one; everywhere, the way from u to v is a bound too, because moving u
  * linearly onto v maps the old patch onto the new one. These maps are chained: a triangle's drift is the box that holds the
- * drifts of the triangles it overlaps, plus its own move, so its length bounds the distance to the start. */
+ * drifts of the triangles it overlaps, plus its own move, so its length bounds the distance to the start. Corners that were moved in
+ * straight lines count by the largest of a triangle's three, not by their sum. */
 #ifndef STRL_GEOMETRY_SIMPLIFY_H
 #define STRL_GEOMETRY_SIMPLIFY_H
 

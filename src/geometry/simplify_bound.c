@@ -182,7 +182,7 @@ static void box_of_way(const double way[3], double more, float box[6])
 static void add_box(float to[6], const float box[6])
 {
     for (unsigned k = 0; k < 6; k++)
-        to[k] += box[k];
+        to[k] = (to[k] + box[k]) * STRL_ROUND_UP;
 }
 
 static void unite_boxes(float to[6], const float box[6])
@@ -222,8 +222,8 @@ static void drift_by_height(const view *w, collapse_effect *effect)
             add_box(own->of, moved);
         double below = -w->least[m], above = w->most[m]; /* neither is negative */
         for (unsigned k = 0; k < 3; k++) {
-            own->of[k] += (float)(below * up[k] + above * down[k]);
-            own->of[3 + k] += (float)(above * up[k] + below * down[k]);
+            own->of[k] = (own->of[k] + (float)(below * up[k] + above * down[k])) * STRL_ROUND_UP;
+            own->of[3 + k] = (own->of[3 + k] + (float)(above * up[k] + below * down[k])) * STRL_ROUND_UP;
         }
     }
 }
@@ -381,7 +381,7 @@ static void drift_straight(const simplifier *s, const strl_star *star, uint32_t 
         reach lost = effect->of[i];
         double edge = has_edge ? 0 : distance(s->sites[to].position, s->sites[x].position);
         for (unsigned k = 0; k < 6; k++)
-            lost.of[k] += (float)edge;
+            lost.of[k] = (lost.of[k] + (float)edge) * STRL_ROUND_UP;
         strl__unite(&effect->orphan, &lost);
         if (receiver == NO_INDEX) /* a triangle of the star stays, see strl__leaves_surface_at */
             for (uint32_t k = 0; k < star->count; k++) {

@@ -16,6 +16,7 @@ typedef struct cell_slot {
 
 typedef struct clustering {
     simplifier *s;
+    double origin[3];    /* of the grid: the least corner, so that a cell can hold everything */
     uint32_t *component; /* per point: union-find */
     cell_slot *slots;
     uint32_t mask;
@@ -39,12 +40,17 @@ static void unite(uint32_t *component, uint32_t a, uint32_t b)
         component[a] = b;
 }
 
+static int64_t cell_of(const clustering *c, const double p[3], unsigned axis, double size)
+{
+    return (int64_t)floor((p[axis] - c->origin[axis]) / size);
+}
+
 static cell_slot *find_cell(clustering *c, const double p[3], double size)
 {
     int64_t cell[3];
     uint64_t hash = 0;
-    for (int k = 0; k < 3; k++) {
-        cell[k] = (int64_t)floor(p[k] / size);
+    for (unsigned k = 0; k < 3; k++) {
+        cell[k] = cell_of(c, p, k, size);
         hash = strl__mix64(hash ^ (uint64_t)cell[k]);
     }
     uint32_t at = (uint32_t)hash & c->mask;
@@ -67,8 +73,13 @@ static bool prepare(clustering *c, simplifier *s, strl_arena *arena)
     c->slots = strl_arena_alloc(arena, size, sizeof *c->slots);
     if (!c->component || !c->slots)
         return false;
-    for (uint32_t p = 0; p < points; p++)
+    for (unsigned k = 0; k < 3; k++)
+        c->origin[k] = INFINITY;
+    for (uint32_t p = 0; p < points; p++) {
         c->component[p] = p;
+        for (unsigned k = 0; k < 3; k++)
+            c->origin[k] = fmin(c->origin[k], s->sites[p].position[k]);
+    }
     for (uint32_t t = 0; t < s->mesh->triangle_count; t++)
         for (unsigned k = 1; k < 3 && !s->faces[t].gone; k++)
             unite(c->component, s->faces[t].point[0], s->faces[t].point[k]);
@@ -87,11 +98,11 @@ static bool is_fixed(const simplifier *s, uint32_t point)
     return (s->mesh->flags[point] & STRL_POINT_KEPT) || s->sites[point].degree > STAR_MAX;
 }
 
-static double squared_from_centre(const cell_slot *slot, const double p[3], double size)
+static double squared_from_centre(const clustering *c, const cell_slot *slot, const double p[3], double size)
 {
     double sum = 0;
-    for (int k = 0; k < 3; k++) {
-        double d = p[k] - ((double)slot->cell[k] + 0.5) * size;
+    for (unsigned k = 0; k < 3; k++) {
+        double d = p[k] - c->origin[k] - ((double)slot->cell[k] + 0.5) * size;
         sum += d * d;
     }
     return sum;
@@ -113,8 +124,8 @@ static void choose_representatives(clustering *c, double size)
         }
         bool fixed = is_fixed(s, p), other_fixed = is_fixed(s, slot->point);
         if (fixed != other_fixed ? fixed
-                                 : squared_from_centre(slot, s->sites[p].position, size) <
-                                       squared_from_centre(slot, s->sites[slot->point].position, size))
+                                 : squared_from_centre(c, slot, s->sites[p].position, size) <
+                                       squared_from_centre(c, slot, s->sites[slot->point].position, size))
             slot->point = p;
     }
 }
@@ -128,20 +139,26 @@ static bool makes_double(const simplifier *s, const strl_star *star, uint32_t to
         const face *f = &s->faces[corner >> 2];
         unsigned c = corner & 3;
         next = f->next[c];
-        if (!f->gone && s->sites[f->point[(c + 1) % 3]].stamp > star->stamp && s->sites[f->point[(c + 2) % 3]].stamp > star->stamp)
-            return true;
+        uint32_t a = f->point[(c + 1) % 3], b = f->point[(c + 2) % 3];
+        if (f->gone || s->sites[a].stamp <= star->stamp || s->sites[b].stamp <= star->stamp)
+            continue;
+        for (uint32_t i = 0; i < star->count; i++)
+            if ((star->next[i] == a && star->previous[i] == b) || (star->next[i] == b && star->previous[i] == a))
+                return true;
     }
     return false;
 }
 
 /* Whether a triangle of the star has another corner in the star's cell: it will vanish when that one comes too. Merging points of triangles
  * that reach further costs error and takes nothing away. */
-static bool can_take_away(const simplifier *s, const strl_star *star, const cell_slot *slot, double size)
+static bool can_take_away(const clustering *c, const strl_star *star, const cell_slot *slot, double size)
 {
     for (uint32_t i = 0; i < star->neighbour_count; i++) {
-        const double *p = s->sites[star->neighbour[i]].position;
-        if ((int64_t)floor(p[0] / size) == slot->cell[0] && (int64_t)floor(p[1] / size) == slot->cell[1] &&
-            (int64_t)floor(p[2] / size) == slot->cell[2])
+        const double *p = c->s->sites[star->neighbour[i]].position;
+        bool inside = true;
+        for (unsigned k = 0; k < 3; k++)
+            inside = inside && cell_of(c, p, k, size) == slot->cell[k];
+        if (inside)
             return true;
     }
     return false;
@@ -169,7 +186,7 @@ static void merge_cells(clustering *c, double size, float limit, bool disjoint_o
         bool same = find_root(c->component, p) == find_root(c->component, to);
         if ((same && disjoint_only) || !strl__star_gather(s, p, &s->star) || star->count == 0)
             continue;
-        if (!can_take_away(s, star, slot, size) && !makes_double(s, star, to))
+        if (!can_take_away(c, star, slot, size) && !makes_double(s, star, to))
             continue;
         s->rung = same ? STRL_SIMPLIFY_CLUSTERING : STRL_SIMPLIFY_DISJOINT;
         if (strl__crowds(s, star, to) || makes_hub(s, star, to)) {

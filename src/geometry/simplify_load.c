@@ -87,7 +87,7 @@ static void *allocate_lines(strl_arena *arena, size_t count)
 
 static bool allocate(simplifier *s, strl_arena *arena)
 {
-    _Static_assert(sizeof(site) <= CACHE_LINE && sizeof(face) == CACHE_LINE, "one cache line each");
+    _Static_assert(sizeof(site) == CACHE_LINE && sizeof(face) == CACHE_LINE, "one cache line each");
     uint32_t points = s->mesh->point_count, wedges = s->mesh->wedge_count;
     s->sites = allocate_lines(arena, points);
     s->faces = allocate_lines(arena, s->mesh->triangle_count);

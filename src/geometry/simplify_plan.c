@@ -3,7 +3,6 @@
 
 #include <math.h>
 
-#define ROUND_UP (1 + 1.2e-7f) /* a sum of floats is a bound again */
 #define RIM_WEIGHT 2.f
 #define SPOKE_WEIGHT 0.45f /* of a normal's change along a spoke: a dent in the shading as long as the spoke */
 
@@ -216,7 +215,7 @@ void strl__plan_collapse(const simplifier *s, const strl_star *star, uint32_t to
         longest += (u[i] - v[i]) * (u[i] - v[i]);
     change = strl__larger(change, s->desc->colour_weight * effect->spoke_colour);
     plan->to = to;
-    plan->geometric = strl_mesh_error(s->mesh, effect->longest) * ROUND_UP;
+    plan->geometric = strl_mesh_error(s->mesh, effect->longest) * STRL_ROUND_UP;
     plan->deviation = sqrtf(deviation * deviation + change * change);
     float way = strl__larger((float)sqrt(longest), effect->spoke_colour > 0 ? effect->spoke_reach : 0);
     plan->shift = strl__larger(effect->all.of[REACH_SHIFT], way * fminf(1, plan->deviation));

@@ -27,6 +27,11 @@ static uint8_t count_use(simplifier *s, strl_star *star, uint32_t point)
 static void count_uses(simplifier *s, strl_star *star, sides *at)
 {
     star->neighbour_count = 0;
+    if (s->tick > UINT32_MAX - 2 * STAR_MAX - 1) {
+        for (uint32_t p = 0; p < s->mesh->point_count; p++)
+            s->sites[p].stamp = 0;
+        s->tick = 0;
+    }
     star->stamp = s->tick;
     for (uint32_t i = 0; i < star->count; i++) {
         at->next[i] = count_use(s, star, star->next[i]);

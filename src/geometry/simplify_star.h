@@ -33,7 +33,7 @@ typedef struct face {
     reach reach;
     bool gone;        /* collapses have removed it */
     bool is_pulled;   /* its drift comes in part from its corners, see pull */
-    uint8_t unused[6];
+    uint8_t unused[6]; /* to the end of the cache line */
 } face;
 
 /* A triangle whose corners were moved in straight lines: a point of it goes by the mean of its corners' ways, weighted by where it

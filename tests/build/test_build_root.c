@@ -170,6 +170,24 @@ static void twenty_points_with_a_hundred_thousand_triangles(void **state)
     check_mesh(&mesh, "twenty points", 40);
 }
 
+/* None shares an edge, and corners of one triangle are a cube's edge apart. */
+static void triangles_between_the_corners_of_a_cube(void **state)
+{
+    (void)state;
+    mesh_file mesh = {0};
+    uint64_t random = 21;
+    for (uint32_t t = 0; t < 100000 / SMALLER; t++) {
+        uint32_t first = mesh_below(&random, 8), step = 1 + mesh_below(&random, 3);
+        for (uint32_t c = 0; c < 3; c++) {
+            uint32_t at = (first + c * step) % 8;
+            mesh_file_add_vertex(&mesh, (at & 1) + 0.01 * unit(&random), (at >> 1 & 1) + 0.01 * unit(&random),
+                                 (at >> 2) + 0.01 * unit(&random));
+        }
+        mesh_file_add_face(&mesh, 3 * t, 3 * t + 1, 3 * t + 2);
+    }
+    check_mesh(&mesh, "cube", 400);
+}
+
 static void a_strip_as_thin_as_a_line(void **state)
 {
     (void)state;
@@ -258,6 +276,7 @@ int main(void)
         cmocka_unit_test(a_book_of_forty_thousand_pages),
         cmocka_unit_test(one_triangle_a_hundred_thousand_times),
         cmocka_unit_test(twenty_points_with_a_hundred_thousand_triangles),
+        cmocka_unit_test(triangles_between_the_corners_of_a_cube),
         cmocka_unit_test(a_strip_as_thin_as_a_line),
         cmocka_unit_test(all_points_on_one_line),
         cmocka_unit_test(a_grid_far_from_the_origin),

@@ -137,16 +137,17 @@ static bool find_holders(group_work *work, uint32_t *const *point_of, strl_arena
     return true;
 }
 
-/* The diagonal of the box that holds the group and the input it stands for. */
-static float most_error(const level_stage *stage, const group_work *work)
+/* The diagonal of the box that holds the group and the input it stands for: that of the children's groups, because a triangle may
+ * have taken over what one of another member of its group stood for. */
+static float diagonal_of_group(const level_stage *stage, const group_work *work)
 {
     double squared = 0;
     for (int k = 0; k < 3; k++) {
         int64_t least = INT64_MAX, most = INT64_MIN;
         for (uint32_t i = 0; i < work->child_count; i++) {
             const strl_node *record = &stage->children->nodes[2 * work->member[i / 2] + (i & 1)].record;
-            least = record->box_min[k] < least ? record->box_min[k] : least;
-            most = record->box_max[k] > most ? record->box_max[k] : most;
+            least = record->group_box_min[k] < least ? record->group_box_min[k] : least;
+            most = record->group_box_max[k] > most ? record->group_box_max[k] : most;
         }
         squared += (double)(most - least) * (double)(most - least);
     }
@@ -162,7 +163,7 @@ static strl_status merge_children(const level_stage *stage, group_work *work, st
     strl_status status = strl_node_mesh_merge(list, work->child_count, arena, &work->merged, &work->owner, point_of, err);
     if (status)
         return status;
-    work->merged.mesh.most_error = most_error(stage, work);
+    work->merged.mesh.most_error = diagonal_of_group(stage, work);
     for (uint32_t t = 0; t < work->merged.mesh.triangle_count; t++)
         work->owner[t] /= 2;
     if (work->merged.mesh.triangle_count > work->count * CROWDED_TRIANGLES) {
