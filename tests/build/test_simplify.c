@@ -146,6 +146,34 @@ static void seams_have_parents_of_their_own_palette(void **state)
             }
 }
 
+/* The new surface and the start lie in one box, so no claim needs to pass its diagonal; and what is claimed there is true. */
+static void no_claim_passes_the_diagonal_that_is_given(void **state)
+{
+    (void)state;
+    unsigned stopped = 0;
+    for (const mesh_kind *kind = mesh_kinds; kind->name; kind++) {
+        run r;
+        run_begin(&r, kind, 9, STRL_SIMPLIFY_CLUSTERING);
+        double squared = 0;
+        for (int k = 0; k < 3; k++) {
+            double least = r.mesh.position[0][k], most = least;
+            for (uint32_t p = 1; p < r.mesh.point_count; p++) {
+                least = fmin(least, r.mesh.position[p][k]);
+                most = fmax(most, r.mesh.position[p][k]);
+            }
+            squared += (most - least) * (most - least);
+        }
+        r.mesh.most_error = nextafterf((float)sqrt(squared), INFINITY);
+        run_simplify(&r);
+        assert_true(r.result.geometric <= r.mesh.most_error * 1.00001f && r.result.appearance <= r.mesh.most_error * 1.00001f);
+        stopped += r.result.geometric >= r.mesh.most_error || r.result.appearance >= r.mesh.most_error;
+        run_check_order(&r);
+        run_measure(&r);
+        run_end(&r);
+    }
+    assert_true(stopped > 0); /* some would have claimed more */
+}
+
 static void the_limits_that_are_asked_for_hold(void **state)
 {
     (void)state;
@@ -279,6 +307,7 @@ int main(void)
         cmocka_unit_test(an_error_at_the_start_is_added_to),
         cmocka_unit_test(errors_and_counts_go_one_way_and_kept_points_stay),
         cmocka_unit_test(seams_have_parents_of_their_own_palette),
+        cmocka_unit_test(no_claim_passes_the_diagonal_that_is_given),
         cmocka_unit_test(the_limits_that_are_asked_for_hold),
         cmocka_unit_test(the_edge_of_a_disc_moves_no_farther_than_claimed),
         cmocka_unit_test(each_failed_allocation_is_one_clean_failure),
