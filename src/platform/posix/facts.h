@@ -22,6 +22,8 @@ strl_status strl__file_create_unique(char *path, size_t random_at, const char *s
                                      strl_error *err);
 /* strl_file_create_nameless; its sentences name `shown`. */
 strl_status strl__file_create_nameless(const char *folder, const char *shown, strl_file **file, strl_error *err);
+/* strl_lock_acquire; *held: it failed because another process has the lock. */
+strl_status strl__lock_acquire(const char *path, strl_lock **lock, bool *held, strl_error *err);
 int strl__file_descriptor(const strl_file *file); /* borrowed */
 
 void strl__file_info_fill(strl_file_info *info, const struct stat *facts);

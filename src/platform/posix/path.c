@@ -177,7 +177,14 @@ static bool is_named(int descriptor, const char *path)
 
 strl_status strl_lock_acquire(const char *path, strl_lock **lock, strl_error *err)
 {
+    bool held;
+    return strl__lock_acquire(path, lock, &held, err);
+}
+
+strl_status strl__lock_acquire(const char *path, strl_lock **lock, bool *held, strl_error *err)
+{
     *lock = NULL;
+    *held = false;
     strl_lock *made = strl__alloc(1, sizeof *made);
     if (!made)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to lock %s", strl__path_shown(path));
@@ -195,7 +202,8 @@ strl_status strl_lock_acquire(const char *path, strl_lock **lock, strl_error *er
         if (!code || code == EINTR)
             continue;
         strl__free(made);
-        if (code == EWOULDBLOCK)
+        *held = code == EWOULDBLOCK;
+        if (*held)
             return strl__fail(err, STRL_ERR_IO, "%s is locked: another process is using it", strl__path_shown(path));
         return strl__fail_system(err, code, "lock", path);
     }

@@ -15,13 +15,15 @@
 #define LOCK_NAME "lock"
 /* What the lock file says: the folder is ours to clear. */
 #define SIGNATURE "stroll scratch folder: the next run of the same output clears it\n"
-#define MOST_ATTEMPTS 100
+#define NOT_OURS "there is one, and it was not made by a build"
+#define MOST_ATTEMPTS 20
 
 struct strl_scratch {
     char *path, *lock_path; /* owned */
     char *made_parent;      /* owned; NULL = it was there before */
     const char *const *names;
     strl_lock *lock; /* NULL until the folder is ours */
+    bool held;       /* by another process */
 };
 
 static bool is_ours(const strl_scratch *scratch, int folder, const char *name)
@@ -82,19 +84,37 @@ static bool remove_ours(strl_scratch *scratch, int folder, const char *name, str
     return true;
 }
 
-static bool is_signed(const strl_scratch *scratch)
+static bool must_be_absent(strl_scratch *scratch, int folder, const char *name, strl_error *err)
+{
+    (void)scratch, (void)folder, (void)name, (void)err;
+    return false;
+}
+
+/* Elsewhere the lock would be a new file in somebody's folder. The files come first: as long as a run has any, its lock
+ * file is there. */
+static bool can_be_locked(strl_scratch *scratch)
+{
+    struct stat facts;
+    bool empty = each_file(scratch, must_be_absent, NULL);
+    return lstat(scratch->lock_path, &facts) == 0 ? S_ISREG(facts.st_mode) : empty && errno == ENOENT;
+}
+
+/* Asked under the lock: before, another process may be about to sign. What ended between making its folder and signing
+ * it has left nothing but, perhaps, a lock file without a word. */
+static strl_status must_be_signed(strl_scratch *scratch, strl_error *err)
 {
     char text[sizeof SIGNATURE];
-    struct stat facts;
     strl_file *file = NULL;
     size_t got = 0;
-    if (lstat(scratch->lock_path, &facts) != 0 || !S_ISREG(facts.st_mode) ||
-        strl_file_open(scratch->lock_path, &file, NULL) != STRL_OK)
-        return false;
-    bool same = strl_file_read_some(file, 0, text, sizeof text, &got, NULL) == STRL_OK &&
-                got == sizeof SIGNATURE - 1 && memcmp(text, SIGNATURE, got) == 0;
+    strl_status status = strl_file_open(scratch->lock_path, &file, err);
+    if (status == STRL_OK)
+        status = strl_file_read_some(file, 0, text, sizeof text, &got, err);
     strl_file_close(file, NULL);
-    return same;
+    if (status != STRL_OK)
+        return status;
+    bool ours = got == 0 ? each_file(scratch, must_be_absent, NULL)
+                         : got == sizeof SIGNATURE - 1 && memcmp(text, SIGNATURE, got) == 0;
+    return ours ? STRL_OK : refuse(scratch, err, NOT_OURS);
 }
 
 static strl_status sign(const strl_scratch *scratch, strl_error *err)
@@ -113,13 +133,14 @@ static strl_status take_over(strl_scratch *scratch, strl_error *err)
     struct stat facts;
     if (lstat(scratch->path, &facts) == 0 && !S_ISDIR(facts.st_mode))
         return refuse(scratch, err, "there is something of that name, and it is not a folder");
-    if (!is_signed(scratch))
-        return refuse(scratch, err, "there is one, and it was not made by a build");
-    strl_status status = strl_lock_acquire(scratch->lock_path, &scratch->lock, err);
+    if (!can_be_locked(scratch))
+        return refuse(scratch, err, NOT_OURS);
+    strl_status status = strl__lock_acquire(scratch->lock_path, &scratch->lock, &scratch->held, err);
     if (status != STRL_OK)
         return status;
     strl_error inner = {.status = STRL_ERR_IO};
-    bool good = each_file(scratch, must_be_ours, &inner) && each_file(scratch, remove_ours, &inner);
+    bool good = must_be_signed(scratch, &inner) == STRL_OK && each_file(scratch, must_be_ours, &inner) &&
+                each_file(scratch, remove_ours, &inner);
     /* Signed anew: its last holder may have removed the lock file just before we made it again. */
     if (good)
         return sign(scratch, err);
@@ -130,27 +151,22 @@ static strl_status take_over(strl_scratch *scratch, strl_error *err)
 
 static strl_status lock_new(strl_scratch *scratch, strl_error *err)
 {
-    strl_status status = strl_lock_acquire(scratch->lock_path, &scratch->lock, err);
-    if (status != STRL_OK) {
-        unlink(scratch->lock_path); /* created before memory ended */
-        rmdir(scratch->path);
-        return status;
-    }
-    return sign(scratch, err);
+    strl_status status = strl__lock_acquire(scratch->lock_path, &scratch->lock, &scratch->held, err);
+    if (status == STRL_ERR_MEMORY)
+        rmdir(scratch->path); /* else it is another process's by now, or gone */
+    return status == STRL_OK ? sign(scratch, err) : status;
 }
 
 static strl_status make(strl_scratch *scratch, strl_error *err)
 {
     strl_status status = STRL_OK;
     for (int attempt = 0; attempt < MOST_ATTEMPTS; attempt++) {
-        struct stat facts;
-        if (mkdir(scratch->path, 0777) == 0)
-            return lock_new(scratch, err);
-        if (errno != EEXIST)
+        bool made = mkdir(scratch->path, 0777) == 0;
+        if (!made && errno != EEXIST)
             return strl__fail_system(err, errno, "create folder", scratch->path);
-        status = take_over(scratch, err);
-        /* Gone meanwhile: its holder ended. */
-        if (status == STRL_OK || scratch->lock || lstat(scratch->path, &facts) == 0)
+        status = made ? lock_new(scratch, err) : take_over(scratch, err);
+        /* Anything else may be the work of another process that begins or ends just now. */
+        if (status == STRL_OK || status == STRL_ERR_MEMORY || scratch->lock || scratch->held)
             return status;
     }
     return status;
