@@ -172,39 +172,17 @@ static strl_status write_header(strl__ply_writer *writer, strl_error *err)
     return strl_file_write(writer->vertices.file, 0, header, HEADER_BYTES, err);
 }
 
-static strl_status append_faces(strl__ply_writer *writer, strl__ply_report report, void *context, strl_error *err)
-{
-    stream *from = &writer->faces;
-    stream *to = &writer->vertices;
-    for (uint64_t at = 0; at < from->offset; at += BUFFER_BYTES) {
-        uint64_t left = from->offset - at;
-        size_t part = left < BUFFER_BYTES ? (size_t)left : BUFFER_BYTES;
-        strl_status status = strl_file_read(from->file, at, from->buffer, part, err);
-        if (status == STRL_OK)
-            status = strl_file_write(to->file, to->offset, from->buffer, part, err);
-        if (status == STRL_OK && report)
-            status = report(context, at + part, from->offset, err);
-        if (status != STRL_OK)
-            return status;
-        to->offset += part;
-        strl_file_punch(from->file, at, part);
-    }
-    return STRL_OK;
-}
-
-strl_status strl__ply_finish(strl__ply_writer *writer, strl__ply_report report, void *context, uint64_t *bytes,
+strl_status strl__ply_finish(strl__ply_writer *writer, strl_output_report report, void *context, uint64_t *bytes,
                              strl_error *err)
 {
     strl_status status = stream_flush(&writer->vertices, err);
     if (status == STRL_OK)
         status = stream_flush(&writer->faces, err);
     if (status == STRL_OK)
-        status = append_faces(writer, report, context, err);
+        status = strl_output_append(writer->output, writer->faces.file, report, context, err);
     if (status == STRL_OK)
         status = write_header(writer, err);
-    if (status == STRL_OK)
-        status = strl_output_finish(writer->output, false, err);
     if (bytes)
-        *bytes = writer->vertices.offset;
-    return status;
+        *bytes = strl_file_bytes(writer->vertices.file);
+    return status == STRL_OK ? strl_output_finish(writer->output, false, err) : status;
 }

@@ -1,14 +1,15 @@
-/* Streams an indexed triangle mesh into a binary little-endian PLY file. PLY wants its counts first and all vertices before
- * the faces: the header has a fixed length and is written last, the faces wait in OUT.faces.tmp and give their blocks back
- * while they are appended. The output appears by the final rename.
- * Order of calls: create, any mix of vertices and faces, then finish; destroy always (without finish it removes everything). */
+/* Streams an indexed triangle mesh into a binary little-endian PLY file. PLY wants its counts first and all vertices
+ * before the faces: the header has a fixed length and is written last, the faces wait in a spill beside the output. The
+ * output appears by the final rename.
+ * Order of calls: create, any mix of vertices and faces, then finish; destroy always (without finish it removes
+ * everything). */
 #ifndef STRL_SCENES_PLY_WRITER_H
 #define STRL_SCENES_PLY_WRITER_H
 
 #include <stddef.h>
 #include <stdint.h>
 
-#include "stroll/error.h"
+#include "platform/output.h"
 
 #define STRL__PLY_VERTICES_MAX 0x7fffffffu /* vertex indices are PLY's int */
 
@@ -27,9 +28,8 @@ strl_status strl__ply_vertices(strl__ply_writer *writer, const void *records, ui
 strl_status strl__ply_triangles(strl__ply_writer *writer, const uint32_t *corners, uint64_t count, strl_error *err);
 uint64_t strl__ply_vertex_count(const strl__ply_writer *writer);
 uint64_t strl__ply_triangle_count(const strl__ply_writer *writer);
-/* report: called now and then with bytes of faces, and what it returns ends the work; may be NULL. */
-typedef strl_status (*strl__ply_report)(void *context, uint64_t done, uint64_t total, strl_error *err);
-strl_status strl__ply_finish(strl__ply_writer *writer, strl__ply_report report, void *context, uint64_t *bytes,
+/* report: of the faces, see strl_output_append; may be NULL. *bytes: of the file; may be NULL. */
+strl_status strl__ply_finish(strl__ply_writer *writer, strl_output_report report, void *context, uint64_t *bytes,
                              strl_error *err);
 void strl__ply_destroy(strl__ply_writer *writer); /* NULL is legal */
 

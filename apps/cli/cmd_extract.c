@@ -1,5 +1,6 @@
-/* stroll extract: a uniform cut as one PLY file. Vertices stream into the file, triangles into a spill beside it, because PLY
- * wants all vertices first; then the triangles follow and the counts are put into the header's reserved places. */
+/* stroll extract: a uniform cut as one PLY file. Vertices stream into the file, triangles into a spill beside it,
+ * because PLY wants all vertices first; then the triangles follow and the counts are put into the header's reserved
+ * places. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -17,7 +18,6 @@
 #include "platform/output.h"
 #include "progress.h"
 
-#define COPY_BYTES ((size_t)1 << 20)
 #define TRIANGLE_BYTES 13u /* u8 count, 3 u32 */
 
 typedef struct extraction {
@@ -47,7 +47,7 @@ static bool needs_doubles(strl_container *container)
     return reach > step * 0x1p23;
 }
 
-/* Written twice: with placeholders to reserve the room, then with the counts, padded by a comment to the same length. */
+/* Written twice: with placeholders to reserve the room, then with the counts; a comment pads it to the same length. */
 static strl_status write_header(extraction *self, uint64_t *bytes, strl_error *err)
 {
     char text[1024], fill[64];
@@ -220,31 +220,17 @@ static strl_status extract_placement(extraction *self, const strl_placement *pla
     }
 }
 
-static strl_status append_triangles(extraction *self, strl_error *err)
+static strl_status report_triangles(void *context, uint64_t done, uint64_t total, strl_error *err)
 {
-    uint8_t *buffer = malloc(COPY_BYTES);
-    strl_status status =
-        buffer ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory to copy triangles into %s", self->path);
-    for (uint64_t at = 0; status == STRL_OK && at < self->spill_bytes;) {
-        uint64_t left = self->spill_bytes - at;
-        size_t step = left < COPY_BYTES ? (size_t)left : COPY_BYTES;
-        status = strl_file_read(self->spill, at, buffer, step, err);
-        if (status == STRL_OK)
-            status = strl_file_write(self->out, self->out_bytes + at, buffer, step, err);
-        if (status == STRL_OK)
-            status = strl_cli_check_interrupt(err);
-        strl_file_punch(self->spill, at, step);
-        at += step;
-        strl_cli_progress_update(&self->line, "triangles", at / TRIANGLE_BYTES, self->triangle_count, "triangles");
-    }
-    free(buffer);
-    return status;
+    extraction *self = context;
+    strl_cli_progress_update(&self->line, "triangles", done / TRIANGLE_BYTES, total / TRIANGLE_BYTES, "triangles");
+    return strl_cli_check_interrupt(err);
 }
 
 static strl_status finish(extraction *self, strl_error *err)
 {
     uint64_t header_bytes;
-    strl_status status = append_triangles(self, err);
+    strl_status status = strl_output_append(self->output, self->spill, report_triangles, self, err);
     if (status == STRL_OK)
         status = write_header(self, &header_bytes, err);
     return status == STRL_OK ? strl_output_finish(self->output, false, err) : status;

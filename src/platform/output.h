@@ -1,7 +1,7 @@
-/* A file that appears under its name only when it is whole: what writes files of the user does it through this. The bytes
- * go to a temporary file that is created for this purpose, under a name that nothing had, beside the file to be written;
- * finish gives it its name, which replaces an older file at once. A link is followed: the file that it leads to is
- * replaced, the link stays. */
+/* A file that appears under its name only when it is whole: what writes files of the user does it through this. The
+ * bytes go to a temporary file that is created for this purpose, under a name that nothing had, beside the file to be
+ * written; finish gives it its name, which replaces an older file at once. A link is followed: the file that it leads
+ * to is replaced, the link stays. */
 #ifndef STRL_PLATFORM_OUTPUT_H
 #define STRL_PLATFORM_OUTPUT_H
 
@@ -26,6 +26,11 @@ strl_file *strl_output_file(strl_output *output); /* borrowed; its sentences nam
 strl_status strl_output_stream(strl_output *output, FILE **stream, strl_error *err);
 /* A file without a name beside the output, for what must wait; the caller's. */
 strl_status strl_output_spill(strl_output *output, strl_file **spill, strl_error *err);
+/* Told the bytes done, now and then; what it returns ends the work. */
+typedef strl_status (*strl_output_report)(void *context, uint64_t done, uint64_t total, strl_error *err);
+/* Puts all of the spill after the file's last byte and gives the spill's blocks back meanwhile. report may be NULL. */
+strl_status strl_output_append(strl_output *output, strl_file *spill, strl_output_report report, void *context,
+                               strl_error *err);
 /* Closes the file and gives it its name. durable: it is on disk afterwards, under that name. Once. */
 strl_status strl_output_finish(strl_output *output, bool durable, strl_error *err);
 /* After finish, or instead of it: then the temporary file is removed. NULL is legal. */

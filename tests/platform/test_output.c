@@ -87,6 +87,8 @@ static strl_status write_all(const char *path, bool durable, strl_error *err)
     if (status == STRL_OK)
         status = strl_file_write(strl_output_file(output), 0, "new", 3, err);
     if (status == STRL_OK)
+        status = strl_output_append(output, spill, NULL, NULL, err);
+    if (status == STRL_OK)
         status = strl_output_stream(output, &stream, err);
     if (status == STRL_OK)
         status = fputs("NEW", stream) >= 0 ? STRL_OK : STRL_ERR_IO;
@@ -109,11 +111,58 @@ static void a_file_has_its_name_when_it_is_whole(void **state)
     assert_int_equal(count_files(folder), 0);
     for (int durable = 0; durable < 2; durable++) {
         assert_int_equal(write_all(in_folder("a"), durable, NULL), STRL_OK);
-        assert_holds(in_folder("a"), "NEW");
+        assert_holds(in_folder("a"), "NEWwait");
         assert_int_equal(count_files(folder), 1);
     }
     assert_int_equal(strl_path_remove(in_folder("a"), NULL), STRL_OK);
     strl_output_close(NULL);
+}
+
+typedef struct listener {
+    unsigned calls, most; /* the call that ends the work */
+    uint64_t done, total;
+} listener;
+
+static strl_status listen(void *context, uint64_t done, uint64_t total, strl_error *err)
+{
+    (void)err;
+    listener *self = context;
+    assert_true(done > self->done && done <= total);
+    self->done = done;
+    self->total = total;
+    return ++self->calls < self->most ? STRL_OK : STRL_ERR_CANCELLED;
+}
+
+static void what_waits_comes_after_the_rest(void **state)
+{
+    (void)state;
+    enum { BYTES = 5 << 19 }; /* more than is copied at once */
+    uint8_t *data = strl__alloc(BYTES, 1), *found = strl__alloc(BYTES, 1);
+    for (uint32_t i = 0; i < BYTES; i++)
+        data[i] = (uint8_t)(i * 2654435761u >> 24);
+    for (unsigned most = 1; most <= 4; most++) {
+        strl_output *output = NULL;
+        strl_file *spill = NULL;
+        listener self = {.most = most};
+        assert_int_equal(strl_output_open(in_folder("a"), NULL, &output, NULL), STRL_OK);
+        assert_int_equal(strl_output_spill(output, &spill, NULL), STRL_OK);
+        assert_int_equal(strl_file_write(spill, 0, data, BYTES, NULL), STRL_OK);
+        assert_int_equal(strl_file_write(strl_output_file(output), 0, "head", 4, NULL), STRL_OK);
+        assert_int_equal(strl_output_append(output, spill, listen, &self, NULL),
+                         most < 4 ? STRL_ERR_CANCELLED : STRL_OK);
+        assert_int_equal(self.calls, most < 4 ? most : 3);
+        assert_int_equal(self.total, BYTES);
+        if (most == 4) {
+            assert_int_equal(strl_file_bytes(strl_output_file(output)), BYTES + 4);
+            assert_int_equal(strl_file_read(strl_output_file(output), 4, found, BYTES, NULL), STRL_OK);
+            assert_memory_equal(found, data, BYTES);
+        }
+        strl_file_close(spill, NULL);
+        strl_output_close(output);
+    }
+    strl__free(found);
+    strl__free(data);
+    assert_int_equal(count_files(folder), 0);
 }
 
 static void two_writers_of_one_name_do_not_meet(void **state)
@@ -194,7 +243,7 @@ static void every_injected_failure_leaves_the_folder_as_it_was(void **state)
                 fail_msg("%s", err.message);
             assert_int_equal(err.status, status);
             assert_int_equal(count_files(folder), 1);
-            assert_holds(in_folder("a"), status == STRL_OK ? "NEW" : "old");
+            assert_holds(in_folder("a"), status == STRL_OK ? "NEWwait" : "old");
         } while (status != STRL_OK);
         assert_true(budget > 3);
     }
@@ -217,6 +266,99 @@ static void a_scratch_folder_is_held_by_one_process(void **state)
     strl_scratch_destroy(first);
     assert_false(strl_path_exists(path));
     strl_scratch_destroy(NULL);
+}
+
+static void a_folder_that_says_nothing_yet_is_taken_over(void **state)
+{
+    (void)state;
+    const strl_scratch_desc desc = {.path = in_folder("s.tmp"), .names = names};
+    for (int with_lock = 0; with_lock < 2; with_lock++) {
+        strl_scratch *scratch = NULL;
+        assert_int_equal(mkdir(desc.path, 0777), 0);
+        if (with_lock)
+            put(in_folder("s.tmp/lock"), "");
+        assert_int_equal(strl_scratch_create(&desc, &scratch, NULL), STRL_OK);
+        put(in_folder("s.tmp/x.spill"), "x");
+        strl_scratch_destroy(scratch);
+        assert_int_equal(count_files(folder), 0);
+    }
+}
+
+static void a_folder_of_somebody_else_stays_as_it_is(void **state)
+{
+    (void)state;
+    static const char *const holds[][3] = {
+        {"letter"}, {"x.spill"}, {"lock", "", "letter"}, {"lock", "", "x.spill"}, {"lock", "mine"}};
+    char path[512];
+    snprintf(path, sizeof path, "%s", in_folder("s.tmp"));
+    const strl_scratch_desc desc = {.path = path, .names = names};
+    for (size_t i = 0; i < sizeof holds / sizeof *holds; i++) {
+        strl_scratch *scratch = NULL;
+        strl_error err = {0};
+        assert_int_equal(mkdir(desc.path, 0777), 0);
+        char first[16], second[16];
+        snprintf(first, sizeof first, "s.tmp/%s", holds[i][0]);
+        snprintf(second, sizeof second, "s.tmp/%s", holds[i][2] ? holds[i][2] : holds[i][0]);
+        put(in_folder(second), "mine");
+        put(in_folder(first), holds[i][1] ? holds[i][1] : "mine");
+        unsigned before = count_files(desc.path);
+        assert_int_equal(strl_scratch_create(&desc, &scratch, &err), STRL_ERR_ARGUMENT);
+        assert_non_null(strstr(err.message, "not made by a build"));
+        assert_int_equal(count_files(desc.path), before);
+        assert_holds(in_folder(first), holds[i][1] ? holds[i][1] : "mine");
+        assert_int_equal(strl_path_remove_directory(desc.path, NULL), STRL_OK);
+    }
+}
+
+/* A lock file that is a link would be made where the link leads to. */
+static void a_lock_that_is_a_link_is_not_followed(void **state)
+{
+    (void)state;
+    const strl_scratch_desc desc = {.path = in_folder("s.tmp"), .names = names};
+    strl_scratch *scratch = NULL;
+    assert_int_equal(mkdir(desc.path, 0777), 0);
+    assert_int_equal(symlink(in_folder("far"), in_folder("s.tmp/lock")), 0);
+    assert_int_equal(strl_scratch_create(&desc, &scratch, NULL), STRL_ERR_ARGUMENT);
+    assert_false(strl_path_exists(in_folder("far")));
+    assert_int_equal(strl_path_remove_directory(desc.path, NULL), STRL_OK);
+}
+
+/* What one of several processes does: 0 where each folder was its own or another's. */
+static int take_turns(const strl_scratch_desc *desc, unsigned rounds)
+{
+    for (unsigned round = 0; round < rounds; round++) {
+        strl_scratch *scratch = NULL;
+        strl_error err = {0};
+        strl_status status = strl_scratch_create(desc, &scratch, &err);
+        if (status == STRL_OK)
+            strl_scratch_destroy(scratch);
+        else if (!strstr(err.message, "is locked")) {
+            fprintf(stderr, "%s\n", err.message);
+            return 1;
+        }
+    }
+    return 0;
+}
+
+static void of_processes_that_start_together_the_others_hear_locked(void **state)
+{
+    (void)state;
+    enum { PROCESSES = 4, ROUNDS = 2000 };
+    const strl_scratch_desc desc = {.path = in_folder("s.tmp"), .names = names};
+    pid_t child[PROCESSES];
+    for (int i = 0; i < PROCESSES; i++) {
+        child[i] = fork();
+        assert_true(child[i] >= 0);
+        if (child[i] == 0)
+            _exit(take_turns(&desc, ROUNDS));
+    }
+    int failed = 0;
+    for (int i = 0; i < PROCESSES; i++) {
+        int status;
+        failed += waitpid(child[i], &status, 0) != child[i] || status != 0;
+    }
+    assert_int_equal(failed, 0);
+    assert_int_equal(count_files(folder), 0);
 }
 
 static void what_a_killed_process_left_is_cleared(void **state)
@@ -268,11 +410,16 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_file_has_its_name_when_it_is_whole),
+        cmocka_unit_test(what_waits_comes_after_the_rest),
         cmocka_unit_test(two_writers_of_one_name_do_not_meet),
         cmocka_unit_test(long_names_are_written_or_refused),
         cmocka_unit_test(the_unfinished_file_lies_in_scratch_where_that_is_beside),
         cmocka_unit_test(every_injected_failure_leaves_the_folder_as_it_was),
         cmocka_unit_test(a_scratch_folder_is_held_by_one_process),
+        cmocka_unit_test(a_folder_that_says_nothing_yet_is_taken_over),
+        cmocka_unit_test(a_folder_of_somebody_else_stays_as_it_is),
+        cmocka_unit_test(a_lock_that_is_a_link_is_not_followed),
+        cmocka_unit_test(of_processes_that_start_together_the_others_hear_locked),
         cmocka_unit_test(what_a_killed_process_left_is_cleared),
         cmocka_unit_test(a_nameless_file_leaves_no_name),
     };

@@ -10,6 +10,7 @@
 #include "base/memory.h"
 #include "platform/posix/facts.h"
 
+#define COPY_BYTES ((size_t)1 << 20)
 #define MOST_LINKS 40
 /* Of the name's own characters: with the random ones and ".part" it stays within the 255 of common file systems. */
 #define MOST_NAME_KEPT 200
@@ -228,8 +229,29 @@ strl_status strl_output_spill(strl_output *output, strl_file **spill, strl_error
 {
     *spill = NULL;
     char *folder = strl__path_parent(output->temporary);
-    strl_status status = folder ? strl__file_create_nameless(folder, output->path, spill, err) : fail_memory(output->path, err);
+    strl_status status =
+        folder ? strl__file_create_nameless(folder, output->path, spill, err) : fail_memory(output->path, err);
     strl__free(folder);
+    return status;
+}
+
+strl_status strl_output_append(strl_output *output, strl_file *spill, strl_output_report report, void *context,
+                               strl_error *err)
+{
+    uint64_t end = strl_file_bytes(output->file), total = strl_file_bytes(spill);
+    uint8_t *buffer = strl__alloc(COPY_BYTES, 1);
+    strl_status status = buffer ? STRL_OK : fail_memory(output->path, err);
+    for (uint64_t at = 0; status == STRL_OK && at < total;) {
+        size_t step = total - at < COPY_BYTES ? (size_t)(total - at) : COPY_BYTES;
+        status = strl_file_read(spill, at, buffer, step, err);
+        if (status == STRL_OK)
+            status = strl_file_write(output->file, end + at, buffer, step, err);
+        strl_file_punch(spill, at, step);
+        at += step;
+        if (status == STRL_OK && report)
+            status = report(context, at, total, err);
+    }
+    strl__free(buffer);
     return status;
 }
 
