@@ -15,14 +15,18 @@ static void on_signal(int number)
 
 void strl_cli_catch_interrupts(void)
 {
-    static const int signals[] = {SIGINT, SIGTERM, SIGHUP, SIGQUIT};
-    struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_RESTART}, before;
-    sigemptyset(&action.sa_mask);
+    /* Whoever presses Ctrl-C again does not want to wait for the next step. The other two come twice of themselves: a
+     * closed terminal's from the kernel and from the shell, timeout's to the process and to its group. */
+    static const struct {
+        int number, flags;
+    } signals[] = {{SIGINT, SA_RESETHAND}, {SIGQUIT, SA_RESETHAND}, {SIGTERM, 0}, {SIGHUP, 0}};
     for (size_t i = 0; i < sizeof signals / sizeof *signals; i++) {
-        /* nohup has the program outlive its terminal */
-        bool outlives = signals[i] == SIGHUP && sigaction(SIGHUP, NULL, &before) == 0 && before.sa_handler == SIG_IGN;
-        if (!outlives)
-            sigaction(signals[i], &action, NULL);
+        struct sigaction action = {.sa_handler = on_signal, .sa_flags = SA_RESTART | signals[i].flags}, before;
+        sigemptyset(&action.sa_mask);
+        /* What was ignored stays so: under nohup the program outlives its terminal, in a script's background its
+         * Ctrl-C. */
+        if (sigaction(signals[i].number, NULL, &before) == 0 && before.sa_handler != SIG_IGN)
+            sigaction(signals[i].number, &action, NULL);
     }
 }
 

@@ -1,5 +1,6 @@
-/* Ctrl-C, termination and the end of the terminal as a question that long work asks between two steps. Work that hears
- * yes removes what it has not finished and fails with STRL_ERR_CANCELLED, which strl_cli_fail tells as "interrupted". */
+/* Ctrl-C, termination and the end of the terminal as a question that long work asks between two steps. Work that
+ * hears yes removes what it has not finished and fails with STRL_ERR_CANCELLED, which strl_cli_fail tells as
+ * "interrupted". */
 #ifndef STROLL_CLI_INTERRUPT_H
 #define STROLL_CLI_INTERRUPT_H
 
@@ -7,7 +8,8 @@
 
 #include "stroll/error.h"
 
-/* From now on SIGINT, SIGTERM, SIGHUP and SIGQUIT only set what the others tell. */
+/* From now on SIGINT, SIGTERM, SIGHUP and SIGQUIT only set what the others tell, those that were ignored excepted. A
+ * second SIGINT or SIGQUIT ends the process at once, with what it has not finished left behind. */
 void strl_cli_catch_interrupts(void);
 bool strl_cli_interrupted(void);
 /* STRL_ERR_CANCELLED once there was a signal. */

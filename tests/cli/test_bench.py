@@ -10,8 +10,8 @@ import sys
 import tempfile
 import time
 
-FIGURES = {"scene": ["scene"], "read": ["read"], "build": ["build_one_core", "build", "build_memory"], "decode": ["decode"],
-           "select": ["select"], "draw": ["draw"]}
+FIGURES = {"scene": ["scene"], "read": ["read"], "build": ["build_one_core", "build", "build_memory"],
+           "decode": ["decode"], "select": ["select"], "draw": ["draw"]}
 UNITS = {"M triangles/s", "MiB", "ms"}
 MAY_LACK = {"draw", "build_memory"}  # without OpenGL; where the system does not tell it
 
@@ -59,7 +59,8 @@ class Test:
     def test_choice(self):
         result = self.run("decode", "scene", "--runs", "3", "--json")
         figures = json.loads(result.stdout)["benchmarks"] if result.returncode == 0 else []
-        self.check("names choose", [figure["name"] for figure in figures] == ["scene", "decode"], (figures, result.stderr))
+        self.check("names choose", [figure["name"] for figure in figures] == ["scene", "decode"],
+                   (figures, result.stderr))
         for figure in figures:
             self.check_figure(figure, 3)
         result = self.run("read", "--runs", "2")
@@ -81,14 +82,17 @@ class Test:
     def test_failures(self):
         missing = os.path.join(self.folder, "missing")
         result = subprocess.run([self.program, "bench", "scene", "--scratch", missing], capture_output=True, text=True)
-        self.check("a folder that is not there is named", result.returncode == 1 and missing in result.stderr, result.stderr)
-        process = subprocess.Popen(self.command("build", "--runs", "1000", "--quiet"), stderr=subprocess.PIPE, text=True)
+        self.check("a folder that is not there is named", result.returncode == 1 and missing in result.stderr,
+                   result.stderr)
+        process = subprocess.Popen(self.command("build", "--runs", "1000", "--quiet"), stderr=subprocess.PIPE,
+                                   text=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
         until = time.monotonic() + 60
         while not os.listdir(self.folder) and process.poll() is None and time.monotonic() < until:
             time.sleep(0.01)
         process.send_signal(signal.SIGINT)
         _, errors = process.communicate(timeout=120)
-        self.check("an interrupt ends it with a sentence", process.returncode == 1 and errors.startswith("stroll: "), errors)
+        self.check("an interrupt ends it with a sentence", process.returncode == 1 and errors.startswith("stroll: "),
+                   errors)
         self.check_empty("after an interrupt")
 
 

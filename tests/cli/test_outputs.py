@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""Whatever writes a file writes it whole or not at all, under the name it was given, and touches no file of anybody else.
+"""Whatever writes a file writes it whole or not at all, under its given name, and touches no file of anybody else.
 
 usage: test_outputs.py PROGRAM"""
+import fcntl
 import os
 import resource
 import shutil
@@ -122,7 +123,8 @@ def a_folder_is_no_file(folder, writers):
 
 def without_rights_nothing_is_begun(folder, writers):
     prefix = ["setpriv", "--reuid", "65534", "--clear-groups"] if ROOT else []
-    if ROOT and (not shutil.which("setpriv") or subprocess.run([*prefix, STROLL, "--version"], stdout=subprocess.DEVNULL).returncode):
+    if ROOT and (not shutil.which("setpriv") or subprocess.run([*prefix, STROLL, "--version"],
+                                                               stdout=subprocess.DEVNULL).returncode):
         print("nobody cannot run the program: rights not tested")
         return
     os.chmod(folder, 0o755)
@@ -220,6 +222,10 @@ def a_foreign_scratch_folder_is_refused_and_stays(folder, writers):
 
     def other_lock(path):
         os.mkdir(path)
+        put(path + "/lock", "mine")
+
+    def silent_lock(path):
+        mine(path)
         put(path + "/lock", "")
 
     def signed_but_shared(path):
@@ -230,7 +236,7 @@ def a_foreign_scratch_folder_is_refused_and_stays(folder, writers):
         shutil.copytree(killed, path)
         os.symlink(killed + "/lock", path + "/soup.spill")
 
-    for i, prepare in enumerate((mine, spill_alone, other_lock, os.mkdir, signed_but_shared, signed_with_link,
+    for i, prepare in enumerate((mine, spill_alone, other_lock, silent_lock, signed_but_shared, signed_with_link,
                                  lambda path: put(path, "mine"), lambda path: os.symlink(killed, path))):
         place = fresh(folder, f"case{i}")
         prepare(place + "/out.stroll.tmp")
@@ -254,6 +260,13 @@ def leave_scratch(folder, build):
 
 
 def what_a_killed_build_left_is_taken_over(folder, writers):
+    for i in range(2):
+        scratch = fresh(folder, f"early{i}") + "/out.stroll.tmp"
+        os.mkdir(scratch)
+        if i: # killed before it wrote into its lock file
+            put(scratch + "/lock", "")
+        must(*writers[0].words, scratch[:-len(".tmp")])
+        assert os.listdir(os.path.dirname(scratch)) == ["out.stroll"]
     scratch = leave_scratch(folder, writers[0])
     put(scratch + "/older-stage.spill", "of an earlier version")
     must(*writers[0].words, scratch[:-len(".tmp")])
@@ -296,9 +309,17 @@ def a_scratch_option_names_the_place_and_is_made_for_the_time(folder, writers):
 
 
 # ---- signals ----
+def hear_all():
+    """The test itself may run where some are ignored, as in a script's background."""
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_DFL)
+
+
 def stop(words, number, ready):
     """Sends the signal once ready() holds; the child's exit status and standard error."""
-    child = subprocess.Popen([STROLL, *words, "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    child = subprocess.Popen([STROLL, *words, "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+                             preexec_fn=hear_all)
     until = time.monotonic() + 30
     while not ready() and child.poll() is None and time.monotonic() < until:
         time.sleep(0.0005)
@@ -336,6 +357,7 @@ def a_signal_leaves_nothing_behind(folder, writers):
 
 def stopped_images_are_whole(folder, writers):
     model = writers[1].words[1]
+    depth_bytes = len(b"Pf\n64 48\n-1.0\n") + 64 * 48 * 4
     for number in SIGNALS:
         place = folder + f"/orbit{number}"
         words = ["render", model, "--path", "orbit", "--frames", "3000", "--size", "64x48", "--depth", "-o", place]
@@ -343,10 +365,12 @@ def stopped_images_are_whole(folder, writers):
         for name in os.listdir(place):
             data = content(place + "/" + name)
             assert name.startswith("frame_0"), name
-            assert data.endswith(b"IEND\xaeB`\x82") if name.endswith(".png") else len(data) == len(b"Pf\n64 48\n-1.0\n") + 64 * 48 * 4, name
+            whole = data.endswith(b"IEND\xaeB`\x82") if name.endswith(".png") else len(data) == depth_bytes
+            assert whole, name
     # before the first image nothing is left, the new folder included
     start = time.monotonic()
-    assert_stopped(["render", writers[0].words[1], "--full", "--path", "walk", "--frames", "2000", "-o", folder + "/new"],
+    assert_stopped(["render", writers[0].words[1], "--full", "--path", "walk", "--frames", "2000", "-o",
+                    folder + "/new"],
                    signal.SIGINT, lambda: time.monotonic() > start + 0.1)
     assert not os.path.exists(folder + "/new") or os.listdir(folder + "/new")
 
@@ -364,14 +388,49 @@ def verify_and_compare_end_by_signals(folder, writers):
     assert_stopped(["compare", place, place], signal.SIGTERM, lambda: time.monotonic() > start + 0.1)
 
 
-def a_hangup_is_ignored_where_it_was_before(folder, writers):
-    """As under nohup."""
-    child = subprocess.Popen([STROLL, *writers[0].words, folder + "/out.stroll", "--quiet"],
-                             preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+def what_was_ignored_before_stays_so(folder, writers):
+    """As the hangup under nohup, and Ctrl-C in a script's background."""
+    def ignore_all():
+        for number in SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
+
+    child = subprocess.Popen([STROLL, *writers[0].words, folder + "/out.stroll", "--quiet"], preexec_fn=ignore_all)
     while not os.path.exists(folder + "/out.stroll.tmp/lock"):
+        assert child.poll() is None
         time.sleep(0.001)
-    child.send_signal(signal.SIGHUP)
+    for number in SIGNALS:
+        child.send_signal(number)
     assert child.wait() == 0 and os.listdir(folder) == ["out.stroll"]
+
+
+def a_second_ctrl_c_ends_the_process(folder, writers):
+    """Asked of one that does not come to its next step: it waits for somebody to read its standard output."""
+    reading, writing = os.pipe()
+    fcntl.fcntl(writing, fcntl.F_SETPIPE_SZ, 4096)
+    os.set_blocking(writing, False)
+    try:
+        while True:
+            os.write(writing, b"x" * 512)
+    except BlockingIOError:
+        os.set_blocking(writing, True)
+    for number in (signal.SIGINT, signal.SIGQUIT):
+        out = f"{folder}/out{number}.stroll"
+        child = subprocess.Popen([STROLL, *writers[0].words, out, "--json"], stdout=writing, stderr=subprocess.DEVNULL,
+                                 preexec_fn=hear_all)
+        try:
+            while not os.path.exists(out): # then it prints
+                assert child.poll() is None
+                time.sleep(0.01)
+            time.sleep(0.2)
+            child.send_signal(number)
+            time.sleep(0.2)
+            assert child.poll() is None, "the first one asks"
+            child.send_signal(number)
+            assert child.wait(timeout=60) == -number
+        finally:
+            child.kill()
+    os.close(reading)
+    os.close(writing)
 
 
 def a_full_standard_output_is_one_sentence(folder, writers):
@@ -397,7 +456,8 @@ def main():
                      what_came_into_a_scratch_folder_meanwhile_stays,
                      a_scratch_option_names_the_place_and_is_made_for_the_time, a_signal_leaves_nothing_behind,
                      stopped_images_are_whole, verify_and_compare_end_by_signals,
-                     a_hangup_is_ignored_where_it_was_before, a_full_standard_output_is_one_sentence):
+                     what_was_ignored_before_stays_so, a_second_ctrl_c_ends_the_process,
+                     a_full_standard_output_is_one_sentence):
             with tempfile.TemporaryDirectory(prefix="stroll-outputs-") as folder:
                 start = time.monotonic()
                 try:
