@@ -24,7 +24,7 @@ typedef struct render_options {
     uint64_t frames, seed, supersample, memory_bytes, gpu_memory_bytes;
     uint32_t size[2];
     double error_px, fps;
-    bool full, realtime, depth, wireframe, flat, no_occlusion, frames_given;
+    bool full, realtime, depth, wireframe, flat, no_occlusion, frames_given, quiet;
     int backend, debug;
 } render_options;
 
@@ -74,8 +74,8 @@ static strl_status load_path(const char *file, strl_camera_path *path, strl_erro
 }
 
 /* A named path shows the model's surface to the probe: any size the renderer had is restored. */
-static strl_status make_path(const render_options *o, strl_render_model *model, strl_renderer *renderer, strl_camera_path *path,
-                             strl_error *err)
+static strl_status make_path(const render_options *o, strl_render_model *model, strl_renderer *renderer,
+                             strl_camera_path *path, strl_error *err)
 {
     prober looks = {model, renderer};
     strl_path_site site = make_site(model, &looks);
@@ -99,9 +99,22 @@ static strl_status make_path(const render_options *o, strl_render_model *model, 
 
 static strl_draw_options draw_options(const render_options *o, const strl_render_model *model)
 {
-    strl_draw_options options = {.debug = (strl_debug_colour)o->debug, .wireframe = o->wireframe, .flat = o->flat, .background = {30, 33, 38}};
+    strl_draw_options options = {
+        .debug = (strl_debug_colour)o->debug, .wireframe = o->wireframe, .flat = o->flat, .background = {30, 33, 38}};
     options.sky_up[model->up_axis] = 1;
     return options;
+}
+
+/* What the images lack. The counts are in the lines of --stats, too. */
+static void warn(const render_options *o, const strl_image_stats *last, const strl_cli_coarse *coarse)
+{
+    if (o->quiet)
+        return;
+    if (last->faults > 0)
+        fprintf(stderr,
+                "stroll: %s: %" PRIu64 " read%s failed and what they were for stayed coarse, the last because %s\n",
+                o->input, last->faults, strl_cli_plural(last->faults), last->last_fault);
+    strl_cli_coarse_report(coarse, o->memory_bytes);
 }
 
 /* Holds a realtime path to its rate; late frames follow at once. */
@@ -142,11 +155,8 @@ static strl_status render_frames(const render_options *o, strl_render_model *mod
         status = strl_render_output_finish(&output, err);
     strl_render_output_deinit(&output);
     strl_cli_progress_end(progress);
-    if (status == STRL_OK && stats.faults > 0)
-        fprintf(stderr, "stroll: %s: %" PRIu64 " read%s failed and what they were for stayed coarse, the last because %s\n", o->input, stats.faults,
-                strl_cli_plural(stats.faults), stats.last_fault);
     if (status == STRL_OK)
-        strl_cli_coarse_report(&coarse, o->memory_bytes);
+        warn(o, &stats, &coarse);
     return status;
 }
 
@@ -163,9 +173,11 @@ static strl_status check_outputs(const render_options *o, strl_error *err)
 
 static strl_status open_renderer(const render_options *o, strl_renderer **renderer, strl_error *err)
 {
-    static const strl_backend backends[] = {STRL_BACKEND_DEFAULT, STRL_BACKEND_GL45, STRL_BACKEND_GL3, STRL_BACKEND_NULL, STRL_BACKEND_GL3};
-    const strl_renderer_desc desc = {.backend = backends[o->backend], .gles = o->backend == BACKEND_GLES, .width = o->size[0],
-                                     .height = o->size[1], .supersample = (uint32_t)o->supersample,
+    static const strl_backend backends[] = {STRL_BACKEND_DEFAULT, STRL_BACKEND_GL45, STRL_BACKEND_GL3,
+                                            STRL_BACKEND_NULL, STRL_BACKEND_GL3};
+    const strl_renderer_desc desc = {.backend = backends[o->backend], .gles = o->backend == BACKEND_GLES,
+                                     .width = o->size[0], .height = o->size[1],
+                                     .supersample = (uint32_t)o->supersample,
                                      .gpu_memory_bytes = o->gpu_memory_bytes};
     return strl_renderer_create(&desc, renderer, err);
 }
@@ -176,17 +188,19 @@ static strl_status render(const render_options *o, strl_cli_progress *progress, 
     strl_render_model *model = NULL;
     strl_renderer *renderer = NULL;
     strl_camera_path path = {0};
-    const strl_render_model_desc desc = {.path = o->input, .full = o->full, .realtime = o->realtime, .error_px = o->error_px,
-                                         .memory_bytes = o->memory_bytes, .progress = progress};
+    const strl_render_model_desc desc = {.path = o->input, .full = o->full, .realtime = o->realtime,
+                                         .error_px = o->error_px, .memory_bytes = o->memory_bytes,
+                                         .progress = progress};
     strl_cli_catch_interrupts();
     strl_status status = check_outputs(o, err);
     if (status == STRL_OK)
         status = open_renderer(o, &renderer, err);
     if (status == STRL_OK)
         status = strl_render_model_open(&desc, &model, err);
-    if (status == STRL_OK)
+    if (status == STRL_OK) {
         status = make_path(o, model, renderer, &path, err);
-    *camera_wrong = o->camera && status == STRL_ERR_ARGUMENT;
+        *camera_wrong = o->camera && status == STRL_ERR_ARGUMENT;
+    }
     if (status == STRL_OK && o->save_path)
         status = strl_path_save(&path, o->save_path, err);
     if (status == STRL_OK)
@@ -210,66 +224,84 @@ static int check(const strl_cli_args *args, const render_options *o)
         return strl_cli_usage_error(args, "--frames says how many frames --path orbit, walk or flythrough gets; %s",
                                     o->path ? "a path file has its own" : "there is no such path here");
     if (o->backend == BACKEND_NULL && o->output)
-        return strl_cli_usage_error(args, "the null backend draws no image for -o %s: leave -o out or choose another backend", o->output);
+        return strl_cli_usage_error(
+            args, "the null backend draws no image for -o %s: leave -o out or choose another backend", o->output);
     if (o->backend == BACKEND_NULL && o->path && (strcmp(o->path, "walk") == 0 || strcmp(o->path, "flythrough") == 0))
-        return strl_cli_usage_error(args, "the null backend sees no surface to go along: save the path with another one and load it");
+        return strl_cli_usage_error(
+            args, "the null backend sees no surface to go along: save the path with another one and load it");
     if (o->full && o->realtime)
         return strl_cli_usage_error(args, "--full draws everything and --realtime what is there: choose one");
     return -1;
 }
 
-static int run(strl_cli_args *args)
+/* Fills o from the command line. Returns as strl_cli_parse does. */
+static int parse(strl_cli_args *args, render_options *o)
 {
-    render_options o = {.frames = 60, .seed = 1, .supersample = 1, .memory_bytes = 512ull << 20, .gpu_memory_bytes = 512ull << 20,
-                        .size = {1280, 720}, .error_px = 1, .fps = DEFAULT_FPS};
     const strl_cli_option options[] = {
-        {.name = "camera", .kind = STRL_CLI_STRING, .value = &o.camera, .argument = "SPEC",
+        {.name = "camera", .kind = STRL_CLI_STRING, .value = &o->camera, .argument = "SPEC",
          .help = "one image: \"eye x y z target x y z up x y z fov DEG\" (the orbit's first frame)"},
-        {.name = "path", .kind = STRL_CLI_STRING, .value = &o.path, .argument = "FILE|orbit|walk|flythrough", .help = "many images"},
-        {.name = "frames", .kind = STRL_CLI_COUNT, .value = &o.frames, .given = &o.frames_given, .help = "of a named path (60)", .least = 1, .most = 1e6},
-        {.name = "seed", .kind = STRL_CLI_COUNT, .value = &o.seed, .help = "of a named path (1)"},
-        {.name = "save-path", .kind = STRL_CLI_STRING, .value = &o.save_path, .argument = "FILE",
+        {.name = "path", .kind = STRL_CLI_STRING, .value = &o->path, .argument = "FILE|orbit|walk|flythrough",
+         .help = "many images"},
+        {.name = "frames", .kind = STRL_CLI_COUNT, .value = &o->frames, .given = &o->frames_given,
+         .help = "of a named path (60)", .least = 1, .most = 1e6},
+        {.name = "seed", .kind = STRL_CLI_COUNT, .value = &o->seed, .help = "of a named path (1)"},
+        {.name = "save-path", .kind = STRL_CLI_STRING, .value = &o->save_path, .argument = "FILE",
          .help = "write the cameras as JSON, for --path of another render"},
-        {.name = "size", .kind = STRL_CLI_SIZE, .value = o.size, .help = "pixels of an image (1280x720)"},
-        {.name = "error", .kind = STRL_CLI_REAL, .value = &o.error_px, .argument = "PX", .help = "allowed pixel error (1)",
-         .least = 1e-6, .most = 1e6},
-        {.name = "full", .kind = STRL_CLI_FLAG, .value = &o.full,
+        {.name = "size", .kind = STRL_CLI_SIZE, .value = o->size, .help = "pixels of an image (1280x720)"},
+        {.name = "error", .kind = STRL_CLI_REAL, .value = &o->error_px, .argument = "PX",
+         .help = "allowed pixel error (1)", .least = 1e-6, .most = 1e6},
+        {.name = "full", .kind = STRL_CLI_FLAG, .value = &o->full,
          .help = "the finest level of a container; the triangles of a mesh file as read, held in memory"},
-        {.name = "realtime", .kind = STRL_CLI_REAL, .value = &o.fps, .argument = "FPS", .given = &o.realtime, .value_optional = true,
-         .help = "never wait for bytes; keep this rate (60)", .least = 1e-3, .most = 1e6},
-        {.name = "no-occlusion", .kind = STRL_CLI_FLAG, .value = &o.no_occlusion, .help = "draw hidden nodes too (always so in this version)"},
-        {.name = "memory", .letter = 'm', .kind = STRL_CLI_BYTES, .value = &o.memory_bytes, .help = "decoded nodes held (512M)",
-         .least = 1 << 20, .most = 0x1p50},
-        {.name = "gpu-memory", .kind = STRL_CLI_BYTES, .value = &o.gpu_memory_bytes, .help = "buffers of nodes (512M)",
-         .least = STRL_RENDERER_LEAST_GPU_BYTES, .most = 0x1p50},
-        {.name = "supersample", .kind = STRL_CLI_COUNT, .value = &o.supersample, .argument = "K",
+        {.name = "realtime", .kind = STRL_CLI_REAL, .value = &o->fps, .argument = "FPS", .given = &o->realtime,
+         .value_optional = true, .help = "never wait for bytes; keep this rate (60)", .least = 1e-3, .most = 1e6},
+        {.name = "no-occlusion", .kind = STRL_CLI_FLAG, .value = &o->no_occlusion,
+         .help = "draw hidden nodes too (always so in this version)"},
+        {.name = "memory", .letter = 'm', .kind = STRL_CLI_BYTES, .value = &o->memory_bytes,
+         .help = "decoded nodes held (512M)", .least = 1 << 20, .most = 0x1p50},
+        {.name = "gpu-memory", .kind = STRL_CLI_BYTES, .value = &o->gpu_memory_bytes,
+         .help = "buffers of nodes (512M)", .least = STRL_RENDERER_LEAST_GPU_BYTES, .most = 0x1p50},
+        {.name = "supersample", .kind = STRL_CLI_COUNT, .value = &o->supersample, .argument = "K",
          .help = "draw K times wider and higher, filter in linear light (1)", .least = 1, .most = 8},
-        {.name = "depth", .kind = STRL_CLI_FLAG, .value = &o.depth,
+        {.name = "depth", .kind = STRL_CLI_FLAG, .value = &o->depth,
          .help = "write linear depth too: frame_00000.pfm, 32-bit floats, infinity = background"},
-        {.name = "output", .letter = 'o', .kind = STRL_CLI_STRING, .value = &o.output, .argument = "PNG or DIR",
+        {.name = "output", .letter = 'o', .kind = STRL_CLI_STRING, .value = &o->output, .argument = "PNG or DIR",
          .help = "where images go: frame_00000.png ..., contact.png and path.json in a folder"},
-        {.name = "stats", .kind = STRL_CLI_STRING, .value = &o.stats, .argument = "FILE.jsonl", .help = "one JSON object a frame"},
-        {.name = "backend", .kind = STRL_CLI_ENUM, .value = &o.backend, .argument = backend_words, .help = "what draws (auto)"},
-        {.name = "debug", .kind = STRL_CLI_ENUM, .value = &o.debug, .argument = "none|cluster|level|error", .help = "colour by it (none)"},
-        {.name = "wireframe", .kind = STRL_CLI_FLAG, .value = &o.wireframe, .help = "edges only"},
-        {.name = "flat", .kind = STRL_CLI_FLAG, .value = &o.flat, .help = "normals of triangles instead of vertices"},
+        {.name = "stats", .kind = STRL_CLI_STRING, .value = &o->stats, .argument = "FILE.jsonl",
+         .help = "one JSON object a frame"},
+        {.name = "backend", .kind = STRL_CLI_ENUM, .value = &o->backend, .argument = backend_words,
+         .help = "what draws (auto)"},
+        {.name = "debug", .kind = STRL_CLI_ENUM, .value = &o->debug, .argument = "none|cluster|level|error",
+         .help = "colour by it (none)"},
+        {.name = "wireframe", .kind = STRL_CLI_FLAG, .value = &o->wireframe, .help = "edges only"},
+        {.name = "flat", .kind = STRL_CLI_FLAG, .value = &o->flat, .help = "normals of triangles instead of vertices"},
     };
-    const strl_cli_usage usage = {.positional = "MODEL", .least = 1, .most = 1, .options = options,
-                                  .option_count = STRL_CLI_COUNT_OF(options),
-                                  .notes = "MODEL is a container, or with --full also a PLY, STL or OBJ file. In the lines of --stats max_error_px is the\n"
-                                           "largest pixel error of what was drawn, and null where the eye is inside a node's box: no pixel error\n"
-                                           "bounds what is that near."};
+    const strl_cli_usage usage = {
+        .positional = "MODEL", .least = 1, .most = 1, .options = options, .option_count = STRL_CLI_COUNT_OF(options),
+        .notes = "MODEL is a container, or with --full also a PLY, STL or OBJ file. In the lines of --stats "
+                 "max_error_px is the\n"
+                 "largest pixel error of what was drawn, and null where the eye is inside a node's box: no pixel "
+                 "error\n"
+                 "bounds what is that near."};
     strl_cli_list inputs;
     int stop = strl_cli_parse(args, &usage, &inputs);
-    if (stop < 0)
-        stop = check(args, &o);
     if (stop >= 0)
         return stop;
+    o->input = inputs.items[0];
+    o->quiet = args->quiet;
+    return check(args, o);
+}
+
+static int run(strl_cli_args *args)
+{
+    render_options o = {.frames = 60, .seed = 1, .supersample = 1, .memory_bytes = 512ull << 20,
+                        .gpu_memory_bytes = 512ull << 20, .size = {1280, 720}, .error_px = 1, .fps = DEFAULT_FPS};
     strl_cli_progress progress;
     strl_error err = {0};
-    strl_cli_progress_init(&progress, args->quiet);
     bool camera_wrong = false;
-    o.input = inputs.items[0];
+    int stop = parse(args, &o);
+    if (stop >= 0)
+        return stop;
+    strl_cli_progress_init(&progress, o.quiet);
     strl_status status = render(&o, &progress, &camera_wrong, &err);
     strl_cli_progress_end(&progress);
     if (camera_wrong)

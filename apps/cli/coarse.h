@@ -19,7 +19,7 @@ typedef struct strl_cli_coarse {
 
 /* One frame: what was asked for, what the walk allowed (more where its budget is tight) and what was drawn. */
 void strl_cli_coarse_add(strl_cli_coarse *coarse, double asked_px, double allowed_px, double drawn_px);
-/* One sentence on standard error where there was such a frame. */
+/* One sentence on standard error where there was such a frame; a warning, so not for --quiet. */
 void strl_cli_coarse_report(const strl_cli_coarse *coarse, uint64_t memory_bytes);
 
 #ifdef __cplusplus

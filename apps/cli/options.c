@@ -82,7 +82,7 @@ static void print_help(const strl_cli_args *args, const strl_cli_usage *usage)
         const strl_cli_option *option = &usage->options[i];
         print_option(option->letter, option->name, argument_of(option), option->value_optional, option->help);
     }
-    print_option('q', "quiet", "", false, "show no progress");
+    print_option('q', "quiet", "", false, "show no progress and no warnings");
     print_option('h', "help", "", false, "print this and stop");
     if (usage->notes)
         printf("\n%s\n", usage->notes);
@@ -289,9 +289,9 @@ static int missing_word(const parse_state *state)
     const strl_cli_usage *usage = state->usage;
     for (size_t i = 0; i < usage->option_count; i++)
         if (usage->options[i].kind == STRL_CLI_LIST && state->seen & (uint64_t)1 << i)
-            return strl_cli_usage_error(state->args,
-                                        "%s is missing: --%s takes all words that follow it, so %s goes before it or after --",
-                                        usage->positional, usage->options[i].name, usage->positional);
+            return strl_cli_usage_error(
+                state->args, "%s is missing: --%s takes all words that follow it, so %s goes before it or after --",
+                usage->positional, usage->options[i].name, usage->positional);
     return strl_cli_usage_error(state->args, "%s is missing", usage->positional);
 }
 

@@ -1,7 +1,8 @@
 /* What every command of the program shares: its entry in the command table, its options, its way to fail.
  *
- * A command is one file cmd_NAME.c that ends in STRL_CLI_COMMAND(NAME, "what it does", run); CMake finds the file and puts
- * the command into the table. `run` declares its options with their defaults, calls strl_cli_parse and does the work:
+ * A command is one file cmd_NAME.c that ends in STRL_CLI_COMMAND(NAME, "what it does", run); CMake finds the file and
+ * puts the command into the table. `run` declares its options with their defaults, calls strl_cli_parse and does the
+ * work:
  *
  *     static int run(strl_cli_args *args)
  *     {
@@ -9,7 +10,8 @@
  *         bool json = false;
  *         strl_cli_list inputs;
  *         const strl_cli_option options[] = {
- *             {.name = "memory", .letter = 'm', .kind = STRL_CLI_BYTES, .value = &memory_bytes, .help = "peak memory (1G)"},
+ *             {.name = "memory", .letter = 'm', .kind = STRL_CLI_BYTES, .value = &memory_bytes,
+ *              .help = "peak memory (1G)"},
  *             {.name = "json", .kind = STRL_CLI_FLAG, .value = &json, .help = "print one JSON object"},
  *         };
  *         const strl_cli_usage usage = {.positional = "INPUT...", .least = 1, .most = SIZE_MAX,
@@ -50,7 +52,7 @@ typedef struct strl_cli_args {
     int argc;            /* words after the command's name */
     char **argv;
     char **words;        /* room for argc positional words; strl_cli_parse fills it */
-    bool quiet;          /* set by strl_cli_parse: no progress */
+    bool quiet;          /* set by strl_cli_parse: no progress, no warnings */
 } strl_cli_args;
 
 typedef struct strl_cli_command {
@@ -95,9 +97,9 @@ typedef struct strl_cli_usage {
     size_t option_count;
 } strl_cli_usage;
 
-/* Reads the command line into the options' values and `positional` (may be NULL where usage has none). Returns -1 to go on,
- * else the exit status at which to stop: 0 after --help, 2 after the sentence of a usage error. A value may follow as next
- * word or after "="; short flags may be joined; "--" ends options. */
+/* Reads the command line into the options' values and `positional` (may be NULL where usage has none). Returns -1 to go
+ * on, else the exit status at which to stop: 0 after --help, 2 after the sentence of a usage error. A value may follow
+ * as next word or after "="; short flags may be joined; "--" ends options. */
 int strl_cli_parse(strl_cli_args *args, const strl_cli_usage *usage, strl_cli_list *positional);
 
 /* "s" where a noun after this count has one: "1 node", "2 nodes". */
@@ -109,7 +111,8 @@ int strl_cli_usage_error(const strl_cli_args *args, const char *format, ...) __a
 /* Prints "stroll: sentence" to standard error, after what is on its way to standard output; returns 1. */
 int strl_cli_fail(const strl_error *err);
 
-/* The same parsers for words inside a specification. False where the whole word is not such a value; 1.5 is no count, 1.5K is. */
+/* The same parsers for words inside a specification. False where the whole word is not such a value; 1.5 is no count,
+ * 1.5K is. */
 bool strl_cli_read_scaled(const char *word, unsigned thousand, uint64_t *value); /* thousand: 1000 or 1024 */
 /* As somebody would type it: 64M, not 67108864; exact for whole numbers up to 10^15. */
 void strl_cli_format_scaled(char text[32], double value, unsigned thousand);

@@ -50,7 +50,8 @@ def unfilter(kind, row, above):
         elif kind == 3:
             guess = (left + up) // 2
         elif kind == 4:
-            guess = min((abs(up - corner), 0, left), (abs(left - corner), 1, up), (abs(left + up - 2 * corner), 2, corner))[2]
+            guess = min((abs(up - corner), 0, left), (abs(left - corner), 1, up),
+                        (abs(left + up - 2 * corner), 2, corner))[2]
         else:
             guess = 0
         row[i] = (row[i] + guess) & 255
@@ -72,15 +73,16 @@ def colourful_share(rows):
 class Display:
     def __enter__(self):
         reading, writing = os.pipe()
-        self.server = subprocess.Popen(["Xvfb", "-displayfd", str(writing), "-screen", "0", "800x600x24", "-nolisten", "tcp", "-noreset"],
-                                       pass_fds=[writing], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.server = subprocess.Popen(["Xvfb", "-displayfd", str(writing), "-screen", "0", "800x600x24", "-nolisten",
+                                        "tcp", "-noreset"], pass_fds=[writing],
+                                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         os.close(writing)
         with os.fdopen(reading) as answer:
             number = answer.readline().strip()
         assert number, "Xvfb did not start"
         self.environment = {**os.environ, "DISPLAY": f":{number}"}
         self.environment.pop("WAYLAND_DISPLAY", None)
-        # A GL driver that is unloaded leaves memory behind that LeakSanitizer then takes for lost; ours shows by its names.
+        # A GL driver that is unloaded leaves memory behind that LeakSanitizer takes for lost; ours shows by its names.
         self.environment["LSAN_OPTIONS"] = "exitcode=0"
         return self
 
@@ -95,7 +97,8 @@ class Viewer:
     def __init__(self, stroll, display, model, folder, *options):
         self.environment, self.folder = display.environment, folder
         self.errors = tempfile.TemporaryFile(mode="w+")
-        self.process = subprocess.Popen([stroll, "view", model, "--size", f"{SIZE[0]}x{SIZE[1]}", "--screenshots", folder, *options],
+        self.process = subprocess.Popen([stroll, "view", model, "--size", f"{SIZE[0]}x{SIZE[1]}", "--screenshots",
+                                         folder, *options],
                                         env=display.environment, stderr=self.errors)
         window = self.wait_for(lambda: self.tool("search", "--onlyvisible", "--pid", str(self.process.pid)), "a window")
         self.window = window.split()[0]
@@ -195,8 +198,9 @@ def check_window(stroll, display, model, folder, *options):
 def check_frames(stroll, display, model):
     """A window that closes by itself: for scripts."""
     def view(*options):
-        done = subprocess.run([stroll, "view", model, "--size", f"{SIZE[0]}x{SIZE[1]}", *options], env=display.environment, text=True,
-                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=PATIENCE_S)
+        done = subprocess.run([stroll, "view", model, "--size", f"{SIZE[0]}x{SIZE[1]}", *options],
+                              env=display.environment, text=True, stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE, timeout=PATIENCE_S)
         assert done.returncode == 0, f"view {options} ended with {done.returncode}: {done.stderr}"
         return done
 
@@ -207,6 +211,8 @@ def check_frames(stroll, display, model):
     assert view("--frames", "1", "--quiet").stdout == ""
     tight = view("--frames", "200", "--error", "0.01", "--memory", "1M")
     assert "--memory 1M holds too little for a pixel error of 0.01: " in tight.stderr, tight.stderr
+    silent = view("--frames", "200", "--error", "0.01", "--memory", "1M", "--quiet")
+    assert silent.stdout == "" and silent.stderr == "", silent
 
 
 def check_refusals(stroll, scene, model):
@@ -226,7 +232,8 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
         scene, model = folder / "scene.ply", folder / "scene.stroll"
-        subprocess.run([stroll, "scene", "isosurface", "--triangles", "40K", "--seed", "2", "-o", scene, "--quiet"], check=True)
+        subprocess.run([stroll, "scene", "isosurface", "--triangles", "40K", "--seed", "2", "-o", scene, "--quiet"],
+                       check=True)
         subprocess.run([stroll, "build", scene, "-o", model, "--quiet"], check=True, stdout=subprocess.DEVNULL)
         check_refusals(stroll, scene, model)
         if missing:
