@@ -5,9 +5,9 @@
 #include <stdio.h>
 
 #include "camera_path.h"
-#include "image.h"
 #include "platform/output.h"
 #include "render_model.h"
+#include "shared/image.h"
 
 typedef struct strl_render_output_desc {
     const char *path;  /* NAME.png or a folder, which is made; NULL = no images */
@@ -36,8 +36,8 @@ strl_status strl_render_output_check(const char *path, strl_error *err);
 /* On failure nothing is left to release. */
 strl_status strl_render_output_init(strl_render_output *output, const strl_render_output_desc *desc, strl_error *err);
 /* Reads the renderer's image back and writes what is wanted of frame `frame`. */
-strl_status strl_render_output_add(strl_render_output *output, size_t frame, strl_renderer *renderer, const strl_image_stats *stats,
-                                   strl_error *err);
+strl_status strl_render_output_add(strl_render_output *output, size_t frame, strl_renderer *renderer,
+                                   const strl_image_stats *stats, strl_error *err);
 /* Writes what belongs to all frames together. */
 strl_status strl_render_output_finish(strl_render_output *output, strl_error *err);
 /* After finish, or instead of it: then the images so far stay, each of which is whole, and the rest is removed. */

@@ -1,5 +1,5 @@
-/* A walk through a container. Settled: fronts are selected until the wanted one is resident, then drawn. Realtime: one front, drawn as
- * far as it is there. */
+/* A walk through a container. Settled: fronts are selected until the wanted one is resident, then drawn. Realtime:
+ * one front, drawn as far as it is there. */
 #include <inttypes.h>
 #include <string.h>
 
@@ -10,6 +10,7 @@
 #include "platform/thread.h"
 #include "render_container.h"
 #include "render_model.h"
+#include "shared/naming.h"
 #include "stroll/walk.h"
 
 #define READ_THREADS 2u
@@ -33,18 +34,14 @@ static strl_status submit(void *context, void (*run)(void *job), void *job, strl
 
 static strl_status fail_unsettled(const strl_walk_stats *stats, strl_error *err)
 {
-    return strl__fail(err, STRL_ERR_IO, "the front does not become resident: %" PRIu32 " nodes are missing%s%.200s", stats->missing_nodes,
-                      stats->last_fault[0] ? ", last fault: " : " and nothing arrives", stats->last_fault);
-}
-
-/* What reads ranges knows offsets, not names. */
-static strl_status name_file(const char *path, strl_status status, strl_error *err)
-{
-    return status == STRL_OK || strstr(err->message, path) ? status : strl__fail_context(err, status, "%s", path);
+    return strl__fail(err, STRL_ERR_IO, "the front does not become resident: %" PRIu32 " nodes are missing%s%.200s",
+                      stats->missing_nodes, stats->last_fault[0] ? ", last fault: " : " and nothing arrives",
+                      stats->last_fault);
 }
 
 /* Selects until nothing is missing. */
-static strl_status settle(walk_model *self, const strl_camera *camera, strl_draw_list *list, strl_image_stats *stats, strl_error *err)
+static strl_status settle(walk_model *self, const strl_camera *camera, strl_draw_list *list, strl_image_stats *stats,
+                          strl_error *err)
 {
     uint32_t idle = 0;
     for (;;) {
@@ -87,7 +84,7 @@ static strl_status walk_draw(strl_render_model *model, strl_renderer *renderer, 
     uint64_t start = strl_clock_ns();
     strl_status status = settle(self, camera, &list, stats, err);
     if (status != STRL_OK)
-        return name_file(self->path, status, err);
+        return strl_name_file(self->path, status, err);
     fill_stats(strl_walk_get_stats(self->walk), stats);
     uint64_t selected = strl_clock_ns();
     strl_render_stats drawn;
@@ -139,7 +136,8 @@ static strl_status open_walk(walk_model *self, const strl_render_model_desc *des
     if (status != STRL_OK)
         return status;
     self->executor = (strl_executor){self->pool, submit};
-    const strl_walk_desc walk = {.memory_bytes = desc->memory_bytes, .error_px = desc->error_px, .executor = &self->executor};
+    const strl_walk_desc walk = {
+        .memory_bytes = desc->memory_bytes, .error_px = desc->error_px, .executor = &self->executor};
     return strl_walk_open(source, &walk, &self->walk, err);
 }
 
@@ -151,7 +149,7 @@ strl_status strl_render_walk_open(const strl_render_model_desc *desc, strl_rende
     self->base.klass = &walk_class;
     self->realtime = desc->realtime;
     self->path = desc->path;
-    strl_status status = name_file(desc->path, open_walk(self, desc, err), err);
+    strl_status status = strl_name_file(desc->path, open_walk(self, desc, err), err);
     if (status != STRL_OK) {
         walk_close(&self->base);
         return status;

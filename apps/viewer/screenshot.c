@@ -1,13 +1,12 @@
 #include "viewer/screenshot.h"
 
 #include <inttypes.h>
-#include <png.h>
 #include <stdio.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
 #include "platform/file.h"
-#include "platform/output.h"
+#include "shared/image.h"
 
 #define MOST_SCREENSHOTS 100000u
 
@@ -35,22 +34,6 @@ static void drop_alpha(uint8_t *pixels, size_t count)
             pixels[3 * p + c] = pixels[4 * p + c];
 }
 
-static strl_status write_png(uint8_t *rgb, uint32_t width, uint32_t height, const char *path, strl_error *err)
-{
-    png_image png = {.version = PNG_IMAGE_VERSION, .width = width, .height = height, .format = PNG_FORMAT_RGB};
-    strl_output *output = NULL;
-    FILE *stream = NULL;
-    strl_status status = strl_output_open(path, NULL, &output, err);
-    if (status == STRL_OK)
-        status = strl_output_stream(output, &stream, err);
-    if (status == STRL_OK && !png_image_write_to_stdio(&png, stream, 0, rgb, 0, NULL))
-        status = strl__fail(err, STRL_ERR_IO, "cannot write the image %s: %s", path, png.message);
-    if (status == STRL_OK)
-        status = strl_output_finish(output, false, err);
-    strl_output_close(output);
-    return status;
-}
-
 strl_status strl_screenshot_write(strl_renderer *renderer, uint32_t width, uint32_t height, const char *folder,
                                   char *path, size_t path_size, strl_error *err)
 {
@@ -64,7 +47,8 @@ strl_status strl_screenshot_write(strl_renderer *renderer, uint32_t width, uint3
         status = strl_renderer_read_colour(renderer, pixels, err);
     if (status == STRL_OK) {
         drop_alpha(pixels, (size_t)width * height);
-        status = write_png(pixels, width, height, file, err);
+        const strl_image image = {width, height, pixels};
+        status = strl_image_write_png(&image, file, err);
     }
     if (status == STRL_OK)
         snprintf(path, path_size, "%s", file);

@@ -7,6 +7,7 @@
 
 #include "base/fail.h"
 #include "platform/thread.h"
+#include "shared/naming.h"
 #include "viewer/frustum.h"
 #include "viewer/gui.h"
 #include "viewer/model.h"
@@ -226,13 +227,6 @@ static strl_draw_options draw_options(const viewer *v)
     return options;
 }
 
-/* What reads ranges knows offsets, not names. */
-static strl_status name_file(const viewer *v, strl_status status, strl_error *err)
-{
-    bool named = status == STRL_OK || strstr(err->message, v->desc.path);
-    return named ? status : strl__fail_context(err, status, "%s", v->desc.path);
-}
-
 /* While frozen, the walk goes on for the camera as it was, and the list is seen by another. */
 static strl_status select_nodes(viewer *v, strl_draw_list *list, strl_error *err)
 {
@@ -244,7 +238,7 @@ static strl_status select_nodes(viewer *v, strl_draw_list *list, strl_error *err
     strl_walk_set_error_px(v->model.walk, v->controls.error_px);
     strl_status status = strl_walk_frame(v->model.walk, v->controls.frozen ? &v->frozen : &v->camera, list, err);
     if (status != STRL_OK)
-        return name_file(v, status, err);
+        return strl_name_file(v->desc.path, status, err);
     v->clock.select_ns += strl_walk_get_stats(v->model.walk)->select_ns;
     v->frozen_far = list->count > 0 ? list->far_distance : v->navigator.radius;
     if (v->controls.frozen && !strl_viewer_set_range(list, &v->camera))
@@ -417,7 +411,7 @@ strl_status strl_viewer_run(const strl_viewer_desc *desc, strl_error *err)
         return strl__fail(err, STRL_ERR_ARGUMENT, "the null renderer draws nothing that a window could show");
     strl_status status = strl_viewer_model_open(&v.model, v.desc.path, v.desc.memory_bytes, v.desc.error_px, err);
     if (status != STRL_OK)
-        return name_file(&v, status, err);
+        return strl_name_file(v.desc.path, status, err);
     reset(&v);
     status = open_window(&v, err);
     if (status == STRL_OK)

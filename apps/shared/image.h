@@ -1,6 +1,6 @@
 /* Pictures in files: PNG for colour, PFM for depth, and the contact sheet. Rows go from top to bottom in memory. */
-#ifndef STRL_CLI_IMAGE_H
-#define STRL_CLI_IMAGE_H
+#ifndef STRL_APPS_IMAGE_H
+#define STRL_APPS_IMAGE_H
 
 #include <stdint.h>
 
@@ -17,8 +17,8 @@ void strl_image_deinit(strl_image *image);
 strl_status strl_image_write_png(const strl_image *image, const char *path, strl_error *err);
 strl_status strl_image_read_png(strl_image *image, const char *path, strl_error *err);
 
-/* Depth is a PFM file: the line "Pf", the line "WIDTH HEIGHT", the line "-1.0" (little-endian), then 32-bit floats, bottom row
- * first. Distances along the view direction in world units; +infinity = background. */
+/* Depth is a PFM file: the line "Pf", the line "WIDTH HEIGHT", the line "-1.0" (little-endian), then 32-bit floats,
+ * bottom row first. Distances along the view direction in world units; +infinity = background. */
 strl_status strl_depth_write(const float *depth, uint32_t width, uint32_t height, const char *path, strl_error *err);
 /* *depth is the caller's (strl__free). */
 strl_status strl_depth_read(float **depth, uint32_t *width, uint32_t *height, const char *path, strl_error *err);

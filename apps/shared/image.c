@@ -1,4 +1,4 @@
-#include "image.h"
+#include "shared/image.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -21,7 +21,8 @@ strl_status strl_image_init(strl_image *image, uint32_t width, uint32_t height, 
 {
     *image = (strl_image){width, height, strl__alloc_zero((size_t)width * height, 3)};
     if (!image->rgb)
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory for an image of %" PRIu32 "x%" PRIu32 " pixels", width, height);
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for an image of %" PRIu32 "x%" PRIu32 " pixels", width,
+                          height);
     return STRL_OK;
 }
 
@@ -33,7 +34,8 @@ void strl_image_deinit(strl_image *image)
 
 strl_status strl_image_write_png(const strl_image *image, const char *path, strl_error *err)
 {
-    png_image png = {.version = PNG_IMAGE_VERSION, .width = image->width, .height = image->height, .format = PNG_FORMAT_RGB};
+    png_image png = {
+        .version = PNG_IMAGE_VERSION, .width = image->width, .height = image->height, .format = PNG_FORMAT_RGB};
     strl_output *output = NULL;
     FILE *stream = NULL;
     strl_status status = strl_output_open(path, NULL, &output, err);
@@ -55,8 +57,8 @@ strl_status strl_image_read_png(strl_image *image, const char *path, strl_error 
         return strl__fail(err, STRL_ERR_FORMAT, "cannot read the image %s: %s", path, png.message);
     strl_status status;
     if (png.width > MOST_SIDE || png.height > MOST_SIDE)
-        status = strl__fail(err, STRL_ERR_LIMIT, "the image %s has %ux%u pixels, expected at most %ux%u", path, png.width, png.height,
-                            MOST_SIDE, MOST_SIDE);
+        status = strl__fail(err, STRL_ERR_LIMIT, "the image %s has %ux%u pixels, expected at most %ux%u", path,
+                            png.width, png.height, MOST_SIDE, MOST_SIDE);
     else
         status = strl_image_init(image, png.width, png.height, err);
     png.format = PNG_FORMAT_RGB;
@@ -79,7 +81,8 @@ strl_status strl_depth_write(const float *depth, uint32_t width, uint32_t height
     if (status == STRL_OK)
         status = strl_file_write(file, 0, head, (size_t)head_bytes, err);
     for (uint32_t row = 0; status == STRL_OK && row < height; row++)
-        status = strl_file_write(file, (uint64_t)head_bytes + row * row_bytes, depth + (size_t)(height - 1 - row) * width, row_bytes, err);
+        status = strl_file_write(file, (uint64_t)head_bytes + row * row_bytes,
+                                 depth + (size_t)(height - 1 - row) * width, row_bytes, err);
     if (status == STRL_OK)
         status = strl_output_finish(output, false, err);
     strl_output_close(output);
@@ -97,13 +100,15 @@ static strl_status read_head(strl_file *file, uint32_t *width, uint32_t *height,
         return status;
     head[got] = 0;
     float scale = 0;
-    if (sscanf(head, "Pf%*1[\n]%" SCNu32 " %" SCNu32 "%*1[\n]%f%*1[\n]%n", width, height, &scale, &used) != 3 || used == 0 || !(scale < 0))
-        return strl__fail(err, STRL_ERR_FORMAT, "%s is not a depth file: expected the head of a little-endian one-channel PFM",
+    if (sscanf(head, "Pf%*1[\n]%" SCNu32 " %" SCNu32 "%*1[\n]%f%*1[\n]%n", width, height, &scale, &used) != 3 ||
+        used == 0 || !(scale < 0))
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "%s is not a depth file: expected the head of a little-endian one-channel PFM",
                           strl_file_path(file));
     *at = (uint64_t)used;
     if (*width == 0 || *height == 0 || *width > MOST_SIDE || *height > MOST_SIDE)
-        return strl__fail(err, STRL_ERR_LIMIT, "%s has %" PRIu32 "x%" PRIu32 " pixels, expected 1x1 to %ux%u", strl_file_path(file),
-                          *width, *height, MOST_SIDE, MOST_SIDE);
+        return strl__fail(err, STRL_ERR_LIMIT, "%s has %" PRIu32 "x%" PRIu32 " pixels, expected 1x1 to %ux%u",
+                          strl_file_path(file), *width, *height, MOST_SIDE, MOST_SIDE);
     uint64_t expected = *at + (uint64_t)*width * *height * sizeof(float);
     if (strl_file_bytes(file) != expected)
         return strl__fail(err, STRL_ERR_FORMAT, "%s has %" PRIu64 " bytes, expected %" PRIu64, strl_file_path(file),
@@ -126,7 +131,8 @@ strl_status strl_depth_read(float **depth, uint32_t *width, uint32_t *height, co
     }
     for (uint32_t row = 0; status == STRL_OK && row < *height; row++) {
         size_t row_bytes = (size_t)*width * sizeof **depth;
-        status = strl_file_read(file, at + row * row_bytes, *depth + (size_t)(*height - 1 - row) * *width, row_bytes, err);
+        status =
+            strl_file_read(file, at + row * row_bytes, *depth + (size_t)(*height - 1 - row) * *width, row_bytes, err);
     }
     strl_file_close(file, NULL);
     if (status != STRL_OK) {
@@ -155,7 +161,8 @@ strl_status strl_contact_sheet_init(strl_contact_sheet *sheet, uint32_t frames, 
 }
 
 /* The mean in linear light of the frame's pixels that one sheet pixel stands for. */
-static void average(const strl_image *image, uint32_t first_x, uint32_t first_y, uint32_t factor, const float linear[256], uint8_t rgb[3])
+static void average(const strl_image *image, uint32_t first_x, uint32_t first_y, uint32_t factor,
+                    const float linear[256], uint8_t rgb[3])
 {
     uint32_t end_x = first_x + factor < image->width ? first_x + factor : image->width;
     uint32_t end_y = first_y + factor < image->height ? first_y + factor : image->height;
