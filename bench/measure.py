@@ -46,9 +46,9 @@ def commit_of(root):
 def machine(root, program):
     """What every record says. `program` tells two builds apart even where the commit does not."""
     memory_bytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    return {"commit": commit_of(root), "program": hashlib.sha256(program.read_bytes()).hexdigest()[:12], "cpu": cpu_model(),
-            "cores": len(os.sched_getaffinity(0)), "memory_gib": round(memory_bytes / 2**30, 1), "system": system_name(),
-            "kernel": platform.release()}
+    return {"commit": commit_of(root), "program": hashlib.sha256(program.read_bytes()).hexdigest()[:12],
+            "cpu": cpu_model(), "cores": len(os.sched_getaffinity(0)), "memory_gib": round(memory_bytes / 2**30, 1),
+            "system": system_name(), "kernel": platform.release()}
 
 
 class Outcome:
@@ -67,7 +67,7 @@ class Outcome:
 
 
 def run(command, cores=None, allowed=(0,)):
-    """Runs a command on the first `cores` processors (None = all). Raises Failed at any other exit status than allowed."""
+    """Runs a command on the first `cores` processors (None = all). Raises Failed at any exit status not allowed."""
     words = [str(word) for word in command]
     processors = sorted(os.sched_getaffinity(0))
     confine = (lambda: os.sched_setaffinity(0, processors[:cores])) if cores else None

@@ -101,7 +101,8 @@ typedef struct probe {
     float *depth; /* owned */
 } probe;
 
-static strl_status probe_init(probe *look, const strl_path_site *site, const double from[3], const double up[3], strl_error *err)
+static strl_status probe_init(probe *look, const strl_path_site *site, const double from[3], const double up[3],
+                              strl_error *err)
 {
     double centre[3], radius;
     strl_path_sphere(site->bounds, centre, &radius);
@@ -135,7 +136,8 @@ static bool probe_point(const probe *look, int x, int y, double point[3])
     double right = ((x + 0.5) / PROBE_SIDE * 2 - 1) * look->view.half_width;
     double up = (1 - (y + 0.5) / PROBE_SIDE * 2) * look->view.half_height;
     for (int i = 0; i < 3; i++)
-        point[i] = look->view.eye[i] + right * look->view.right[i] + up * look->view.up[i] + depth * look->view.forward[i];
+        point[i] =
+            look->view.eye[i] + right * look->view.right[i] + up * look->view.up[i] + depth * look->view.forward[i];
     return true;
 }
 
@@ -156,7 +158,8 @@ static bool probe_nearest(const probe *look, int x, int y, double point[3])
 static void track(uint64_t seed, double phase, double *a, double *b)
 {
     double angle = 2 * M_PI * phase;
-    double radius = 0.5 + 0.18 * sin(2 * angle + 2 * M_PI * random_at(seed, 0)) + 0.1 * sin(3 * angle + 2 * M_PI * random_at(seed, 1));
+    double radius = 0.5 + 0.18 * sin(2 * angle + 2 * M_PI * random_at(seed, 0)) +
+                    0.1 * sin(3 * angle + 2 * M_PI * random_at(seed, 1));
     double start = 2 * M_PI * random_at(seed, 2);
     *a = radius * cos(angle + start);
     *b = radius * sin(angle + start);
@@ -186,7 +189,8 @@ static bool track_point(const strl_path_site *site, const probe *above, uint64_t
     return highest > -INFINITY;
 }
 
-strl_status strl_path_walk(const strl_path_site *site, size_t frames, uint64_t seed, strl_camera_path *path, strl_error *err)
+strl_status strl_path_walk(const strl_path_site *site, size_t frames, uint64_t seed, strl_camera_path *path,
+                           strl_error *err)
 {
     double down[3] = {0}, side[3] = {0};
     down[site->up_axis] = 1;
@@ -199,7 +203,8 @@ strl_status strl_path_walk(const strl_path_site *site, size_t frames, uint64_t s
     for (size_t f = 0; status == STRL_OK && f < frames; f++) {
         strl_path_frame *frame = &path->frames[f];
         double phase = (double)f / (double)frames;
-        if (!track_point(site, &above, seed, phase, frame->eye) || !track_point(site, &above, seed, phase + 0.03, frame->target))
+        if (!track_point(site, &above, seed, phase, frame->eye) ||
+            !track_point(site, &above, seed, phase + 0.03, frame->target))
             status = strl__fail(err, STRL_ERR_ARGUMENT, "the model has no surface to walk on");
         frame->up[site->up_axis] = 1;
     }
@@ -216,8 +221,8 @@ typedef struct stops {
     double eye[FLY_STOPS + 2][3], target[FLY_STOPS + 2][3], knot[FLY_STOPS + 2];
 } stops;
 
-static strl_status find_stop(const strl_path_site *site, uint64_t seed, int stop, double radius, double surface[3], double eye[3],
-                             strl_error *err)
+static strl_status find_stop(const strl_path_site *site, uint64_t seed, int stop, double radius, double surface[3],
+                             double eye[3], strl_error *err)
 {
     double way[3], up[3] = {0};
     double azimuth = 2 * M_PI * (random_at(seed, 10) + (stop + 0.5 * random_at(seed, 20 + (uint64_t)stop)) / FLY_STOPS);
@@ -271,8 +276,8 @@ static double curve(double (*points)[3], const double *knot, int s, double t, in
     double slope0 = (points[s + 1][axis] - points[before][axis]) / (knot[s + 1] - knot[before]);
     double slope1 = (points[after][axis] - points[s][axis]) / (knot[after] - knot[s]);
     double u2 = u * u, u3 = u2 * u;
-    return (2 * u3 - 3 * u2 + 1) * points[s][axis] + (u3 - 2 * u2 + u) * span * slope0 + (3 * u2 - 2 * u3) * points[s + 1][axis] +
-           (u3 - u2) * span * slope1;
+    return (2 * u3 - 3 * u2 + 1) * points[s][axis] + (u3 - 2 * u2 + u) * span * slope0 +
+           (3 * u2 - 2 * u3) * points[s + 1][axis] + (u3 - u2) * span * slope1;
 }
 
 /* An up vector that is not along the view. */
@@ -286,7 +291,8 @@ static void set_up(strl_path_frame *frame, unsigned up_axis)
         frame->up[i] = i == (steep ? (up_axis + 1) % 3 : up_axis);
 }
 
-strl_status strl_path_flythrough(const strl_path_site *site, size_t frames, uint64_t seed, strl_camera_path *path, strl_error *err)
+strl_status strl_path_flythrough(const strl_path_site *site, size_t frames, uint64_t seed, strl_camera_path *path,
+                                 strl_error *err)
 {
     stops all = {0};
     strl_status status = find_stops(site, seed, &all, err);
@@ -318,7 +324,8 @@ strl_status strl_path_parse(const strl_path_site *site, const char *spec, strl_c
         const char *word;
         double *values;
         int count;
-    } known[] = {{"eye", frame->eye, 3}, {"target", frame->target, 3}, {"up", frame->up, 3}, {"fov", &path->fov_y_deg, 1}};
+    } known[] = {
+        {"eye", frame->eye, 3}, {"target", frame->target, 3}, {"up", frame->up, 3}, {"fov", &path->fov_y_deg, 1}};
     const char *at = spec + strspn(spec, " ,\t");
     while (status == STRL_OK && *at) {
         size_t length = strcspn(at, " ,\t"), k = 0;
@@ -333,7 +340,8 @@ strl_status strl_path_parse(const strl_path_site *site, const char *spec, strl_c
             char *end;
             known[k].values[i] = strtod(at += strspn(at, " ,\t"), &end);
             if (end == at || (*end && !strchr(" ,\t", *end)) || !isfinite(known[k].values[i]))
-                status = strl__fail(err, STRL_ERR_ARGUMENT, "camera: expected a number after \"%s\", found \"%.40s\"", known[k].word, at);
+                status = strl__fail(err, STRL_ERR_ARGUMENT, "camera: expected a number after \"%s\", found \"%.40s\"",
+                                    known[k].word, at);
             at = end;
         }
         at += strspn(at, " ,\t");

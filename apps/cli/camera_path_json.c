@@ -31,15 +31,19 @@ static strl_status read_frames(const json_t *root, const char *file, strl_camera
     const json_t *frames = json_object_get(root, "frames"), *fov = json_object_get(root, "fov_y_deg");
     size_t count = json_array_size(frames);
     if (count == 0 || count > MOST_FRAMES)
-        return strl__fail(err, STRL_ERR_FORMAT, "path file %s: expected \"frames\" with 1 to %u entries, found %zu", file, MOST_FRAMES, count);
-    *path = (strl_camera_path){json_is_number(fov) ? json_number_value(fov) : 60, count, strl__alloc_zero(count, sizeof *path->frames)};
+        return strl__fail(err, STRL_ERR_FORMAT, "path file %s: expected \"frames\" with 1 to %u entries, found %zu",
+                          file, MOST_FRAMES, count);
+    *path = (strl_camera_path){json_is_number(fov) ? json_number_value(fov) : 60, count,
+                               strl__alloc_zero(count, sizeof *path->frames)};
     if (!path->frames)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a path of %zu frames", count);
     for (size_t f = 0; f < count; f++) {
         const json_t *entry = json_array_get(frames, f);
         strl_path_frame *frame = &path->frames[f];
-        if (!read_vector(entry, "eye", frame->eye) || !read_vector(entry, "target", frame->target) || !read_vector(entry, "up", frame->up))
-            return strl__fail(err, STRL_ERR_FORMAT, "path file %s: frame %zu: expected eye, target and up of three numbers each", file, f);
+        if (!read_vector(entry, "eye", frame->eye) || !read_vector(entry, "target", frame->target) ||
+            !read_vector(entry, "up", frame->up))
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "path file %s: frame %zu: expected eye, target and up of three numbers each", file, f);
         const char *fault = strl_path_fault(path, f);
         if (fault)
             return strl__fail(err, STRL_ERR_FORMAT, "path file %s: frame %zu: %s", file, f, fault);
@@ -75,8 +79,8 @@ strl_status strl_path_save(const strl_camera_path *path, const char *file, strl_
     json_t *frames = json_array();
     for (size_t f = 0; f < path->count; f++) {
         const strl_path_frame *frame = &path->frames[f];
-        json_array_append_new(frames, json_pack("{s:o,s:o,s:o}", "eye", vector_of(frame->eye), "target", vector_of(frame->target), "up",
-                                                vector_of(frame->up)));
+        json_array_append_new(frames, json_pack("{s:o,s:o,s:o}", "eye", vector_of(frame->eye), "target",
+                                                vector_of(frame->target), "up", vector_of(frame->up)));
     }
     json_t *root = json_pack("{s:f,s:o}", "fov_y_deg", path->fov_y_deg, "frames", frames);
     strl_output *output = NULL;

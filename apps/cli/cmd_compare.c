@@ -48,12 +48,14 @@ static strl_status load_files(frame_files *files, const char *folder, size_t fra
     snprintf(name, sizeof name, "frame_%05zu.pfm", frame);
     char *pfm = strl_path_join(folder, name);
     *files = (frame_files){0};
-    strl_status status = png && pfm ? strl_image_read_png(&files->image, png, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
+    strl_status status = png && pfm ? strl_image_read_png(&files->image, png, err)
+                                    : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
     if (status == STRL_OK)
         status = strl_depth_read(&files->depth, &width, &height, pfm, err);
     if (status == STRL_OK && (width != files->image.width || height != files->image.height))
-        status = strl__fail(err, STRL_ERR_FORMAT, "%s has %" PRIu32 "x%" PRIu32 " pixels, its image %" PRIu32 "x%" PRIu32, pfm, width, height,
-                            files->image.width, files->image.height);
+        status =
+            strl__fail(err, STRL_ERR_FORMAT, "%s has %" PRIu32 "x%" PRIu32 " pixels, its image %" PRIu32 "x%" PRIu32,
+                       pfm, width, height, files->image.width, files->image.height);
     strl__free(png);
     strl__free(pfm);
     return status;
@@ -83,7 +85,8 @@ static void add_frame(compare_totals *totals, size_t frame, const strl_compare_f
     totals->psnr_db[totals->psnr_count++] = result->psnr_db;
 }
 
-static strl_status compare_frame(const compare_options *o, const strl_camera_path *path, size_t frame, compare_totals *totals, strl_error *err)
+static strl_status compare_frame(const compare_options *o, const strl_camera_path *path, size_t frame,
+                                 compare_totals *totals, strl_error *err)
 {
     frame_files reference, images;
     strl_status status = load_files(&reference, o->reference, frame, err);
@@ -92,14 +95,18 @@ static strl_status compare_frame(const compare_options *o, const strl_camera_pat
         return status;
     }
     status = load_files(&images, o->images, frame, err);
-    if (status == STRL_OK && (images.image.width != reference.image.width || images.image.height != reference.image.height))
-        status = strl__fail(err, STRL_ERR_FORMAT, "frame %zu of %s has %" PRIu32 "x%" PRIu32 " pixels, that of %s %" PRIu32 "x%" PRIu32, frame,
-                            o->images, images.image.width, images.image.height, o->reference, reference.image.width, reference.image.height);
+    if (status == STRL_OK &&
+        (images.image.width != reference.image.width || images.image.height != reference.image.height))
+        status = strl__fail(err, STRL_ERR_FORMAT,
+                            "frame %zu of %s has %" PRIu32 "x%" PRIu32 " pixels, that of %s %" PRIu32 "x%" PRIu32,
+                            frame, o->images, images.image.width, images.image.height, o->reference,
+                            reference.image.width, reference.image.height);
     if (status == STRL_OK) {
         strl_compare_frame result;
         double focal_px = reference.image.height / (2 * tan(path->fov_y_deg * (M_PI / 360)));
-        strl_compare_images(&(strl_compare_side){reference.image.rgb, reference.depth}, &(strl_compare_side){images.image.rgb, images.depth},
-                            reference.image.width, reference.image.height, o->error_px, focal_px, &result);
+        strl_compare_images(&(strl_compare_side){reference.image.rgb, reference.depth},
+                            &(strl_compare_side){images.image.rgb, images.depth}, reference.image.width,
+                            reference.image.height, o->error_px, focal_px, &result);
         add_frame(totals, frame, &result);
     }
     free_files(&reference);
@@ -110,7 +117,8 @@ static strl_status compare_frame(const compare_options *o, const strl_camera_pat
 static strl_status load_path(const char *folder, strl_camera_path *path, strl_error *err)
 {
     char *file = strl_path_join(folder, "path.json");
-    strl_status status = file ? strl_path_load(file, path, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
+    strl_status status =
+        file ? strl_path_load(file, path, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
     strl__free(file);
     if (status == STRL_ERR_IO)
         return strl__fail_context(err, status, "%s is no folder of images that `stroll render` wrote", folder);
@@ -126,8 +134,10 @@ static strl_status load_common_path(const compare_options *o, strl_camera_path *
         status = load_path(o->images, &other, err);
     if (status == STRL_OK && (path->count != other.count || path->fov_y_deg != other.fov_y_deg ||
                               memcmp(path->frames, other.frames, path->count * sizeof *path->frames) != 0))
-        status = strl__fail(err, STRL_ERR_ARGUMENT, "%s and %s were drawn with different cameras: save the path of one (--save-path) and load "
-                            "it for the other (--path)", o->reference, o->images);
+        status = strl__fail(err, STRL_ERR_ARGUMENT,
+                            "%s and %s were drawn with different cameras: save the path of one (--save-path) and load "
+                            "it for the other (--path)",
+                            o->reference, o->images);
     strl_path_deinit(&other);
     return status;
 }
@@ -159,10 +169,12 @@ static strl_status compare(const compare_options *o, compare_totals *totals, str
     strl_cli_progress_end(&progress);
     totals->frames = path.count;
     if (status == STRL_OK && totals->psnr_count == 0)
-        status = strl__fail(err, STRL_ERR_ARGUMENT, "no pixel of %s or %s is covered: there is nothing to compare", o->reference, o->images);
+        status = strl__fail(err, STRL_ERR_ARGUMENT, "no pixel of %s or %s is covered: there is nothing to compare",
+                            o->reference, o->images);
     if (status == STRL_OK) {
         qsort(totals->psnr_db, totals->psnr_count, sizeof *totals->psnr_db, by_value);
-        totals->psnr_median = (totals->psnr_db[(totals->psnr_count - 1) / 2] + totals->psnr_db[totals->psnr_count / 2]) / 2;
+        totals->psnr_median =
+            (totals->psnr_db[(totals->psnr_count - 1) / 2] + totals->psnr_db[totals->psnr_count / 2]) / 2;
     }
     strl_path_deinit(&path);
     return status;
@@ -179,33 +191,45 @@ static double depth_share(const compare_totals *t)
 static strl_status judge(const compare_options *o, const compare_totals *t, strl_error *err)
 {
     if (t->uncovered + t->overcovered > 0)
-        return strl__fail(err, STRL_ERR_LIMIT, "coverage: %" PRIu64 " pixels are background where the reference is wholly covered and %" PRIu64
-                          " the other way round, expected 0; most in frame %zu", t->uncovered, t->overcovered, t->worst_coverage_frame);
+        return strl__fail(err, STRL_ERR_LIMIT,
+                          "coverage: %" PRIu64
+                          " pixels are background where the reference is wholly covered and %" PRIu64
+                          " the other way round, expected 0; most in frame %zu",
+                          t->uncovered, t->overcovered, t->worst_coverage_frame);
     if (depth_share(t) < LEAST_DEPTH_SHARE)
-        return strl__fail(err, STRL_ERR_LIMIT, "depth: %.4f %% of the pixels covered in both are within the reference's range, expected %.1f %%; "
-                          "fewest in frame %zu", 100 * depth_share(t), 100 * LEAST_DEPTH_SHARE, t->worst_depth_frame);
+        return strl__fail(
+            err, STRL_ERR_LIMIT,
+            "depth: %.4f %% of the pixels covered in both are within the reference's range, expected %.1f %%; "
+            "fewest in frame %zu",
+            100 * depth_share(t), 100 * LEAST_DEPTH_SHARE, t->worst_depth_frame);
     if (t->psnr_median < o->least_psnr_db)
-        return strl__fail(err, STRL_ERR_LIMIT, "colour: the median PSNR is %.2f dB, expected at least %.2f; least in frame %zu", t->psnr_median,
-                          o->least_psnr_db, t->worst_psnr_frame);
+        return strl__fail(err, STRL_ERR_LIMIT,
+                          "colour: the median PSNR is %.2f dB, expected at least %.2f; least in frame %zu",
+                          t->psnr_median, o->least_psnr_db, t->worst_psnr_frame);
     return STRL_OK;
 }
 
 static void print_json(const compare_options *o, const compare_totals *t, bool holds)
 {
-    printf("{\"frames\":%zu,\"error_px\":%.6g,\"uncovered_pixels\":%" PRIu64 ",\"overcovered_pixels\":%" PRIu64 ",\"worst_coverage_frame\":%zu,"
-           "\"covered_in_both\":%" PRIu64 ",\"depth_within\":%.8f,\"worst_depth_frame\":%zu,\"psnr_min_db\":%.4f,\"psnr_median_db\":%.4f,"
+    printf("{\"frames\":%zu,\"error_px\":%.6g,\"uncovered_pixels\":%" PRIu64 ",\"overcovered_pixels\":%" PRIu64
+           ",\"worst_coverage_frame\":%zu,"
+           "\"covered_in_both\":%" PRIu64
+           ",\"depth_within\":%.8f,\"worst_depth_frame\":%zu,\"psnr_min_db\":%.4f,\"psnr_median_db\":%.4f,"
            "\"worst_psnr_frame\":%zu,\"least_psnr_db\":%.6g,\"holds\":%s}\n",
-           t->frames, o->error_px, t->uncovered, t->overcovered, t->worst_coverage_frame, t->both, depth_share(t), t->worst_depth_frame,
-           t->psnr_least, t->psnr_median, t->worst_psnr_frame, o->least_psnr_db, holds ? "true" : "false");
+           t->frames, o->error_px, t->uncovered, t->overcovered, t->worst_coverage_frame, t->both, depth_share(t),
+           t->worst_depth_frame, t->psnr_least, t->psnr_median, t->worst_psnr_frame, o->least_psnr_db,
+           holds ? "true" : "false");
 }
 
 static void print_text(const compare_totals *t)
 {
     printf("%zu frame%s\n", t->frames, strl_cli_plural(t->frames));
-    printf("coverage  %" PRIu64 " uncovered, %" PRIu64 " overcovered pixels (worst frame %zu)\n", t->uncovered, t->overcovered,
-           t->worst_coverage_frame);
-    printf("depth     %.4f %% of %" PRIu64 " pixels within the range (worst frame %zu)\n", 100 * depth_share(t), t->both, t->worst_depth_frame);
-    printf("colour    PSNR median %.2f dB, least %.2f dB (frame %zu)\n", t->psnr_median, t->psnr_least, t->worst_psnr_frame);
+    printf("coverage  %" PRIu64 " uncovered, %" PRIu64 " overcovered pixels (worst frame %zu)\n", t->uncovered,
+           t->overcovered, t->worst_coverage_frame);
+    printf("depth     %.4f %% of %" PRIu64 " pixels within the range (worst frame %zu)\n", 100 * depth_share(t),
+           t->both, t->worst_depth_frame);
+    printf("colour    PSNR median %.2f dB, least %.2f dB (frame %zu)\n", t->psnr_median, t->psnr_least,
+           t->worst_psnr_frame);
 }
 
 static int run(strl_cli_args *args)
@@ -219,10 +243,13 @@ static int run(strl_cli_args *args)
         {.name = "json", .kind = STRL_CLI_FLAG, .value = &o.json, .help = "print one JSON object"},
     };
     const strl_cli_usage usage = {
-        .positional = "DIR_A DIR_B", .least = 2, .most = 2, .options = options, .option_count = STRL_CLI_COUNT_OF(options),
+        .positional = "DIR_A DIR_B", .least = 2, .most = 2, .options = options,
+        .option_count = STRL_CLI_COUNT_OF(options),
         .notes = "Both are folders that `stroll render --depth` wrote with the same cameras; DIR_A is the reference.\n"
-                 "Limits: where the 5x5 neighbourhood of a pixel is wholly covered (background) in A, the pixel is covered (background) in B;\n"
-                 "99.9 % of the pixels covered in both have a depth within the range of A's 3x3 neighbourhood widened by PX z / f;\n"
+                 "Limits: where the 5x5 neighbourhood of a pixel is wholly covered (background) in A, the pixel is "
+                 "covered (background) in B;\n"
+                 "99.9 % of the pixels covered in both have a depth within the range of A's 3x3 neighbourhood widened "
+                 "by PX z / f;\n"
                  "the median over the frames of the PSNR over pixels covered in either is at least DB."};
     strl_cli_list folders;
     int stop = strl_cli_parse(args, &usage, &folders);

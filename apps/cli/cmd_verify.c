@@ -86,11 +86,12 @@ static json_t *json_cuts(const strl_verify_cut *cuts, uint32_t count)
     json_t *array = json_array();
     for (uint32_t i = 0; i < count; i++) {
         const strl_verify_cut *cut = &cuts[i];
-        json_array_append_new(
-            array, json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:I, s:I, s:I}", "error", cut->error, "claimed",
-                             cut->claimed, "measured_from_input", cut->from_input, "measured_to_input", cut->to_input,
-                             "rms", cut->rms, "claimed_over_measured", strl_verify_ratio(cut), "nodes", (json_int_t)cut->nodes,
-                             "triangles", (json_int_t)cut->triangles, "points", (json_int_t)cut->points));
+        json_array_append_new(array,
+                              json_pack("{s:f, s:f, s:f, s:f, s:f, s:f, s:I, s:I, s:I}", "error", cut->error, "claimed",
+                                        cut->claimed, "measured_from_input", cut->from_input, "measured_to_input",
+                                        cut->to_input, "rms", cut->rms, "claimed_over_measured", strl_verify_ratio(cut),
+                                        "nodes", (json_int_t)cut->nodes, "triangles", (json_int_t)cut->triangles,
+                                        "points", (json_int_t)cut->points));
     }
     return array;
 }

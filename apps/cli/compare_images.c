@@ -16,7 +16,8 @@ static bool covered(const float *depth, size_t pixel)
 }
 
 /* How many pixels of the neighbourhood lie in the image, and how many of those are covered. */
-static void count_neighbours(const float *depth, frame_size size, int x, int y, int reach, int *inside, int *covered_count)
+static void count_neighbours(const float *depth, frame_size size, int x, int y, int reach, int *inside,
+                             int *covered_count)
 {
     *inside = *covered_count = 0;
     for (int dy = -reach; dy <= reach; dy++)
@@ -28,7 +29,8 @@ static void count_neighbours(const float *depth, frame_size size, int x, int y, 
         }
 }
 
-static void compare_coverage(const float *reference, const float *image, frame_size size, int x, int y, strl_compare_frame *result)
+static void compare_coverage(const float *reference, const float *image, frame_size size, int x, int y,
+                             strl_compare_frame *result)
 {
     size_t pixel = (size_t)y * (size_t)size.width + (size_t)x;
     /* Where both agree there is nothing to find: most pixels. */
@@ -77,8 +79,8 @@ static double psnr(const strl_compare_side *a, const strl_compare_side *b, size_
     return fmin(MOST_DB, 10 * log10(255.0 * 255.0 * 3 * (double)*either / sum));
 }
 
-void strl_compare_images(const strl_compare_side *reference, const strl_compare_side *image, uint32_t width, uint32_t height,
-                         double error_px, double focal_px, strl_compare_frame *result)
+void strl_compare_images(const strl_compare_side *reference, const strl_compare_side *image, uint32_t width,
+                         uint32_t height, double error_px, double focal_px, strl_compare_frame *result)
 {
     frame_size size = {(int)width, (int)height};
     *result = (strl_compare_frame){0};

@@ -1,4 +1,5 @@
-/* A progress line on the terminal: bar, rate, time left. Silent under --quiet and where standard error is no terminal. */
+/* A progress line on the terminal: bar, rate, time left. Silent under --quiet and where standard error is no
+ * terminal. */
 #ifndef STRL_CLI_PROGRESS_H
 #define STRL_CLI_PROGRESS_H
 

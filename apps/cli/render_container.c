@@ -3,8 +3,8 @@
 #include <math.h>
 #include <string.h>
 
-void strl_render_world_box(const strl_tree *tree, const double transform[12], const int64_t box_min[3], const int64_t box_max[3],
-                           strl_box *box)
+void strl_render_world_box(const strl_tree *tree, const double transform[12], const int64_t box_min[3],
+                           const int64_t box_max[3], strl_box *box)
 {
     for (int row = 0; row < 3; row++) {
         const double *m = transform + 4 * row;

@@ -37,7 +37,9 @@ typedef struct full_draw {
 
 static strl_status flush(full_draw *draw, strl_error *err)
 {
-    strl_draw_list list = {.items = draw->model->items, .count = draw->model->item_count, .near_distance = draw->near_distance,
+    strl_draw_list list = {.items = draw->model->items,
+                           .count = draw->model->item_count,
+                           .near_distance = draw->near_distance,
                            .far_distance = draw->far_distance};
     strl_render_stats drawn;
     strl_status status = strl_renderer_draw(draw->renderer, draw->camera, &list, &draw->options, &drawn, err);
@@ -67,8 +69,8 @@ static strl_vertex *make_vertices(const strl_pm *mesh, strl_arena *arena)
 }
 
 /* Decodes a leaf and puts it into the batch. */
-static strl_status add_leaf(full_draw *draw, const strl_tree *tree, const strl_cut *cut, uint32_t id, const strl_node *record,
-                            uint64_t placement, const double transform[12], strl_error *err)
+static strl_status add_leaf(full_draw *draw, const strl_tree *tree, const strl_cut *cut, uint32_t id,
+                            const strl_node *record, uint64_t placement, const double transform[12], strl_error *err)
 {
     full_model *model = draw->model;
     strl_pm mesh;
@@ -76,9 +78,16 @@ static strl_status add_leaf(full_draw *draw, const strl_tree *tree, const strl_c
     if (status != STRL_OK)
         return status;
     strl_draw_item *item = &model->items[model->item_count];
-    *item = (strl_draw_item){.key = (placement << 40 | (uint64_t)cut->tree << 32 | id) + 1, .placement = (uint32_t)placement, .node = id,
-                             .level = record->level, .group = record->group, .visible = true, .vertex_count = mesh.vertex_count,
-                             .indices = mesh.triangle[0], .index_count = 3 * mesh.triangle_count, .step = tree->step};
+    *item = (strl_draw_item){.key = (placement << 40 | (uint64_t)cut->tree << 32 | id) + 1,
+                             .placement = (uint32_t)placement,
+                             .node = id,
+                             .level = record->level,
+                             .group = record->group,
+                             .visible = true,
+                             .vertex_count = mesh.vertex_count,
+                             .indices = mesh.triangle[0],
+                             .index_count = 3 * mesh.triangle_count,
+                             .step = tree->step};
     item->vertices = make_vertices(&mesh, &model->arena);
     if (!item->vertices)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for the vertices of node %" PRIu32, id);

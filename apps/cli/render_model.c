@@ -26,7 +26,8 @@ strl_status strl_render_model_open(const strl_render_model_desc *desc, strl_rend
 {
     *model = NULL;
     if (strstr(desc->path, "://"))
-        return strl__fail(err, STRL_ERR_UNSUPPORTED, "%s: models behind an address are not supported yet, expected a file", desc->path);
+        return strl__fail(err, STRL_ERR_UNSUPPORTED,
+                          "%s: models behind an address are not supported yet, expected a file", desc->path);
     bool container;
     strl_status status = is_container(desc->path, &container, err);
     if (status != STRL_OK)
@@ -34,8 +35,10 @@ strl_status strl_render_model_open(const strl_render_model_desc *desc, strl_rend
     if (container)
         return desc->full ? strl_render_full_open(desc, model, err) : strl_render_walk_open(desc, model, err);
     if (!desc->full)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "%s is not a container: build one first (stroll build), or draw its triangles as read "
-                          "with --full", desc->path);
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "%s is not a container: build one first (stroll build), or draw its triangles as read "
+                          "with --full",
+                          desc->path);
     return strl_render_soup_open(desc, model, err);
 }
 

@@ -1,5 +1,5 @@
-/* What `stroll render` draws: an input file as read, a container's finest level, or a walk through a container. Each turns a camera
- * into an image of a renderer. */
+/* What `stroll render` draws: an input file as read, a container's finest level, or a walk through a container. Each
+ * turns a camera into an image of a renderer. */
 #ifndef STRL_CLI_RENDER_MODEL_H
 #define STRL_CLI_RENDER_MODEL_H
 
@@ -55,8 +55,8 @@ strl_status strl_render_soup_open(const strl_render_model_desc *desc, strl_rende
 strl_status strl_render_full_open(const strl_render_model_desc *desc, strl_render_model **model, strl_error *err);
 strl_status strl_render_walk_open(const strl_render_model_desc *desc, strl_render_model **model, strl_error *err);
 
-/* Near and far of a list whose visible boxes lie between least and largest along the view. The eye may stand inside a box; the depth
- * buffer still wants a near plane before it. */
+/* Near and far of a list whose visible boxes lie between least and largest along the view. The eye may stand inside a
+ * box; the depth buffer still wants a near plane before it. */
 void strl_render_set_range(strl_draw_list *list, double least, double largest);
 /* Adds a renderer's figures of one draw. */
 void strl_render_add_stats(strl_image_stats *stats, const strl_render_stats *drawn);

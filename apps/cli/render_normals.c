@@ -8,7 +8,8 @@
 #include "base/memory.h"
 
 #define CREASE_COSINE 0.76604444f /* 40 degrees */
-/* Faces looked at round one corner: a pole with a million faces would take a million squared. They are spread evenly over all. */
+/* Faces looked at round one corner: a pole with a million faces would take a million squared. They are spread evenly
+ * over all. */
 #define MOST_FACES 2048u
 
 typedef struct face {
@@ -29,7 +30,8 @@ struct strl_smooth_normals {
 
 static strl_status fail_memory(const strl_smooth_normals *normals, strl_error *err)
 {
-    return strl__fail(err, STRL_ERR_MEMORY, "no memory for the normals of more than %zu triangles", normals->face_count);
+    return strl__fail(err, STRL_ERR_MEMORY, "no memory for the normals of more than %zu triangles",
+                      normals->face_count);
 }
 
 strl_status strl_smooth_normals_create(strl_smooth_normals **normals, strl_error *err)
@@ -85,7 +87,8 @@ static bool number_position(strl_smooth_normals *normals, const float position[3
     size_t at = slot_of(normals, plain);
     if (!normals->slots[at]) {
         if (normals->position_count >= UINT32_MAX - 1 ||
-            !strl__grow(&normals->position, &normals->position_capacity, normals->position_count + 1, sizeof *normals->position))
+            !strl__grow(&normals->position, &normals->position_capacity, normals->position_count + 1,
+                        sizeof *normals->position))
             return false;
         memcpy(normals->position[normals->position_count++], plain, sizeof plain);
         normals->slots[at] = (uint32_t)normals->position_count;
@@ -97,7 +100,8 @@ static bool number_position(strl_smooth_normals *normals, const float position[3
 strl_status strl_smooth_normals_add(strl_smooth_normals *normals, const float position[3][3], strl_error *err)
 {
     if (normals->face_count >= UINT32_MAX / 3)
-        return strl__fail(err, STRL_ERR_LIMIT, "more than %zu triangles without normals cannot be drawn as read; give the file normals",
+        return strl__fail(err, STRL_ERR_LIMIT,
+                          "more than %zu triangles without normals cannot be drawn as read; give the file normals",
                           normals->face_count);
     if (!strl__grow(&normals->faces, &normals->face_capacity, normals->face_count + 1, sizeof *normals->faces))
         return fail_memory(normals, err);

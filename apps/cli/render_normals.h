@@ -1,5 +1,5 @@
-/* Normals for triangles that came without: by position, angle-weighted, with a crease of 40 degrees. Holds the whole mesh in memory
- * (about 70 bytes a triangle): for reference images, not for builds. */
+/* Normals for triangles that came without: by position, angle-weighted, with a crease of 40 degrees. Holds the whole
+ * mesh in memory (about 70 bytes a triangle): for reference images, not for builds. */
 #ifndef STRL_CLI_RENDER_NORMALS_H
 #define STRL_CLI_RENDER_NORMALS_H
 

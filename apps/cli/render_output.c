@@ -19,7 +19,8 @@ static bool ends_in_png(const char *path)
     return length > 4 && strcasecmp(path + length - 4, ".png") == 0;
 }
 
-/* Whether the name's end looks like that of another kind of file: a dot and two to six letters and digits, not digits alone. */
+/* Whether the name's end looks like that of another kind of file: a dot and two to six letters and digits, not digits
+ * alone. */
 static bool has_extension(const char *path)
 {
     const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path, *dot = strrchr(name, '.');
@@ -41,15 +42,18 @@ static strl_status check_folder(const char *path, strl_error *err)
     strl_file_info info;
     if (strl_path_stat(path, &info, NULL) == STRL_OK && info.is_directory) {
         char *first = strl_path_join(path, "frame_00000.png");
-        strl_status status = first ? strl_output_check(first, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
+        strl_status status =
+            first ? strl_output_check(first, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
         strl__free(first);
         return status;
     }
     if (strl_path_exists(path))
         return strl__fail(err, STRL_ERR_ARGUMENT, "%s is not a folder: images go to NAME.png or into a folder", path);
     if (has_extension(path))
-        return strl__fail(err, STRL_ERR_ARGUMENT, "images go to NAME.png or into a folder, found %s (a new folder with a dot in its "
-                          "name is %s/)", path, path);
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "images go to NAME.png or into a folder, found %s (a new folder with a dot in its "
+                          "name is %s/)",
+                          path, path);
     size_t length = strlen(path);
     char *name = strl__strdup(path);
     if (!name)
@@ -70,7 +74,8 @@ static strl_status make_folder(strl_render_output *output, strl_error *err)
 {
     const strl_render_output_desc *desc = &output->desc;
     if (!output->folder && desc->cameras->count > 1)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "%zu frames need a folder to go to, found the file name %s", desc->cameras->count, desc->path);
+        return strl__fail(err, STRL_ERR_ARGUMENT, "%zu frames need a folder to go to, found the file name %s",
+                          desc->cameras->count, desc->path);
     output->made_folder = output->folder && !strl_path_exists(desc->path);
     return output->folder ? strl_path_make_directory(desc->path, err) : STRL_OK;
 }
@@ -83,9 +88,11 @@ static strl_status allocate(strl_render_output *output, strl_error *err)
     output->rgba = strl__alloc(pixels, 4);
     output->depth = strl__alloc(pixels, sizeof *output->depth);
     if (status == STRL_OK && (!output->rgba || !output->depth))
-        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for an image of %" PRIu32 "x%" PRIu32 " pixels", size[0], size[1]);
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for an image of %" PRIu32 "x%" PRIu32 " pixels", size[0],
+                            size[1]);
     if (status == STRL_OK && output->folder && frames > 1 && frames <= MOST_SHEET_FRAMES)
-        status = strl_contact_sheet_init(&output->sheet, (uint32_t)frames, size[0], size[1], output->desc.background, err);
+        status =
+            strl_contact_sheet_init(&output->sheet, (uint32_t)frames, size[0], size[1], output->desc.background, err);
     return status;
 }
 
@@ -126,7 +133,8 @@ static strl_status write_image(strl_render_output *output, size_t frame, strl_er
     for (size_t p = 0; p < pixels; p++)
         memcpy(output->image.rgb + 3 * p, output->rgba + 4 * p, 3);
     char *path = frame_path(output, frame, ".png");
-    strl_status status = path ? strl_image_write_png(&output->image, path, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
+    strl_status status = path ? strl_image_write_png(&output->image, path, err)
+                              : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
     strl__free(path);
     if (status == STRL_OK && output->sheet.image.rgb)
         strl_contact_sheet_add(&output->sheet, (uint32_t)frame, &output->image);
@@ -159,16 +167,27 @@ static json_t *real_or_null(double value)
 static strl_status write_stats(strl_render_output *output, size_t frame, const strl_image_stats *s, strl_error *err)
 {
     /* cull_ms: frustum culling is part of selecting; occlusion will have a stage of its own. */
-    json_t *line = json_pack("{s:I,s:b,s:f,s:f,s:f,s:f}", "frame", (json_int_t)frame, "realtime", output->desc.realtime, "frame_ms",
-                             (double)s->frame_ns * 1e-6, "select_ms", (double)s->select_ns * 1e-6, "cull_ms", 0.0, "draw_ms",
-                             (double)s->draw_ns * 1e-6);
+    json_t *line = json_pack("{s:I,s:b,s:f,s:f,s:f,s:f}", "frame", (json_int_t)frame, "realtime", output->desc.realtime,
+                             "frame_ms", (double)s->frame_ns * 1e-6, "select_ms", (double)s->select_ns * 1e-6,
+                             "cull_ms", 0.0, "draw_ms", (double)s->draw_ns * 1e-6);
     const struct {
         const char *name;
         uint64_t value;
-    } counts[] = {{"triangles", s->triangles}, {"splats", 0}, {"nodes", s->nodes}, {"nodes_culled", s->nodes_culled}, {"draws", s->draws},
-                  {"requests", s->requests}, {"bytes_read", s->bytes_read}, {"resident_bytes", s->resident_bytes}, {"gpu_bytes", s->gpu_bytes},
-                  {"uploaded_bytes", s->uploaded_bytes}, {"evictions", s->evictions}, {"covered_pixels", count_covered(output)},
-                  {"missing_nodes", s->missing_nodes}, {"fronts", s->fronts}, {"faults", s->faults}};
+    } counts[] = {{"triangles", s->triangles},
+                  {"splats", 0},
+                  {"nodes", s->nodes},
+                  {"nodes_culled", s->nodes_culled},
+                  {"draws", s->draws},
+                  {"requests", s->requests},
+                  {"bytes_read", s->bytes_read},
+                  {"resident_bytes", s->resident_bytes},
+                  {"gpu_bytes", s->gpu_bytes},
+                  {"uploaded_bytes", s->uploaded_bytes},
+                  {"evictions", s->evictions},
+                  {"covered_pixels", count_covered(output)},
+                  {"missing_nodes", s->missing_nodes},
+                  {"fronts", s->fronts},
+                  {"faults", s->faults}};
     int failed = !line;
     for (size_t c = 0; c < sizeof counts / sizeof *counts; c++)
         failed |= json_object_set_new(line, counts[c].name, json_integer((json_int_t)counts[c].value));
@@ -176,13 +195,14 @@ static strl_status write_stats(strl_render_output *output, size_t frame, const s
     failed |= json_object_set_new(line, "allowed_error_px", real_or_null(s->allowed_error_px));
     failed |= json_object_set_new(line, "last_fault", json_string(s->last_fault));
     if (!failed)
-        failed = json_dumpf(line, output->stats_stream, JSON_COMPACT | JSON_REAL_PRECISION(8)) != 0 || fputc('\n', output->stats_stream) == EOF;
+        failed = json_dumpf(line, output->stats_stream, JSON_COMPACT | JSON_REAL_PRECISION(8)) != 0 ||
+                 fputc('\n', output->stats_stream) == EOF;
     json_decref(line);
     return failed ? strl__fail(err, STRL_ERR_IO, "cannot write %s", output->desc.stats) : STRL_OK;
 }
 
-strl_status strl_render_output_add(strl_render_output *output, size_t frame, strl_renderer *renderer, const strl_image_stats *stats,
-                                   strl_error *err)
+strl_status strl_render_output_add(strl_render_output *output, size_t frame, strl_renderer *renderer,
+                                   const strl_image_stats *stats, strl_error *err)
 {
     strl_status status = STRL_OK;
     bool images = output->desc.path != NULL;
@@ -203,7 +223,8 @@ strl_status strl_render_output_finish(strl_render_output *output, strl_error *er
 {
     strl_status status = STRL_OK;
     if (output->folder) {
-        char *sheet = strl_path_join(output->desc.path, "contact.png"), *cameras = strl_path_join(output->desc.path, "path.json");
+        char *sheet = strl_path_join(output->desc.path, "contact.png"),
+             *cameras = strl_path_join(output->desc.path, "path.json");
         if (!sheet || !cameras)
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
         if (status == STRL_OK && output->sheet.image.rgb)

@@ -1,6 +1,6 @@
-/* An input file drawn as read: no weld, no lattice, no container. The reference for images. Its triangles are kept in memory as batches of
- * float vertices (about 20 bytes a triangle, and while a file without normals is read about 70 more); the renderer keeps
- * on the GPU what its budget allows and streams the rest in every frame. */
+/* An input file drawn as read: no weld, no lattice, no container. The reference for images. Its triangles are kept in
+ * memory as batches of float vertices (about 20 bytes a triangle, and while a file without normals is read about 70
+ * more); the renderer keeps on the GPU what its budget allows and streams the rest in every frame. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
@@ -59,14 +59,16 @@ typedef strl_status (*soup_take)(soup_load *load, const strl_triangle *triangle,
 static strl_status read_pass(soup_load *load, const char *stage, soup_take take, strl_error *err)
 {
     strl_triangle *triangles = strl__alloc(READ_TRIANGLES, sizeof *triangles);
-    strl_status status = triangles ? strl_reader_rewind(load->reader, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory to read triangles");
+    strl_status status = triangles ? strl_reader_rewind(load->reader, err)
+                                   : strl__fail(err, STRL_ERR_MEMORY, "no memory to read triangles");
     size_t count = 1;
     load->triangles = 0;
     while (status == STRL_OK && count > 0) {
         status = strl_reader_next(load->reader, triangles, READ_TRIANGLES, &count, err);
         for (size_t t = 0; status == STRL_OK && t < count; t++, load->triangles++)
             status = take(load, &triangles[t], err);
-        strl_cli_progress_update(load->progress, stage, strl_reader_bytes_done(load->reader), load->file_bytes, "bytes");
+        strl_cli_progress_update(load->progress, stage, strl_reader_bytes_done(load->reader), load->file_bytes,
+                                 "bytes");
         if (status == STRL_OK)
             status = strl_cli_check_interrupt(err);
     }
@@ -126,7 +128,8 @@ static strl_status close_batch(soup_load *load, strl_error *err)
                         .vertex_count = load->vertex_count, .index_count = load->index_count};
     model->batches[model->batch_count++] = batch;
     if (!batch.vertices || !batch.indices)
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory to hold the model: %" PRIu64 " triangles are read", load->triangles);
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory to hold the model: %" PRIu64 " triangles are read",
+                          load->triangles);
     memcpy(batch.vertices, load->vertices, load->vertex_count * sizeof *batch.vertices);
     memcpy(batch.indices, load->indices, load->index_count * sizeof *batch.indices);
     strl_box *box = &model->batches[model->batch_count - 1].box;
@@ -193,8 +196,13 @@ static strl_status make_items(soup_model *model, strl_error *err)
     for (size_t b = 0; b < model->batch_count; b++) {
         const soup_batch *batch = &model->batches[b];
         strl_draw_item *item = &model->items[b];
-        *item = (strl_draw_item){.key = b + 1, .node = (uint32_t)b, .vertices = batch->vertices, .vertex_count = batch->vertex_count,
-                                 .indices = batch->indices, .index_count = batch->index_count, .positions = STRL_POSITIONS_FLOAT};
+        *item = (strl_draw_item){.key = b + 1,
+                                 .node = (uint32_t)b,
+                                 .vertices = batch->vertices,
+                                 .vertex_count = batch->vertex_count,
+                                 .indices = batch->indices,
+                                 .index_count = batch->index_count,
+                                 .positions = STRL_POSITIONS_FLOAT};
         memcpy(item->origin, model->origin, sizeof item->origin);
         for (int i = 0; i < 3; i++)
             item->transform[i * 5] = 1;

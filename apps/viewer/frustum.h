@@ -8,7 +8,8 @@
 
 #define STRL_FRUSTUM_LINES 12u
 
-/* The pyramid of `seen` up to distance `far`, in pixels of `by`: x y x y. Returns how many lines lie before `by`'s eye. */
+/* The pyramid of `seen` up to distance `far`, in pixels of `by`: x y x y. Returns how many lines lie before `by`'s
+ * eye. */
 uint32_t strl_frustum_lines(const strl_camera *seen, double far, const strl_camera *by,
                             float lines[STRL_FRUSTUM_LINES][4]);
 

@@ -69,7 +69,8 @@ void strl_navigator_init(strl_navigator *n, const double bounds[6], unsigned up_
     strl_navigator_home(n);
 }
 
-/* The pivot of a new orbit is what lies ahead at the model's depth, so that turning does not throw the model out of sight. */
+/* The pivot of a new orbit is what lies ahead at the model's depth, so that turning does not throw the model out of
+ * sight. */
 void strl_navigator_set_mode(strl_navigator *n, strl_navigator_mode mode)
 {
     if (mode == STRL_NAVIGATOR_ORBIT && n->mode != mode) {

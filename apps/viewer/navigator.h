@@ -1,5 +1,5 @@
-/* Where the visitor is and looks. One state for both ways to move: orbit turns it about the pivot, which lies `distance`
- * ahead, fly about the eye. Drags are in pixels, y downward. Pure arithmetic: no window. */
+/* Where the visitor is and looks. One state for both ways to move: orbit turns it about the pivot, which lies
+ * `distance` ahead, fly about the eye. Drags are in pixels, y downward. Pure arithmetic: no window. */
 #ifndef STRL_VIEWER_NAVIGATOR_H
 #define STRL_VIEWER_NAVIGATOR_H
 

@@ -17,17 +17,19 @@ import sheets
 import tables
 
 MODELS = ("isosurface_3k", "isosurface_6k")
-ONE_EACH = ("build", "images_orbit", "images_flythrough", "psnr_orbit", "psnr_flythrough", "verify", "backends", "rate", "bytes",
-            "dependencies", "walk")
+ONE_EACH = ("build", "images_orbit", "images_flythrough", "psnr_orbit", "psnr_flythrough", "verify", "backends",
+            "rate", "bytes", "dependencies", "walk")
 
 
 class Test:
     def __init__(self, program, folder):
         self.program, self.folder, self.failures = program, folder, 0
-        self.data, self.log, self.docs, self.counts = (folder / name for name in ("data", "log.jsonl", "docs.md", "counts.csv"))
+        self.data, self.log, self.docs, self.counts = (
+            folder / name for name in ("data", "log.jsonl", "docs.md", "counts.csv"))
         self.data.mkdir()
         self.docs.write_text(f"before\n{tables.BEGIN}\nSTALE\n{tables.END}\nafter\n")
-        self.counts.write_text("model,triangles,seed,triangles_in,triangles_leaf,nodes,levels,root_triangles,bytes_out\n")
+        self.counts.write_text("model,triangles,seed,triangles_in,triangles_leaf,nodes,levels,root_triangles,"
+                               "bytes_out\n")
 
     def check(self, claim, holds, detail=""):
         print("%s %s" % ("ok  " if holds else "FAIL", claim))
@@ -37,13 +39,14 @@ class Test:
 
     def must_show(self, *words, models=MODELS):
         command = [sys.executable, "-B", ROOT / "bench" / "must_show.py", "--data", self.data, "--stroll", self.program,
-                   "--scratch", self.folder / "scratch", "--log", self.log, "--docs", self.docs, "--counts", self.counts,
-                   "--models", ",".join(models), "--frames", 2, "--size", "160x90", "--pairs", 1, *words]
+                   "--scratch", self.folder / "scratch", "--log", self.log, "--docs", self.docs,
+                   "--counts", self.counts, "--models", ",".join(models), "--frames", 2, "--size", "160x90", "--pairs", 1,
+                   *words]
         return subprocess.run([str(word) for word in command], capture_output=True, text=True)
 
     def test_parts(self):
-        subprocess.run([self.program, "scene", "plain-plane", "--triangles", "2K", "-o", self.data / "plane.ply", "--quiet"],
-                       check=True)
+        subprocess.run([self.program, "scene", "plain-plane", "--triangles", "2K", "-o", self.data / "plane.ply",
+                        "--quiet"], check=True)
         result = self.must_show("--write-docs", "--psnr-frames", 1)
         self.check("every part is measured", result.returncode == 0, result.stderr)
         records = measure.Log(self.log, {}).latest()
@@ -61,22 +64,27 @@ class Test:
         for part in parts:
             title, rows = part.split("\n")[0], [line for line in part.split("\n") if line.startswith("| ")]
             cells = [cell.strip() for row in rows for cell in row.strip("|").split("|")]
-            self.check(f"no figure of \"{title}\" is missing", len(rows) > 1 and "-" not in cells and "" not in cells, rows)
+            self.check(f"no figure of \"{title}\" is missing", len(rows) > 1 and "-" not in cells and "" not in cells,
+                       rows)
         counted = [line.split(",")[0] for line in self.counts.read_text().splitlines()[1:]]
         self.check("counts are written", counted == ["isosurface", "isosurface", "plane"], counted)
 
     def test_origins(self):
         """One line a machine; a table says of which commit it is, and of which models where they differ."""
         def record(model, commit, cores):
-            report = {"dropped": {"nonfinite": 0, "degenerate": 0}, "triangles_in": 1, "nodes": 1, "levels": 1, "root_triangles": 1}
-            return {"model": model, "commit": commit, "cpu": "CPU", "cores": cores, "memory_gib": 1, "system": "S", "kernel": "K",
-                    "report": report, "bytes_per_triangle": 1, "system_peak_rss_bytes": 1, "seconds": 1, "holds": True, "said": ""}
+            report = {"dropped": {"nonfinite": 0, "degenerate": 0}, "triangles_in": 1, "nodes": 1, "levels": 1,
+                      "root_triangles": 1}
+            return {"model": model, "commit": commit, "cpu": "CPU", "cores": cores, "memory_gib": 1, "system": "S",
+                    "kernel": "K", "report": report, "bytes_per_triangle": 1, "system_peak_rss_bytes": 1,
+                    "seconds": 1, "holds": True, "said": ""}
 
-        records = {("build", "a"): record("a", "c1", 2), ("build", "b"): record("b", "c2", 2), ("build", "c"): record("c", "c1", 2),
-                   ("root", "a"): record("a", "c1", 2)}
+        records = {("build", "a"): record("a", "c1", 2), ("build", "b"): record("b", "c2", 2),
+                   ("build", "c"): record("c", "c1", 2), ("root", "a"): record("a", "c1", 2)}
         text = tables.markdown(records)
-        self.check("one machine stands once", text.count("Machine") == 1 and text.startswith("Machine: CPU, 2 cores, "), text)
-        self.check("a table names its commits with their models", "--parts build`, commits c1 (a, c), c2 (b)\n" in text, text)
+        self.check("one machine stands once", text.count("Machine") == 1 and
+                   text.startswith("Machine: CPU, 2 cores, "), text)
+        self.check("a table names its commits with their models",
+                   "--parts build`, commits c1 (a, c), c2 (b)\n" in text, text)
         self.check("and one commit alone", "--parts roots`, commit c1\n" in text, text)
         text = tables.markdown({**records, ("root", "b"): record("b", "c1", 4)})
         self.check("two machines get names", "Machine 1: CPU, 2 cores" in text and "Machine 2: CPU, 4 cores" in text and
@@ -85,7 +93,8 @@ class Test:
     def test_sheet(self):
         rows = sheets.read_png(self.folder / "scratch" / "sheets" / f"{MODELS[0]}_orbit.png")
         width = len(rows[0]) // 9  # three pictures of three bytes a pixel
-        left, middle, right = (b"".join(bytes(row[3 * width * i:3 * width * (i + 1)]) for row in rows) for i in range(3))
+        left, middle, right = (b"".join(bytes(row[3 * width * i:3 * width * (i + 1)]) for row in rows)
+                               for i in range(3))
         self.check("a sheet shows reference, ours and their difference", len(set(left)) > 20 and
                    all(c == min(255, sheets.GAIN * abs(a - b)) for a, b, c in zip(left, middle, right)), len(rows))
 
@@ -100,8 +109,8 @@ class Test:
         self.check("what is there is kept", result.returncode == 0 and result.stdout.count(": kept") == 8 and
                    len(self.log.read_text().splitlines()) == lines, result.stdout)
         result = self.must_show("--parts", "build", "--again", models=MODELS[:1])
-        self.check("--again measures anew", result.returncode == 0 and len(self.log.read_text().splitlines()) == lines + 1,
-                   result.stderr)
+        self.check("--again measures anew", result.returncode == 0 and
+                   len(self.log.read_text().splitlines()) == lines + 1, result.stderr)
         old = [json.loads(line) for line in self.log.read_text().splitlines()]
         self.log.write_text("".join(json.dumps({**record, "program": "another"}) + "\n" for record in old))
         result = self.must_show("--parts", "build", models=MODELS[:1])
@@ -109,20 +118,23 @@ class Test:
 
     def test_refusals(self):
         result = self.must_show("--parts", "build", models=("missing",))
-        self.check("a model that is not there is named", result.returncode == 1 and "missing.ply" in result.stderr, result.stderr)
+        self.check("a model that is not there is named", result.returncode == 1 and "missing.ply" in result.stderr,
+                   result.stderr)
         result = self.must_show("--parts", "sprint")
         self.check("an unknown part is wrong usage", result.returncode == 2, result.stderr)
         lines = len(self.log.read_text().splitlines())
         result = self.must_show("--parts", "build", "--again", "--data", self.folder / "nowhere")
         self.check("a folder that is not there is wrong usage, and nothing is measured", result.returncode == 2 and
-                   "nowhere is no folder" in result.stderr and len(self.log.read_text().splitlines()) == lines, result.stderr)
+                   "nowhere is no folder" in result.stderr and len(self.log.read_text().splitlines()) == lines,
+                   result.stderr)
 
 
 def main():
     program = os.path.abspath(sys.argv[1])
     with tempfile.TemporaryDirectory() as folder:
         test = Test(program, pathlib.Path(folder))
-        for part in (test.test_parts, test.test_tables, test.test_origins, test.test_sheet, test.test_png, test.test_resume, test.test_refusals):
+        for part in (test.test_parts, test.test_tables, test.test_origins, test.test_sheet, test.test_png,
+                     test.test_resume, test.test_refusals):
             part()
         return 1 if test.failures else 0
 

@@ -25,7 +25,8 @@ def write_png(path, pixels):
     rows = b"".join(b"\0" + bytes(v for pixel in row for v in pixel) for row in pixels)
     head = struct.pack(">IIBBBBB", WIDTH, HEIGHT, 8, 2, 0, 0, 0)
     with open(path, "wb") as file:
-        file.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+        file.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows)) +
+                   chunk(b"IEND", b""))
 
 
 def write_pfm(path, depth):
@@ -99,8 +100,8 @@ class Test:
         self.check("one pixel of a hole is found", status == 1 and answer["uncovered_pixels"] == 1 and
                    answer["worst_coverage_frame"] == 1 and "coverage" in error, (status, answer, error))
         status, answer, error = self.compare(speck)
-        self.check("pixels outside are found, at the image's edge too", status == 1 and answer["overcovered_pixels"] == 2,
-                   (status, answer, error))
+        self.check("pixels outside are found, at the image's edge too", status == 1 and
+                   answer["overcovered_pixels"] == 2, (status, answer, error))
         status, answer, error = self.compare(edge)
         self.check("an outline that moves by one pixel is no hole", answer["uncovered_pixels"] == 0 and
                    answer["overcovered_pixels"] == 0, (status, answer, error))
@@ -118,14 +119,17 @@ class Test:
             depth[15][15] = depth[15][25] = 14
 
         status, answer, error = self.compare(moved(0.99))
-        self.check("depth within a pixel's error passes", status == 0 and answer["depth_within"] == 1, (status, answer, error))
+        self.check("depth within a pixel's error passes", status == 0 and answer["depth_within"] == 1,
+                   (status, answer, error))
         status, answer, error = self.compare(moved(1.01))
-        self.check("depth beyond it fails", status == 1 and answer["depth_within"] < 0.1 and "depth" in error, (status, answer, error))
+        self.check("depth beyond it fails", status == 1 and answer["depth_within"] < 0.1 and "depth" in error,
+                   (status, answer, error))
         status, answer, error = self.compare(moved(1.99), "--error", "2")
         self.check("--error widens the range", status == 0, (status, answer, error))
         status, answer, error = self.compare(two)
         expected = 1 - 2 * FRAMES / (640 * FRAMES)
-        self.check("the share counts pixels", abs(answer["depth_within"] - expected) < 1e-6 and status == 1, (status, answer, error))
+        self.check("the share counts pixels", abs(answer["depth_within"] - expected) < 1e-6 and status == 1,
+                   (status, answer, error))
 
     def test_colour(self):
         def off(by):
@@ -140,7 +144,8 @@ class Test:
 
         status, answer, error = self.compare(off(5))
         expected = 20 * math.log10(255 / 5)
-        self.check("PSNR is that of the covered pixels", status == 0 and abs(answer["psnr_median_db"] - expected) < 1e-3, (answer, error))
+        self.check("PSNR is that of the covered pixels", status == 0 and
+                   abs(answer["psnr_median_db"] - expected) < 1e-3, (answer, error))
         status, answer, error = self.compare(off(10))
         self.check("a PSNR below 30 dB fails", status == 1 and "PSNR" in error, (status, answer, error))
         status, answer, error = self.compare(off(10), "--psnr", "28")
@@ -152,15 +157,18 @@ class Test:
         self.compare()
         os.remove(self.root + "/b/frame_00001.pfm")
         result = self.run()
-        self.check("a missing depth file is named", result.returncode == 1 and "frame_00001.pfm" in result.stderr, result.stderr)
+        self.check("a missing depth file is named", result.returncode == 1 and "frame_00001.pfm" in result.stderr,
+                   result.stderr)
         with open(self.root + "/b/frame_00001.pfm", "wb") as file:
             file.write(b"Pf\n48 32\n-1.0\n" + b"\0" * 100)
         result = self.run()
-        self.check("a short depth file is refused", result.returncode == 1 and "bytes, expected" in result.stderr, result.stderr)
+        self.check("a short depth file is refused", result.returncode == 1 and "bytes, expected" in result.stderr,
+                   result.stderr)
         with open(self.root + "/b/frame_00000.png", "r+b") as file:
             file.truncate(60)
         result = self.run()
-        self.check("a broken PNG is refused", result.returncode == 1 and "frame_00000.png" in result.stderr, result.stderr)
+        self.check("a broken PNG is refused", result.returncode == 1 and "frame_00000.png" in result.stderr,
+                   result.stderr)
         result = subprocess.run([self.program, "compare", self.root], capture_output=True, text=True)
         self.check("one folder is wrong usage", result.returncode == 2, result.stderr)
 

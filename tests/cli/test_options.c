@@ -132,7 +132,8 @@ static void wrong_usage_stops_with_2(void **state)
     (void)state;
     static const char *const lines[] = {
         "-o x", "a", "a b c -o x", "a -o", "a -o x --nothing", "a -o x -z", "a -o x --memory", "a -o x --memory 1Q",
-        "a -o x --memory -1", "a -o x --memory 99999999999G", "a -o x --jobs 0", "a -o x --jobs 65", "a -o x --jobs 2.x", "a -o x --jobs 1.5",
+        "a -o x --memory -1", "a -o x --memory 99999999999G", "a -o x --jobs 0", "a -o x --jobs 65",
+        "a -o x --jobs 2.x", "a -o x --jobs 1.5",
         "a -o x --error nan", "a -o x --error 1x", "a -o x --size 1280", "a -o x --size 0x5", "a -o x --size 5x20000",
         "a -o x --structure hl", "a -o x --structure |", "a -o x --json=1", "a -o x -o y", "a -o x --out y",
     };
