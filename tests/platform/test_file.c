@@ -1,3 +1,4 @@
+#include <fcntl.h>
 #include <setjmp.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -453,6 +454,34 @@ static void the_peak_resident_set_counts_what_was_freed_and_what_children_held(v
     assert_true(strl_process_peak_rss_bytes() >= own + step);
 }
 
+static void a_thread_waits_for_the_disk_only_where_it_reads_from_it(void **state)
+{
+    (void)state;
+    const size_t size = (size_t)4 << 20;
+    uint8_t *bytes = calloc(size, 1);
+    strl_file *file = NULL;
+    assert_non_null(bytes);
+    assert_int_equal(strl_file_create("test_file_waits", &file, NULL), STRL_OK);
+    assert_int_equal(strl_file_write(file, 0, bytes, size, NULL), STRL_OK);
+    assert_int_equal(strl_file_sync(file, NULL), STRL_OK);
+    uint64_t before = strl_thread_disk_waits();
+    assert_int_equal(strl_file_read(file, 0, bytes, size, NULL), STRL_OK);
+    uint64_t kept = strl_thread_disk_waits() - before;
+    int descriptor = open("test_file_waits", O_RDONLY);
+    assert_true(descriptor >= 0);
+    bool forgotten = posix_fadvise(descriptor, 0, 0, POSIX_FADV_DONTNEED) == 0;
+    close(descriptor);
+    before = strl_thread_disk_waits();
+    assert_int_equal(strl_file_read(file, 0, bytes, size, NULL), STRL_OK);
+    uint64_t fetched = strl_thread_disk_waits() - before;
+    assert_true(kept <= 16); /* pages of the program itself */
+    /* A file system in memory forgets nothing. */
+    assert_true(!forgotten || fetched == 0 || fetched >= size / 512 / 2);
+    strl_file_close(file, NULL);
+    remove("test_file_waits");
+    free(bytes);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -473,6 +502,7 @@ int main(void)
         cmocka_unit_test(a_lock_ends_with_its_process),
         cmocka_unit_test(every_injected_failure_is_reported_and_publishes_nothing),
         cmocka_unit_test(threads_run_wait_and_leave_signals_to_the_host),
+        cmocka_unit_test(a_thread_waits_for_the_disk_only_where_it_reads_from_it),
         cmocka_unit_test(clocks_advance_and_processors_are_counted),
         cmocka_unit_test(the_peak_resident_set_counts_what_was_freed_and_what_children_held),
     };
