@@ -3,22 +3,28 @@
 #include <string.h>
 
 #include "build/build.h"
+#include "build_progress.h"
 #include "interrupt.h"
 #include "options.h"
-#include "progress.h"
 #include "units.h"
 
 /* What the build calls back with. */
 typedef struct build_watch {
-    strl_cli_progress progress;
+    strl_cli_build_progress progress;
     bool quiet;
 } build_watch;
 
 static bool show_progress(void *context, const strl_build_progress *progress)
 {
     build_watch *watch = context;
-    strl_cli_progress_update(&watch->progress, progress->stage, progress->done, progress->total, "items");
+    strl_cli_build_progress_update(&watch->progress, progress);
     return !strl_cli_interrupted();
+}
+
+static void show_estimate(void *context, const strl_build_estimate *estimate)
+{
+    build_watch *watch = context;
+    strl_cli_build_progress_estimate(&watch->progress, estimate);
 }
 
 static void show_warning(void *context, const char *sentence)
@@ -26,7 +32,7 @@ static void show_warning(void *context, const char *sentence)
     build_watch *watch = context;
     if (watch->quiet)
         return;
-    strl_cli_progress_end(&watch->progress);
+    strl_cli_build_progress_end(&watch->progress);
     fprintf(stderr, "stroll: warning: %s\n", sentence);
 }
 
@@ -118,17 +124,18 @@ static int run(strl_cli_args *args)
     build_watch watch = {.quiet = args->quiet};
     strl_build_result result;
     strl_error err = {0};
-    strl_cli_progress_init(&watch.progress, args->quiet);
+    strl_cli_build_progress_init(&watch.progress, args->quiet);
     desc.inputs = (const char *const *)inputs.items;
     desc.input_count = (uint32_t)inputs.count;
     desc.jobs = (unsigned)jobs;
     desc.unit = unit_given ? strl_cli_unit_name(unit) : NULL;
     desc.progress = show_progress;
+    desc.estimate = show_estimate;
     desc.warn = show_warning;
     desc.context = &watch;
     strl_cli_catch_interrupts();
     strl_status status = strl_build_clusters(&desc, &result, &err);
-    strl_cli_progress_end(&watch.progress);
+    strl_cli_build_progress_end(&watch.progress);
     if (status)
         return strl_cli_fail(&err);
     if (json)

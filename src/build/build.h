@@ -12,11 +12,24 @@
 #define STRL_ROOT_MAX_TRIANGLES 16384u
 
 typedef struct strl_build_progress {
-    const char *stage;   /* "read", "sort", "level 3 of 11", ...; static */
-    uint32_t stage_index, stage_count;
+    const char *stage;   /* "read", "sort", "level 3", ...; static */
+    uint32_t stage_index, stage_count; /* from 1; all levels are one stage */
     uint64_t done, total; /* items of the stage; total 0 = unknown */
-    uint64_t triangles_in;
+    uint64_t triangles_in; /* as announced by the inputs, until they have been read once */
+    double share;          /* of the whole build, 0 to 1 */
+    double seconds_left;   /* estimated; 0 = unknown */
+    double triangles_per_s; /* of the whole build so far; 0 = unknown */
+    uint64_t scratch_bytes; /* on disk now */
+    uint64_t memory_bytes;  /* the budget; the system knows what is used of it (strl_process_rss_bytes) */
 } strl_build_progress;
+
+/* What a build will take, guessed from the inputs' headers and sizes before they are read. */
+typedef struct strl_build_estimate {
+    uint64_t triangles;          /* 0 = unknown */
+    uint64_t scratch_bytes;      /* at most */
+    uint64_t scratch_free_bytes; /* of that disk now. The build is refused where the triangles, counted, do not fit */
+    double seconds;              /* roughly */
+} strl_build_estimate;
 
 /* How to build. Zero-initialise: every 0 takes its default. */
 typedef struct strl_build_desc {
@@ -36,7 +49,9 @@ typedef struct strl_build_desc {
     /* Told on the caller's thread, once for each thing amiss that does not stop the build; the sentence is borrowed for the
      * call. May be NULL; the result has the counts. */
     void (*warn)(void *context, const char *sentence);
-    void *context; /* of both */
+    /* Told on the caller's thread, once, before the inputs are read. May be NULL. */
+    void (*estimate)(void *context, const strl_build_estimate *estimate);
+    void *context; /* of all three */
 } strl_build_desc;
 
 typedef struct strl_build_result {

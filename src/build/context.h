@@ -3,6 +3,7 @@
 #define STRL_BUILD_CONTEXT_H
 
 #include "build/build.h"
+#include "build/progress.h"
 #include "geometry/progressive.h"
 #include "readers/reader.h"
 #include "store/spill.h"
@@ -15,12 +16,15 @@ typedef struct strl_build_context {
     const char *scratch_dir;
     uint64_t memory_bytes;
     strl_build_progress progress;
+    strl_estimate estimate;
 } strl_build_context;
 
 /* Reports progress; STRL_ERR_CANCELLED where the callback says so. */
 strl_status strl__build_report(strl_build_context *context, uint64_t done, uint64_t total, strl_error *err);
-/* Starts the next stage. */
+/* Starts the next stage. Its share of the time stands in progress.c. */
 void strl__build_stage(strl_build_context *context, const char *stage);
+/* How many triangles there will be, as far as is known. */
+void strl__build_expect(strl_build_context *context, uint64_t triangles);
 
 /* The stages of the builder `clusters`. */
 strl_status strl__clusters_run(strl_build_context *context, strl_error *err);

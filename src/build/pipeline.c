@@ -13,18 +13,32 @@
 
 strl_status strl__build_report(strl_build_context *context, uint64_t done, uint64_t total, strl_error *err)
 {
-    context->progress.done = done;
-    context->progress.total = total;
-    if (context->desc->progress && !context->desc->progress(context->desc->context, &context->progress))
+    strl_build_progress *progress = &context->progress;
+    strl__estimate_update(&context->estimate, done, total, strl_clock_ns());
+    progress->done = done;
+    progress->total = total;
+    progress->share = context->estimate.share;
+    progress->seconds_left = context->estimate.seconds_left;
+    progress->triangles_per_s = strl__estimate_rate(&context->estimate, progress->triangles_in);
+    progress->scratch_bytes = strl_spill_set_bytes(context->spills);
+    if (context->desc->progress && !context->desc->progress(context->desc->context, progress))
         return strl__fail(err, STRL_ERR_CANCELLED, "the build was cancelled");
     return STRL_OK;
 }
 
 void strl__build_stage(strl_build_context *context, const char *stage)
 {
+    strl__estimate_stage(&context->estimate, stage);
     context->progress.stage = stage;
-    context->progress.stage_index++;
+    context->progress.stage_index = context->estimate.stage_index;
+    context->progress.stage_count = STRL_STAGE_COUNT;
     context->progress.done = context->progress.total = 0;
+}
+
+void strl__build_expect(strl_build_context *context, uint64_t triangles)
+{
+    context->progress.triangles_in = triangles;
+    strl__estimate_guess(&context->estimate, strl__estimate_seconds(triangles, strl_pool_workers(context->pool)));
 }
 
 /* What the build puts into its scratch folder: the streams of the stages, a reader's, and the unfinished container. */
@@ -118,6 +132,8 @@ strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *
     strl_build_context context = {.desc = desc, .result = result,
                                   .memory_bytes = desc->memory_bytes ? desc->memory_bytes : 1ull << 30};
     *result = (strl_build_result){.inputs = desc->input_count};
+    strl__estimate_start(&context.estimate, started);
+    context.progress.memory_bytes = context.memory_bytes;
     strl_status status = check_request(desc, &target, err);
     if (!status)
         status = run(&context, target, err);

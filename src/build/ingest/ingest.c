@@ -60,6 +60,24 @@ static strl_status check_disk(const strl_build_context *context, uint64_t triang
     return status;
 }
 
+static strl_status tell_estimate(strl_build_context *context, strl_reader *const *readers, strl_error *err)
+{
+    strl_build_estimate estimate = {0};
+    for (uint32_t i = 0; i < context->desc->input_count; i++) {
+        strl_reader_info info;
+        strl_reader_info_get(readers[i], &info);
+        /* A file may announce more than it has room for: nothing tells of a triangle in less than a byte. */
+        estimate.triangles += info.triangles_hint < info.file_bytes ? info.triangles_hint : info.file_bytes;
+    }
+    strl__build_expect(context, estimate.triangles);
+    estimate.seconds = context->estimate.seconds_left;
+    estimate.scratch_bytes = estimate.triangles * SCRATCH_BYTES_OF_TRIANGLE;
+    strl_status status = strl_path_free_bytes(context->scratch_dir, &estimate.scratch_free_bytes, err);
+    if (!status && context->desc->estimate)
+        context->desc->estimate(context->desc->context, &estimate);
+    return status;
+}
+
 strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, strl_error *err)
 {
     model_survey survey = {0};
@@ -72,12 +90,15 @@ strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, st
     if (status)
         goto done;
     strl__build_stage(context, "survey");
+    status = tell_estimate(context, readers, err);
+    if (status)
+        goto done;
     status = strl__survey_run(context, readers, &survey, err);
     if (status)
         goto done;
     context->result->triangles_in = survey.triangles;
     note_drops(context, readers);
-    context->progress.triangles_in = survey.triangles;
+    strl__build_expect(context, survey.triangles);
     status = survey.triangles ? check_disk(context, survey.triangles, err)
                               : strl__ingest_refuse_empty(context, readers, err);
     if (status)
