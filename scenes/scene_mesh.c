@@ -54,6 +54,9 @@ static bool ends_in(const char *path, const char *ending)
 
 static strl_status find_format(strl__scene_mesh *writer, strl_error *err)
 {
+    strl_status status = strl_output_check(writer->path, err); /* no file at all is worse than a wrong ending */
+    if (status != STRL_OK)
+        return status;
     writer->is_stl = ends_in(writer->path, ".stl");
     if (writer->is_stl || ends_in(writer->path, ".ply"))
         return STRL_OK;

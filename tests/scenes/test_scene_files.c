@@ -287,7 +287,7 @@ static uint64_t leaf_triangles(const char *input)
 static void all_files_build_to_the_same_number_of_triangles(void **state)
 {
     (void)state;
-    strl_scene_desc desc = {.name = "isosurface", .path = ply, .triangles = 50000, .seed = 1};
+    strl_scene_desc desc = {.name = "isosurface", .path = ply, .triangles = 20000, .seed = 1};
     strl_scene_result plain = write_scene(&desc);
     desc.path = stl;
     write_scene(&desc);
