@@ -130,8 +130,8 @@ static void names_deinit(strl_names *names)
 
 void strl_ingest_deinit(strl_ingest *ingest)
 {
-    strl_spill_close_and_delete(ingest->soup, NULL);
-    strl_spill_close_and_delete(ingest->shared, NULL);
+    strl_spill_close(ingest->soup);
+    strl_spill_close(ingest->shared);
     strl__free(ingest->cells);
     strl__free(ingest->edges);
     strl__free(ingest->palette);

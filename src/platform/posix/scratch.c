@@ -13,15 +13,19 @@
 #include "platform/posix/facts.h"
 
 #define LOCK_NAME "lock"
-/* What the lock file says: the folder is ours to clear. */
-#define SIGNATURE "stroll scratch folder: the next run of the same output clears it\n"
+/* What the lock file says: the folder is ours to clear, and perhaps the one it is in. */
+#define SIGNATURE "stroll scratch folder: the next build of the same output resumes or clears it\n"
+#define PARENT_SIGNATURE SIGNATURE "made with the folder that it is in\n"
 #define MOST_ATTEMPTS 100
 
 struct strl_scratch {
     char *path, *lock_path; /* owned */
     char *made_parent;      /* owned; NULL = it was there before */
     const char *const *names;
+    bool keep;
     strl_lock *lock; /* NULL until the folder is ours */
+    bool (*needed)(void *context, const char *name); /* of a sweep; NULL = nothing is */
+    void *context;                                   /* its */
 };
 
 static bool is_ours(const strl_scratch *scratch, int folder, const char *name)
@@ -75,80 +79,137 @@ static bool must_be_ours(strl_scratch *scratch, int folder, const char *name, st
 
 static bool remove_ours(strl_scratch *scratch, int folder, const char *name, strl_error *err)
 {
-    if (is_ours(scratch, folder, name) && unlinkat(folder, name, 0) != 0 && errno != ENOENT) {
+    bool needed = scratch->needed && scratch->needed(scratch->context, name);
+    if (!needed && is_ours(scratch, folder, name) && unlinkat(folder, name, 0) != 0 && errno != ENOENT) {
         strl__fail_system(err, errno, "remove a scratch file in", scratch->path);
         return false;
     }
     return true;
 }
 
-static bool is_signed(const strl_scratch *scratch)
+/* Whether the lock file says that the folder is ours, and *with_parent that the one it is in is, too. */
+static bool is_signed(const strl_scratch *scratch, bool *with_parent)
 {
-    char text[sizeof SIGNATURE];
+    char text[sizeof PARENT_SIGNATURE + 1] = "";
     struct stat facts;
     strl_file *file = NULL;
     size_t got = 0;
+    *with_parent = false;
     if (lstat(scratch->lock_path, &facts) != 0 || !S_ISREG(facts.st_mode) ||
         strl_file_open(scratch->lock_path, &file, NULL) != STRL_OK)
         return false;
-    bool same = strl_file_read_some(file, 0, text, sizeof text, &got, NULL) == STRL_OK &&
-                got == sizeof SIGNATURE - 1 && memcmp(text, SIGNATURE, got) == 0;
+    bool good = strl_file_read_some(file, 0, text, sizeof PARENT_SIGNATURE, &got, NULL) == STRL_OK;
     strl_file_close(file, NULL);
-    return same;
+    *with_parent = good && strcmp(text, PARENT_SIGNATURE) == 0;
+    return *with_parent || (good && strcmp(text, SIGNATURE) == 0);
 }
 
-static strl_status sign(const strl_scratch *scratch, strl_error *err)
+static strl_status sign(const strl_scratch *scratch, const char *lock_path, strl_error *err)
 {
     strl_file *file = NULL;
-    strl_status status = strl_file_create(scratch->lock_path, &file, err);
+    const char *text = scratch->made_parent ? PARENT_SIGNATURE : SIGNATURE;
+    strl_status status = strl_file_create(lock_path, &file, err);
     if (status == STRL_OK)
-        status = strl_file_write(file, 0, SIGNATURE, sizeof SIGNATURE - 1, err);
+        status = strl_file_write(file, 0, text, strlen(text), err);
     strl_status closed = strl_file_close(file, status == STRL_OK ? err : NULL);
     return status != STRL_OK ? status : closed;
 }
 
+static bool clear_left_over(strl_scratch *scratch, strl_error *err)
+{
+    return each_file(scratch, must_be_ours, err) && (scratch->keep || each_file(scratch, remove_ours, err));
+}
+
 /* The folder is there. Nothing in it is touched before all of it is known to be ours. */
-static strl_status take_over(strl_scratch *scratch, strl_error *err)
+static strl_status take_over(strl_scratch *scratch, const char *parent, strl_error *err)
 {
     struct stat facts;
+    bool with_parent;
     if (lstat(scratch->path, &facts) == 0 && !S_ISDIR(facts.st_mode))
         return refuse(scratch, err, "there is something of that name, and it is not a folder");
-    if (!is_signed(scratch))
+    if (!is_signed(scratch, &with_parent))
         return refuse(scratch, err, "there is one, and it was not made by a build");
     strl_status status = strl_lock_acquire(scratch->lock_path, &scratch->lock, err);
     if (status != STRL_OK)
         return status;
     strl_error inner = {.status = STRL_ERR_IO};
-    bool good = each_file(scratch, must_be_ours, &inner) && each_file(scratch, remove_ours, &inner);
-    /* Signed anew: its last holder may have removed the lock file just before we made it again. */
-    if (good)
-        return sign(scratch, err);
+    bool good = clear_left_over(scratch, &inner);
+    if (good && parent && with_parent && !scratch->made_parent)
+        scratch->made_parent = strl__strdup(parent); /* without memory it stays */
+    /* Its last holder may have removed the lock file just before we made it again. */
+    if (!good)
+        status = strl__fail(err, inner.status, "%s", inner.message);
+    else if (!is_signed(scratch, &with_parent))
+        status = sign(scratch, scratch->lock_path, err);
+    if (status != STRL_OK && (!good || scratch->keep)) { /* what is in it is not to be removed */
+        strl_lock_release(scratch->lock);
+        scratch->lock = NULL;
+    }
+    return status;
+}
+
+/* Under no name that anything has. Where the file system cannot promise that, it is looked at before. */
+static int rename_new(const char *from, const char *to)
+{
+    struct stat facts;
+    if (renameat2(AT_FDCWD, from, AT_FDCWD, to, RENAME_NOREPLACE) == 0)
+        return 0;
+    if (errno != EINVAL && errno != ENOSYS)
+        return errno;
+    if (lstat(to, &facts) == 0)
+        return EEXIST;
+    return rename(from, to) == 0 ? 0 : errno;
+}
+
+/* Locked and signed before it gets its name: whenever the process may end, what has the name is known to be ours. *exists:
+ * something else got it first. */
+static strl_status make_new(strl_scratch *scratch, const char *folder, const char *lock_path, bool *exists, strl_error *err)
+{
+    if (mkdir(folder, 0777) != 0 && errno != EEXIST)
+        return strl__fail_system(err, errno, "create folder", scratch->path);
+    strl_status status = strl_lock_acquire(lock_path, &scratch->lock, err);
+    if (status == STRL_OK)
+        status = sign(scratch, lock_path, err);
+    int code = status == STRL_OK ? rename_new(folder, scratch->path) : 0;
+    *exists = code == EEXIST;
+    if (status == STRL_OK && code == 0)
+        return STRL_OK;
+    if (code)
+        status = strl__fail_system(err, code, "create folder", scratch->path);
+    if (scratch->lock)
+        unlink(lock_path);
     strl_lock_release(scratch->lock);
     scratch->lock = NULL;
-    return strl__fail(err, inner.status, "%s", inner.message);
+    rmdir(folder);
+    return status;
 }
 
-static strl_status lock_new(strl_scratch *scratch, strl_error *err)
+static strl_status make_beside(strl_scratch *scratch, bool *exists, strl_error *err)
 {
-    strl_status status = strl_lock_acquire(scratch->lock_path, &scratch->lock, err);
-    if (status != STRL_OK) {
-        unlink(scratch->lock_path); /* created before memory ended */
-        rmdir(scratch->path);
-        return status;
+    size_t size = strlen(scratch->path) + 32;
+    char *folder = strl__alloc(size, 1), *lock_path = NULL;
+    if (folder) { /* a folder of that name is that of an ended process */
+        snprintf(folder, size, "%s.%ld", scratch->path, (long)getpid());
+        lock_path = strl_path_join(folder, LOCK_NAME);
     }
-    return sign(scratch, err);
+    strl_status status = lock_path ? make_new(scratch, folder, lock_path, exists, err)
+                                   : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
+    strl__free(lock_path);
+    strl__free(folder);
+    return status;
 }
 
-static strl_status make(strl_scratch *scratch, strl_error *err)
+static strl_status make(strl_scratch *scratch, const char *parent, strl_error *err)
 {
     strl_status status = STRL_OK;
     for (int attempt = 0; attempt < MOST_ATTEMPTS; attempt++) {
         struct stat facts;
-        if (mkdir(scratch->path, 0777) == 0)
-            return lock_new(scratch, err);
-        if (errno != EEXIST)
-            return strl__fail_system(err, errno, "create folder", scratch->path);
-        status = take_over(scratch, err);
+        bool exists = lstat(scratch->path, &facts) == 0;
+        if (!exists)
+            status = make_beside(scratch, &exists, err);
+        if (!exists)
+            return status;
+        status = take_over(scratch, parent, err);
         /* Gone meanwhile: its holder ended. */
         if (status == STRL_OK || scratch->lock || lstat(scratch->path, &facts) == 0)
             return status;
@@ -176,6 +237,7 @@ strl_status strl_scratch_create(const strl_scratch_desc *desc, strl_scratch **sc
     if (!made)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a scratch folder");
     made->names = desc->names;
+    made->keep = desc->keep;
     made->path = strl__strdup(desc->path);
     made->lock_path = strl_path_join(desc->path, LOCK_NAME);
     strl_status status = made->path && made->lock_path ? STRL_OK
@@ -183,7 +245,7 @@ strl_status strl_scratch_create(const strl_scratch_desc *desc, strl_scratch **sc
     if (status == STRL_OK && desc->parent)
         status = make_parent(made, desc->parent, err);
     if (status == STRL_OK)
-        status = make(made, err);
+        status = make(made, desc->parent, err);
     if (status != STRL_OK)
         strl_scratch_destroy(made);
     else
@@ -194,6 +256,33 @@ strl_status strl_scratch_create(const strl_scratch_desc *desc, strl_scratch **sc
 const char *strl_scratch_path(const strl_scratch *scratch)
 {
     return scratch->path;
+}
+
+strl_status strl_scratch_sweep(strl_scratch *scratch, bool (*needed)(void *context, const char *name), void *context,
+                               strl_error *err)
+{
+    strl_error inner = {.status = STRL_ERR_IO};
+    scratch->needed = needed;
+    scratch->context = context;
+    bool good = each_file(scratch, remove_ours, &inner);
+    scratch->needed = NULL;
+    return good ? STRL_OK : strl__fail(err, inner.status, "%s", inner.message);
+}
+
+static void release(strl_scratch *scratch)
+{
+    strl__free(scratch->made_parent);
+    strl__free(scratch->lock_path);
+    strl__free(scratch->path);
+    strl__free(scratch);
+}
+
+void strl_scratch_leave(strl_scratch *scratch)
+{
+    if (!scratch)
+        return;
+    strl_lock_release(scratch->lock);
+    release(scratch);
 }
 
 void strl_scratch_destroy(strl_scratch *scratch)
@@ -208,8 +297,5 @@ void strl_scratch_destroy(strl_scratch *scratch)
     }
     if (scratch->made_parent)
         rmdir(scratch->made_parent);
-    strl__free(scratch->made_parent);
-    strl__free(scratch->lock_path);
-    strl__free(scratch->path);
-    strl__free(scratch);
+    release(scratch);
 }
