@@ -182,14 +182,21 @@ static strl_status read_all(strl_build_context *context, const char *path, strl_
     return status;
 }
 
+bool strl__checkpoint_exists(const char *scratch_dir)
+{
+    char *path = strl_path_join(scratch_dir, STRL_CHECKPOINT_NAME);
+    bool exists = !path || strl_path_exists(path);
+    strl__free(path);
+    return exists;
+}
+
 strl_status strl__checkpoint_read(strl_build_context *context, strl_error *err)
 {
     char *path = strl_path_join(context->scratch_dir, STRL_CHECKPOINT_NAME);
     if (!path)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
-    context->has_checkpoint = strl_path_exists(path);
-    strl_status status = context->has_checkpoint ? read_all(context, path, err) : STRL_OK;
-    context->result->resumed = !status && context->has_checkpoint;
+    strl_status status = read_all(context, path, err);
+    context->result->resumed = !status;
     strl__free(path);
     return status;
 }

@@ -14,8 +14,10 @@
 
 /* All open kept streams, and words. Nothing where the context keeps none. */
 strl_status strl__checkpoint_write(strl_build_context *context, const strl_writer *words, strl_error *err);
-/* Sets has_checkpoint; where there is one, checks that it is of this request, restores the streams and compares their
- * checksums, sets the result's counters, and `resumed` to the builder's words. */
+/* Without memory to look: true, so that nothing is removed. */
+bool strl__checkpoint_exists(const char *scratch_dir);
+/* Of a context that has one: checks that it is of this request, restores the streams and compares their checksums, sets
+ * the result's counters, and `resumed` to the builder's words. */
 strl_status strl__checkpoint_read(strl_build_context *context, strl_error *err);
 
 /* ---- the request (request.c) ---- */

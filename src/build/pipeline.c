@@ -107,7 +107,7 @@ static bool is_needed(void *context, const char *name)
 /* Takes up what an earlier build has left, and removes what it had begun; all of it where there is no checkpoint. */
 static strl_status resume(strl_build_context *context, strl_scratch *scratch, strl_error *err)
 {
-    strl_status status = strl__checkpoint_read(context, err);
+    strl_status status = context->has_checkpoint ? strl__checkpoint_read(context, err) : STRL_OK;
     if (!status)
         status = strl_scratch_sweep(scratch, context->has_checkpoint ? is_needed : NULL, context, err);
     if (!status && !context->has_checkpoint && context->desc->warn) {
@@ -135,7 +135,6 @@ static strl_status tell_kept(const strl_build_context *context, strl_status stat
 static strl_status run_in_scratch(strl_build_context *context, strl_scratch *scratch, strl_error *err)
 {
     const strl_build_desc *desc = context->desc;
-    context->scratch_dir = strl_scratch_path(scratch);
     strl_status status = strl_pool_create(count_workers(desc, context->memory_bytes) - 1, &context->pool, err);
     if (!status)
         status = strl_spill_set_create(context->scratch_dir, 0, &context->spills, err);
@@ -158,6 +157,8 @@ static strl_status run(strl_build_context *context, const char *target, strl_err
     strl_status status = open_scratch(context->desc, target, &scratch, err);
     if (status)
         return status;
+    context->scratch_dir = strl_scratch_path(scratch);
+    context->has_checkpoint = context->desc->resume && strl__checkpoint_exists(context->scratch_dir);
     status = run_in_scratch(context, scratch, err);
     context->result->scratch_kept = status && context->has_checkpoint;
     if (context->result->scratch_kept)

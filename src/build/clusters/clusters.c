@@ -213,7 +213,9 @@ static strl_status run_partition(strl_hierarchy *hierarchy, strl_partition *part
 {
     strl_build_context *context = hierarchy->context;
     strl__build_stage(context, "partition");
-    strl_status status = strl_partition_create(hierarchy->ingest, partition, err);
+    strl_status status = strl__build_report(context, 0, 0, err);
+    if (!status)
+        status = strl_partition_create(hierarchy->ingest, partition, err);
     if (!status)
         hierarchy->levels = strl__alloc_zero((size_t)partition->depth + 1, sizeof *hierarchy->levels);
     if (!status && !hierarchy->levels)

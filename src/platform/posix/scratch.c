@@ -87,21 +87,27 @@ static bool remove_ours(strl_scratch *scratch, int folder, const char *name, str
     return true;
 }
 
-/* Whether the lock file says that the folder is ours, and *with_parent that the one it is in is, too. */
-static bool is_signed(const strl_scratch *scratch, bool *with_parent)
+/* What the lock file says: that the folder is ours, and perhaps the one it is in. */
+typedef struct claim {
+    bool is_ours, with_parent;
+} claim;
+
+static strl_status read_claim(const strl_scratch *scratch, claim *found, strl_error *err)
 {
     char text[sizeof PARENT_SIGNATURE + 1] = "";
     struct stat facts;
     strl_file *file = NULL;
     size_t got = 0;
-    *with_parent = false;
-    if (lstat(scratch->lock_path, &facts) != 0 || !S_ISREG(facts.st_mode) ||
-        strl_file_open(scratch->lock_path, &file, NULL) != STRL_OK)
-        return false;
-    bool good = strl_file_read_some(file, 0, text, sizeof PARENT_SIGNATURE, &got, NULL) == STRL_OK;
+    *found = (claim){0};
+    if (lstat(scratch->lock_path, &facts) != 0 || !S_ISREG(facts.st_mode))
+        return STRL_OK;
+    strl_status status = strl_file_open(scratch->lock_path, &file, err);
+    if (status == STRL_OK)
+        status = strl_file_read_some(file, 0, text, sizeof PARENT_SIGNATURE, &got, err);
     strl_file_close(file, NULL);
-    *with_parent = good && strcmp(text, PARENT_SIGNATURE) == 0;
-    return *with_parent || (good && strcmp(text, SIGNATURE) == 0);
+    found->with_parent = strcmp(text, PARENT_SIGNATURE) == 0;
+    found->is_ours = found->with_parent || strcmp(text, SIGNATURE) == 0;
+    return status;
 }
 
 static strl_status sign(const strl_scratch *scratch, const char *lock_path, strl_error *err)
@@ -115,36 +121,50 @@ static strl_status sign(const strl_scratch *scratch, const char *lock_path, strl
     return status != STRL_OK ? status : closed;
 }
 
-static bool clear_left_over(strl_scratch *scratch, strl_error *err)
+static void unlock(strl_scratch *scratch)
 {
-    return each_file(scratch, must_be_ours, err) && (scratch->keep || each_file(scratch, remove_ours, err));
+    strl_lock_release(scratch->lock);
+    scratch->lock = NULL;
 }
 
-/* The folder is there. Nothing in it is touched before all of it is known to be ours. */
+/* Nothing in the folder is touched before all of it is known to be ours. */
+static strl_status clear_left_over(strl_scratch *scratch, strl_error *err)
+{
+    strl_error inner = {.status = STRL_ERR_IO};
+    bool good = each_file(scratch, must_be_ours, &inner) && (scratch->keep || each_file(scratch, remove_ours, &inner));
+    return good ? STRL_OK : strl__fail(err, inner.status, "%s", inner.message);
+}
+
+/* The folder is locked and cleared, as far as it is to be. */
+static strl_status sign_again(strl_scratch *scratch, const char *parent, bool with_parent, strl_error *err)
+{
+    claim found;
+    if (parent && with_parent && !scratch->made_parent)
+        scratch->made_parent = strl__strdup(parent); /* without memory it stays */
+    strl_status status = read_claim(scratch, &found, err);
+    /* Its last holder may have removed the lock file just before we made it again. */
+    return status != STRL_OK || found.is_ours ? status : sign(scratch, scratch->lock_path, err);
+}
+
+/* The folder is there. */
 static strl_status take_over(strl_scratch *scratch, const char *parent, strl_error *err)
 {
     struct stat facts;
-    bool with_parent;
+    claim found;
     if (lstat(scratch->path, &facts) == 0 && !S_ISDIR(facts.st_mode))
         return refuse(scratch, err, "there is something of that name, and it is not a folder");
-    if (!is_signed(scratch, &with_parent))
-        return refuse(scratch, err, "there is one, and it was not made by a build");
-    strl_status status = strl_lock_acquire(scratch->lock_path, &scratch->lock, err);
+    strl_status status = read_claim(scratch, &found, err);
+    if (status == STRL_OK && !found.is_ours)
+        status = refuse(scratch, err, "there is one, and it was not made by a build");
+    if (status == STRL_OK)
+        status = strl_lock_acquire(scratch->lock_path, &scratch->lock, err);
     if (status != STRL_OK)
         return status;
-    strl_error inner = {.status = STRL_ERR_IO};
-    bool good = clear_left_over(scratch, &inner);
-    if (good && parent && with_parent && !scratch->made_parent)
-        scratch->made_parent = strl__strdup(parent); /* without memory it stays */
-    /* Its last holder may have removed the lock file just before we made it again. */
-    if (!good)
-        status = strl__fail(err, inner.status, "%s", inner.message);
-    else if (!is_signed(scratch, &with_parent))
-        status = sign(scratch, scratch->lock_path, err);
-    if (status != STRL_OK && (!good || scratch->keep)) { /* what is in it is not to be removed */
-        strl_lock_release(scratch->lock);
-        scratch->lock = NULL;
-    }
+    status = clear_left_over(scratch, err);
+    if (status == STRL_OK)
+        status = sign_again(scratch, parent, found.with_parent, err);
+    if (status != STRL_OK)
+        unlock(scratch); /* what is in it stays */
     return status;
 }
 
@@ -178,8 +198,7 @@ static strl_status make_new(strl_scratch *scratch, const char *folder, const cha
         status = strl__fail_system(err, code, "create folder", scratch->path);
     if (scratch->lock)
         unlink(lock_path);
-    strl_lock_release(scratch->lock);
-    scratch->lock = NULL;
+    unlock(scratch);
     rmdir(folder);
     return status;
 }
