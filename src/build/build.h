@@ -33,6 +33,7 @@ typedef struct strl_build_desc {
     /* A build that is stopped leaves its scratch folder, with the stages that are finished, for a later one that resumes.
      * Not set: nothing is left. */
     bool keep;
+    uint64_t keep_triangles; /* models of fewer are built before that is worth anything: nothing is kept of them; 0 = 65,536 */
     bool resume;            /* goes on with what an earlier build of the same request has left, if there is anything; keeps, too */
     bool no_dependencies;   /* for measuring what dependencies bring: every group has one member */
     /* Called on the caller's thread, often; false cancels. May be NULL. */

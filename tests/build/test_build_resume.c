@@ -42,7 +42,7 @@ static strl_status build(bool resume, unsigned jobs, stop *s, strl_build_result 
 {
     const char *input = built_path("in.ply");
     strl_build_desc desc = {.inputs = &input, .input_count = 1, .output = built_path("out.stroll"),
-                            .memory_bytes = STRL_BUILD_LEAST_MEMORY, .jobs = jobs, .keep = true, .resume = resume,
+                            .memory_bytes = STRL_BUILD_LEAST_MEMORY, .jobs = jobs, .keep = true, .keep_triangles = 1, .resume = resume,
                             .progress = s ? say_no : NULL, .context = s};
     *err = (strl_error){0};
     return strl_build_clusters(&desc, result, err);

@@ -108,11 +108,20 @@ def interrupted_it_keeps_what_is_finished(folder):
 
 
 def with_nothing_to_resume_it_begins(folder):
-    scene = Scene(folder, "60K")
+    scene = Scene(folder, "100K")
     done = scene.resume()
     assert done.error.count("\n") == 1 and "from the beginning" in done.error, done
     done = scene.resume("--quiet")
     assert done.error == "", done
+
+
+def of_a_small_model_nothing_is_kept(folder):
+    source = os.path.join(folder, "in.ply")
+    must("scene", "isosurface", "--triangles", "50K", "-o", source, "--quiet")
+    build = Watched(source, "-o", os.path.join(folder, "out.stroll"))
+    build.wait_for(1)
+    build.child.communicate()
+    assert build.seen == 0 and build.child.returncode == 0
 
 
 def without_resume_it_begins_anew(folder):
@@ -241,6 +250,7 @@ def fill(path):
 
 
 run_tests(killed_at_random_moments_it_resumes, killed_again_and_again_it_comes_to_its_end,
-          interrupted_it_keeps_what_is_finished, with_nothing_to_resume_it_begins, without_resume_it_begins_anew,
+          interrupted_it_keeps_what_is_finished, with_nothing_to_resume_it_begins,
+          of_a_small_model_nothing_is_kept, without_resume_it_begins_anew,
           what_was_not_saved_is_cut_off_or_removed, damage_is_found, another_request_is_refused,
           scratch_elsewhere_is_found_again_and_removed, on_a_full_disk_it_waits_for_room)

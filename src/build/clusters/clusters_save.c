@@ -8,9 +8,8 @@
 #include "build/saved.h"
 #include "platform/thread.h"
 
-/* A level is saved after so many parts of it, but not after a few nodes: a checkpoint costs about as much as one. */
+/* A level is saved after so many parts of it: what it has used up waits on disk for that. */
 #define PARTS_OF_LEVEL 32u
-#define LEAST_GROUPS 8u
 /* Nor does more work than this get lost. */
 #define MOST_NS (UINT64_C(20) * 1000000000u)
 
@@ -37,7 +36,7 @@ strl_status strl_clusters_note(strl_hierarchy *hierarchy, uint32_t level, uint32
     uint32_t since = done - hierarchy->saved_done;
     if (!hierarchy->context->keep || done == groups)
         return STRL_OK; /* the end of the level is saved with what follows from it */
-    if (since < (part < LEAST_GROUPS ? LEAST_GROUPS : part) && strl_clock_ns() - hierarchy->saved_at_ns < MOST_NS)
+    if (since < part && strl_clock_ns() - hierarchy->saved_at_ns < MOST_NS)
         return STRL_OK;
     const strl_position position = {.finished = STRL_STAGE_PARTITION, .level = level, .done = done};
     return strl_clusters_save(hierarchy, &position, err);
