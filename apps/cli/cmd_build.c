@@ -81,9 +81,19 @@ static void print_text(const strl_build_result *r, const char *output)
            r->seconds, rate, processor_rate, (double)r->peak_rss_bytes / 1e6, (double)r->scratch_bytes / 1e6);
 }
 
+/* What was stopped by a signal says that it was, and how to go on. */
+static int fail(const strl_build_result *result, const strl_error *err)
+{
+    if (err->status != STRL_ERR_CANCELLED || !result->scratch_kept)
+        return strl_cli_fail(err);
+    fflush(stdout);
+    fprintf(stderr, "stroll: interrupted; what is finished is kept: the same command with --resume goes on\n");
+    return 1;
+}
+
 static int run(strl_cli_args *args)
 {
-    strl_build_desc desc = {0};
+    strl_build_desc desc = {.keep = true};
     strl_cli_list inputs;
     uint64_t jobs = 0;
     bool json = false, unit_given = false;
@@ -99,6 +109,8 @@ static int run(strl_cli_args *args)
          .least = 1, .most = 256},
         {.name = "scratch", .kind = STRL_CLI_STRING, .value = &desc.scratch, .argument = "DIR",
          .help = "folder in which OUT.stroll.tmp is made for the time of the build, with it where missing (beside the output)"},
+        {.name = "resume", .kind = STRL_CLI_FLAG, .value = &desc.resume,
+         .help = "go on where the same build was killed, interrupted or met a full disk (from the beginning)"},
         {.name = "grid", .kind = STRL_CLI_REAL, .value = &desc.grid, .argument = "STEP",
          .help = "largest lattice step, model units; one below a 2^30th of the extent is refused (chosen from the model)",
          .least = 1e-300, .most = 1e300},
@@ -130,7 +142,7 @@ static int run(strl_cli_args *args)
     strl_status status = strl_build_clusters(&desc, &result, &err);
     strl_cli_progress_end(&watch.progress);
     if (status)
-        return strl_cli_fail(&err);
+        return fail(&result, &err);
     if (json)
         return print_json(&result);
     if (!args->quiet)

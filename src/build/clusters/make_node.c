@@ -172,5 +172,5 @@ strl_status strl_take_node(strl_hierarchy *hierarchy, strl_level *level, uint32_
     for (size_t i = 0; i < made->neighbour_count && !status; i++)
         if (!strl_adjacency_add(&hierarchy->next, self >> 1, made->next_neighbour[2 * i], made->next_neighbour[2 * i + 1]))
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the neighbours of a level");
-    return status;
+    return status || !level->states ? status : strl_node_state_save(level, self, made, err);
 }

@@ -170,7 +170,7 @@ strl_status strl__connect_cells(strl_build_context *context, strl_ingest *ingest
     connecting c = {.context = context, .ingest = ingest, .pairs = pairs};
     unsigned window = strl_pool_workers(context->pool);
     c.slots = strl__alloc_zero(strl_pool_window(context->pool, window), sizeof *c.slots);
-    strl_status status = c.slots ? strl_spill_open(context->spills, "shared", 0, &ingest->shared, err)
+    strl_status status = c.slots ? strl__build_open_stream(context, "shared", &ingest->shared, err)
                                  : strl__fail(err, STRL_ERR_MEMORY, "no memory to connect cells");
     if (!status)
         status = strl_pool_ordered(context->pool, pairs->count, window, connect_spill, take_connected, &c, NULL, err);
