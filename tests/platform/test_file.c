@@ -426,6 +426,27 @@ static void clocks_advance_and_processors_are_counted(void **state)
     assert_in_range(strl_cpu_count(), 1, 65536);
 }
 
+static void a_reopened_file_is_cut_and_goes_on(void **state)
+{
+    (void)state;
+    strl_file *file = NULL;
+    strl_error err = {0};
+    char text[8] = "";
+    make_file("again", "abcdef");
+    assert_int_equal(strl_file_reopen(in_folder("again"), 7, &file, &err), STRL_ERR_FORMAT);
+    assert_null(file);
+    assert_non_null(strstr(err.message, "ends at byte 6, expected 7"));
+    assert_int_equal(strl_file_reopen(in_folder("again"), 4, &file, NULL), STRL_OK);
+    assert_int_equal(strl_file_bytes(file), 4);
+    assert_int_equal(strl_file_write(file, 4, "XY", 2, NULL), STRL_OK);
+    assert_int_equal(strl_file_read(file, 0, text, 6, NULL), STRL_OK);
+    assert_string_equal(text, "abcdXY");
+    assert_int_equal(strl_file_close(file, NULL), STRL_OK);
+    assert_int_equal(strl_path_remove(in_folder("again"), NULL), STRL_OK);
+    assert_int_equal(strl_file_reopen(in_folder("again"), 0, &file, NULL), STRL_ERR_IO);
+    assert_int_equal(strl_file_reopen(in_folder("."), 0, &file, NULL), STRL_ERR_IO);
+}
+
 static void touch_pages(size_t bytes)
 {
     void *pages = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -459,6 +480,7 @@ int main(void)
         cmocka_unit_test(what_was_written_is_read_back_at_any_offset),
         cmocka_unit_test(a_short_read_says_where_the_file_ends),
         cmocka_unit_test(what_is_no_regular_file_is_not_opened),
+        cmocka_unit_test(a_reopened_file_is_cut_and_goes_on),
         cmocka_unit_test(a_long_path_does_not_hide_the_reason),
         cmocka_unit_test(a_full_device_is_a_full_disk),
         cmocka_unit_test(a_write_past_the_largest_file_is_refused),

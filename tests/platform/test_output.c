@@ -391,6 +391,37 @@ static void what_a_killed_process_left_is_cleared(void **state)
     assert_int_equal(count_files(folder), 0);
 }
 
+static bool is_x(void *context, const char *name)
+{
+    ++*(unsigned *)context;
+    return strcmp(name, "x.spill") == 0;
+}
+
+static void what_is_left_for_a_later_run_is_found_again(void **state)
+{
+    (void)state;
+    strl_scratch_desc desc = {.path = in_folder("parent/s.tmp"), .parent = in_folder("parent"), .names = names, .keep = true};
+    strl_scratch *scratch = NULL;
+    unsigned asked = 0;
+    assert_int_equal(strl_scratch_create(&desc, &scratch, NULL), STRL_OK);
+    put(in_folder("parent/s.tmp/x.spill"), "x");
+    put(in_folder("parent/s.tmp/y.spill"), "y");
+    strl_scratch_leave(scratch);
+    strl_scratch_leave(NULL);
+    assert_int_equal(count_files(desc.path), 3);
+    assert_int_equal(strl_scratch_create(&desc, &scratch, NULL), STRL_OK);
+    assert_int_equal(count_files(desc.path), 3);
+    assert_int_equal(strl_scratch_sweep(scratch, is_x, &asked, NULL), STRL_OK);
+    assert_int_equal(asked, 2);
+    assert_int_equal(count_files(desc.path), 2);
+    strl_scratch_leave(scratch);
+    desc.keep = false;
+    assert_int_equal(strl_scratch_create(&desc, &scratch, NULL), STRL_OK);
+    assert_int_equal(count_files(desc.path), 1);
+    strl_scratch_destroy(scratch);
+    assert_int_equal(count_files(folder), 0); /* the parent, which the first run made, too */
+}
+
 static void a_nameless_file_leaves_no_name(void **state)
 {
     (void)state;
@@ -421,6 +452,7 @@ int main(void)
         cmocka_unit_test(a_lock_that_is_a_link_is_not_followed),
         cmocka_unit_test(of_processes_that_start_together_the_others_hear_locked),
         cmocka_unit_test(what_a_killed_process_left_is_cleared),
+        cmocka_unit_test(what_is_left_for_a_later_run_is_found_again),
         cmocka_unit_test(a_nameless_file_leaves_no_name),
     };
     return cmocka_run_group_tests(tests, set_up, tear_down);
