@@ -21,7 +21,6 @@ typedef struct view {
     double s_of[RING_MAX], t_of[RING_MAX], h_of[RING_MAX]; /* two coordinates across the normal, one along it */
     double us, ut, uh;           /* u, or its nearest point on the new boundary edge */
     double moved[3];             /* from u to that point; 0 for a closed fan */
-    double side[RING_MAX];       /* of u seen along the new spoke to each point: > 0 = at its left */
     uint32_t image;              /* the new triangle that holds u */
     double least[RING_MAX], most[RING_MAX]; /* per new triangle: how far the new surface lies above the old one; the patches agree on the rim */
 } view;
@@ -92,11 +91,9 @@ static bool is_height_field(const view *w)
 static void find_image(view *w)
 {
     w->image = 1;
-    for (uint32_t m = 1; m + 1 < w->n; m++) {
-        w->side[m] = cross2(w->s_of[m], w->t_of[m], w->us, w->ut);
-        if (w->side[m] >= 0)
+    for (uint32_t m = 1; m + 1 < w->n; m++)
+        if (cross2(w->s_of[m], w->t_of[m], w->us, w->ut) >= 0)
             w->image = m;
-    }
 }
 
 static void note_gap(view *w, uint32_t triangle, double gap)
@@ -170,12 +167,12 @@ static void note_crossings(view *w, watch *seen, collapse_effect *effect)
     }
 }
 
-/* The box of a move by t * way, t in [0, 1]; `more` in every direction. */
-static void box_of_way(const double way[3], double more, float box[6])
+/* The box of a move by t * way, t in [0, 1]. */
+static void box_of_way(const double way[3], float box[6])
 {
     for (unsigned k = 0; k < 3; k++) {
-        box[k] = (float)((way[k] < 0 ? -way[k] : 0) + more);
-        box[3 + k] = (float)((way[k] > 0 ? way[k] : 0) + more);
+        box[k] = (float)(way[k] < 0 ? -way[k] : 0);
+        box[3 + k] = (float)(way[k] > 0 ? way[k] : 0);
     }
 }
 
@@ -183,12 +180,6 @@ static void add_box(float to[6], const float box[6])
 {
     for (unsigned k = 0; k < 6; k++)
         to[k] = (to[k] + box[k]) * STRL_ROUND_UP;
-}
-
-static void unite_boxes(float to[6], const float box[6])
-{
-    for (unsigned k = 0; k < 6; k++)
-        to[k] = strl__larger(to[k], box[k]);
 }
 
 /* A new triangle overlaps the old triangles between v and itself on its side of u; the one that holds u may overlap all.
@@ -204,7 +195,7 @@ static void drift_by_height(const view *w, collapse_effect *effect)
         down[k] = n > 0 ? 0 : -n;
     }
     float moved[6];
-    box_of_way(w->moved, 0, moved);
+    box_of_way(w->moved, moved);
     reach sum = {{0}};
     for (uint32_t m = w->first; m < w->image; m++) {
         strl__unite(&sum, &w->s->faces[star->triangle[triangle[m]]].reach);
@@ -256,13 +247,18 @@ static bool colours_vary(const simplifier *s, const strl_star *star, uint32_t ow
     return false;
 }
 
+static double distance_squared(const simplifier *s, uint32_t a, uint32_t b)
+{
+    const double *p = s->sites[a].position, *q = s->sites[b].position;
+    double x = p[0] - q[0], y = p[1] - q[1], z = p[2] - q[2];
+    return x * x + y * y + z * z;
+}
+
 static float farthest(const simplifier *s, const strl_star *star, uint32_t to)
 {
-    const double *v = s->sites[to].position;
     double most = 0;
     for (uint32_t i = 0; i < star->neighbour_count; i++) {
-        const double *x = s->sites[star->neighbour[i]].position;
-        double a = x[0] - v[0], b = x[1] - v[1], c = x[2] - v[2], squared = a * a + b * b + c * c;
+        double squared = distance_squared(s, star->neighbour[i], to);
         most = squared > most ? squared : most;
     }
     return (float)sqrt(most);
@@ -315,12 +311,6 @@ static uint32_t triangle_beside(const simplifier *s, const strl_star *star, uint
     return any;
 }
 
-static double distance(const double a[3], const double b[3])
-{
-    double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
-    return sqrt(x * x + y * y + z * z);
-}
-
 /* The triangle of the star that stays and keeps the edge to x; NO_INDEX = none. */
 static uint32_t keeper_of(const strl_star *star, uint32_t to, uint32_t x)
 {
@@ -343,8 +333,8 @@ static void pulled_drift(const simplifier *s, uint32_t triangle, unsigned c, con
     float most[6];
     memcpy(most, p->corner[c], sizeof most);
     add_box(most, way);
-    unite_boxes(most, p->corner[(c + 1) % 3]);
-    unite_boxes(most, p->corner[(c + 2) % 3]);
+    for (unsigned k = 0; k < 6; k++)
+        most[k] = strl__larger(most[k], strl__larger(p->corner[(c + 1) % 3][k], p->corner[(c + 2) % 3][k]));
     memcpy(drift, p->before, sizeof p->before);
     add_box(drift, most);
 }
@@ -357,7 +347,7 @@ static void drift_straight(const simplifier *s, const strl_star *star, uint32_t 
     double way[3];
     for (unsigned k = 0; k < 3; k++)
         way[k] = s->sites[to].position[k] - s->sites[star->point].position[k];
-    box_of_way(way, 0, effect->way);
+    box_of_way(way, effect->way);
     effect->straight = true;
     effect->orphan = (reach){{0}};
     for (uint32_t i = 0; i < star->count; i++) {
@@ -379,7 +369,7 @@ static void drift_straight(const simplifier *s, const strl_star *star, uint32_t 
         if (receiver != NO_INDEX)
             effect->receiver[effect->receivers++] = receiver;
         reach lost = effect->of[i];
-        double edge = has_edge ? 0 : distance(s->sites[to].position, s->sites[x].position);
+        double edge = has_edge ? 0 : sqrt(distance_squared(s, to, x));
         for (unsigned k = 0; k < 6; k++)
             lost.of[k] = (lost.of[k] + (float)edge) * STRL_ROUND_UP;
         strl__unite(&effect->orphan, &lost);

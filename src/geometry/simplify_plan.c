@@ -38,7 +38,13 @@ static double dot(const double a[3], const double b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* No triangle that stays may turn by more than about 75 degrees or become a line. */
+/* From twice the area's vector before to that after: by more than about 75 degrees, or to a line. */
+static inline bool turns(const double before[3], const double after[3])
+{
+    double along = dot(before, after);
+    return !(along > 0) | (along * along < 0.0625 * dot(before, before) * dot(after, after));
+}
+
 static bool fan_keeps_orientation(const strl_fan *fan, uint32_t v_at, uint32_t first, uint32_t end)
 {
     double v[3] = {fan->x[0][v_at], fan->x[1][v_at], fan->x[2][v_at]};
@@ -50,12 +56,12 @@ static bool fan_keeps_orientation(const strl_fan *fan, uint32_t v_at, uint32_t f
         after[0] = before[0] + v[1] * edge[2] - v[2] * edge[1];
         after[1] = before[1] + v[2] * edge[0] - v[0] * edge[2];
         after[2] = before[2] + v[0] * edge[1] - v[1] * edge[0];
-        double along = dot(before, after);
-        turned |= !(along > 0) | (along * along < 0.0625 * dot(before, before) * dot(after, after));
+        turned |= turns(before, after);
     }
     return !turned;
 }
 
+/* No triangle that stays may turn over. */
 static bool keeps_orientation(const simplifier *s, const strl_star *star, uint32_t to)
 {
     if (star->manifold) {
@@ -71,8 +77,7 @@ static bool keeps_orientation(const simplifier *s, const strl_star *star, uint32
         double before[3], after[3];
         cross_of(s->sites[star->point].position, a, b, before);
         cross_of(s->sites[to].position, a, b, after);
-        double along = dot(before, after);
-        if (!(along > 0) || along * along < 0.0625 * dot(before, before) * dot(after, after))
+        if (turns(before, after))
             return false;
     }
     return true;

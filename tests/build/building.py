@@ -10,6 +10,7 @@ import sys
 import tempfile
 import threading
 import time
+import traceback
 
 STROLL = os.path.abspath(sys.argv[1]) if len(sys.argv) > 1 else None
 MIB = 1 << 20
@@ -145,7 +146,7 @@ def run_tests(*tests):
             try:
                 test(folder)
                 print(f"[       OK ] {test.__name__}", flush=True)
-            except AssertionError as error:
+            except Exception:  # the others are run too
                 failed += 1
-                print(f"[  FAILED  ] {test.__name__}\n{error}", flush=True)
+                print(f"[  FAILED  ] {test.__name__}\n{traceback.format_exc()}", flush=True)
     sys.exit(1 if failed else 0)

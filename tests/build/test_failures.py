@@ -6,10 +6,10 @@ import signal
 import subprocess
 import time
 
-from building import STROLL, assert_refused, build, must, run, run_tests, sanitizers, write_box_stl, write_grid_obj
+from building import STROLL, assert_refused, build, must, run, run_tests, write_box_stl, write_grid_obj
 
 OLDER = b"an older container"
-SLOW = 10 if sanitizers() else 1
+PATIENCE_S = 600  # a machine may be slow; what waits longer hangs
 
 
 def older_output(folder):
@@ -158,32 +158,42 @@ def start_long_build(folder, out):
         must("scene", "isosurface", "--triangles", "400K", "-o", source, "--quiet")
     child = subprocess.Popen([STROLL, "build", source, "-o", out], stdout=subprocess.PIPE,
                              stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 30
+    deadline = time.monotonic() + PATIENCE_S
     while not os.path.exists(out + ".tmp/lock"):
         assert child.poll() is None and time.monotonic() < deadline
         time.sleep(0.002)
     return child
 
 
+def seconds_of_long_build(folder):
+    """Of a whole one, here and now."""
+    out = os.path.join(folder, "whole.stroll")
+    child = start_long_build(folder, out)
+    start = time.monotonic()
+    _, error = child.communicate(timeout=PATIENCE_S)
+    assert child.returncode == 0, error
+    os.remove(out)
+    return time.monotonic() - start
+
+
 def signals_stop_a_build_cleanly(folder):
+    """At the start it is always stopped; later it may be done already, where the machine's other work came and went."""
+    seconds = seconds_of_long_build(folder)
     out = older_output(folder)
-    stopped = 0
-    for number, wait in ((signal.SIGINT, 0), (signal.SIGTERM, 0.1), (signal.SIGHUP, 0.4), (signal.SIGQUIT, 1),
-                         (signal.SIGTERM, 1.8)):
+    for number, share in ((signal.SIGINT, 0), (signal.SIGTERM, 0.05), (signal.SIGHUP, 0.2), (signal.SIGQUIT, 0.45),
+                          (signal.SIGTERM, 0.7)):
         child = start_long_build(folder, out)
-        time.sleep(wait * SLOW)
+        time.sleep(share * seconds)
         child.send_signal(number)
-        _, error = child.communicate(timeout=60 * SLOW)
-        if child.returncode == 0: # it was done already
+        _, error = child.communicate(timeout=PATIENCE_S)
+        if child.returncode == 0 and share > 0:
             older_output(folder)
             continue
-        stopped += 1
         assert child.returncode == 1, (child.returncode, error)
         assert error.count("\n") == 1 and "interrupted" in error, error
         left = ["long.ply", "out.stroll"] + (["out.stroll.tmp"] if "--resume" in error else [])
         assert sorted(os.listdir(folder)) == left, os.listdir(folder)
         assert read(out) == OLDER
-    assert stopped >= 3
 
 
 def a_second_build_of_the_same_output_is_refused(folder):
@@ -192,7 +202,7 @@ def a_second_build_of_the_same_output_is_refused(folder):
     write_box_stl(other)
     child = start_long_build(folder, out)
     assert_refused(run("build", other, "-o", out), "lock")
-    output, error = child.communicate(timeout=120 * SLOW)
+    _, error = child.communicate(timeout=PATIENCE_S)
     assert child.returncode == 0, error
     must("info", out)
     assert sorted(os.listdir(folder)) == ["in.stl", "long.ply", "out.stroll"]
@@ -201,7 +211,9 @@ def a_second_build_of_the_same_output_is_refused(folder):
 def what_a_killed_build_left_does_no_harm(folder):
     out = older_output(folder)
     child = start_long_build(folder, out)
-    time.sleep(0.5 * SLOW)
+    while not any(name.endswith(".spill") for name in os.listdir(out + ".tmp")):
+        assert child.poll() is None, "the build was over before it could be killed"
+        time.sleep(0.002)
     child.kill()
     child.communicate()
     assert read(out) == OLDER

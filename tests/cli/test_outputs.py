@@ -16,6 +16,7 @@ import traceback
 
 STROLL = os.path.abspath(sys.argv[1])
 ROOT = os.geteuid() == 0
+PATIENCE_S = 600
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
@@ -44,7 +45,7 @@ def make_writers(data):
 
 # ---- helpers ----
 def run(*words, **options):
-    return subprocess.run([STROLL, *words, "--quiet"], capture_output=True, text=True, timeout=120, **options)
+    return subprocess.run([STROLL, *words, "--quiet"], capture_output=True, text=True, timeout=PATIENCE_S, **options)
 
 
 def must(*words):
@@ -135,7 +136,7 @@ def without_rights_nothing_is_begun(folder, writers):
         for path in (closed + "/new" + writer.ending, writable + "/protected" + writer.ending):
             put(writable + "/protected" + writer.ending, "protected")
             os.chmod(writable + "/protected" + writer.ending, 0o444)
-            done = subprocess.run([*prefix, STROLL, *writer.words, path], capture_output=True, text=True, timeout=60)
+            done = subprocess.run([*prefix, STROLL, *writer.words, path], capture_output=True, text=True, timeout=PATIENCE_S)
             assert_refused(done, "Permission denied")
             assert os.listdir(closed) == [] and content(writable + "/protected" + writer.ending) == b"protected"
 
@@ -320,20 +321,27 @@ def stop(words, number, ready):
     """Sends the signal once ready() holds; the child's exit status and standard error."""
     child = subprocess.Popen([STROLL, *words, "--quiet"], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
                              preexec_fn=hear_all)
-    until = time.monotonic() + 30
-    while not ready() and child.poll() is None and time.monotonic() < until:
+    while not ready() and child.poll() is None:
         time.sleep(0.0005)
     child.send_signal(number)
-    _, error = child.communicate(timeout=60)
+    _, error = child.communicate(timeout=PATIENCE_S)
     return child.returncode, error
 
 
-def assert_stopped(words, number, ready):
-    """A child that was done before the signal came is asked again."""
-    for _ in range(20):
-        code, error = stop(words, number, ready)
-        if code != 0:
+def after(seconds):
+    """What holds from then on."""
+    start = time.monotonic()
+    return lambda: time.monotonic() > start + seconds
+
+
+def assert_stopped(words, number, ready=None):
+    """Without `ready` some time after the start: less where the child was done already, more where it did not listen yet."""
+    seconds = 0.3
+    for _ in range(40):
+        code, error = stop(words, number, ready or after(seconds))
+        if code not in (0, -number):
             break
+        seconds *= 0.7 if code == 0 else 1.3
     assert code == 1 and error == "stroll: interrupted\n", (words, number, code, error)
 
 
@@ -368,10 +376,8 @@ def stopped_images_are_whole(folder, writers):
             whole = data.endswith(b"IEND\xaeB`\x82") if name.endswith(".png") else len(data) == depth_bytes
             assert whole, name
     # before the first image nothing is left, the new folder included
-    start = time.monotonic()
     assert_stopped(["render", writers[0].words[1], "--full", "--path", "walk", "--frames", "2000", "-o",
-                    folder + "/new"],
-                   signal.SIGINT, lambda: time.monotonic() > start + 0.1)
+                    folder + "/new"], signal.SIGINT)
     assert not os.path.exists(folder + "/new") or os.listdir(folder + "/new")
 
 
@@ -379,13 +385,11 @@ def verify_and_compare_end_by_signals(folder, writers):
     model, source = writers[1].words[1], writers[0].words[1]
     before = every_file(os.path.dirname(model)).keys()
     for number in SIGNALS:
-        start = time.monotonic()
-        assert_stopped(["verify", model, "--against", source], number, lambda: time.monotonic() > start + 0.3)
+        assert_stopped(["verify", model, "--against", source], number)
         assert every_file(os.path.dirname(model)).keys() == before
     place = folder + "/images"
     must("render", model, "--path", "orbit", "--frames", "40", "--size", "640x480", "--depth", "-o", place)
-    start = time.monotonic()
-    assert_stopped(["compare", place, place], signal.SIGTERM, lambda: time.monotonic() > start + 0.1)
+    assert_stopped(["compare", place, place], signal.SIGTERM)
 
 
 def what_was_ignored_before_stays_so(folder, writers):
@@ -426,7 +430,7 @@ def a_second_ctrl_c_ends_the_process(folder, writers):
             time.sleep(0.2)
             assert child.poll() is None, "the first one asks"
             child.send_signal(number)
-            assert child.wait(timeout=60) == -number
+            assert child.wait(timeout=PATIENCE_S) == -number
         finally:
             child.kill()
     os.close(reading)
