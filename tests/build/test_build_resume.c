@@ -15,15 +15,23 @@
 #include "build/built.h"
 #include "platform/file.h"
 
+/* How much of what could be tried is: under a sanitizer, where all takes ten times as long, less. */
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define STRIDE 5u
-#define BYTE_STRIDE 29u
+#define CALL_STRIDE 9u
+#define FAILURE_SHARE 2u
+#define BYTE_STRIDE 41u
+#define WORD_SHARE 3u
 #else
-#define STRIDE 12u
-#define BYTE_STRIDE 5u
+#define CALL_STRIDE 2u
+#define FAILURE_SHARE 5u
+#define BYTE_STRIDE 7u
+#define WORD_SHARE 8u
 #endif
 #define HEAD_BYTES 20u /* of a checkpoint, before what its checksum is of */
 #define STEP_BYTES 16384u
+/* Rings of a torus: the fewest that give a root two and three levels above the leaves. */
+#define TWO_LEVELS 52u
+#define THREE_LEVELS 101u
 
 static uint8_t *expected;
 static size_t expected_bytes;
@@ -50,10 +58,11 @@ static strl_status build(bool resume, unsigned jobs, stop *s, strl_build_result 
     return strl_build_clusters(&desc, result, err);
 }
 
-static void make_input(void)
+/* And what a build of it gives that nothing stops. */
+static void make_input(uint32_t rings)
 {
     mesh_file mesh = {0};
-    mesh_file_torus(&mesh, 120, 120);
+    mesh_file_torus(&mesh, rings, 100);
     mesh_file_write_ply(&mesh, built_path("in.ply"));
     mesh_file_free(&mesh);
     strl_build_result result;
@@ -92,81 +101,7 @@ static int clean_up(void **state)
     return built_teardown(state);
 }
 
-/* ---- stopped ---- */
-static void cancelled_at_any_call_it_resumes(void **state)
-{
-    (void)state;
-    make_input();
-    unsigned kept = 0;
-    for (uint64_t after = 1;; after++) {
-        stop s = {.after = after};
-        strl_build_result result;
-        strl_error err;
-        strl_status status = build(false, 2, &s, &result, &err);
-        if (status == STRL_OK)
-            break;
-        assert_int_equal(status, STRL_ERR_CANCELLED);
-        assert_int_equal(result.scratch_kept, strl_path_exists(built_path("out.stroll.tmp")));
-        kept += result.scratch_kept;
-        assert_int_equal(strstr(err.message, "--resume") != NULL, result.scratch_kept);
-        must_resume();
-    }
-    assert_output();
-    assert_true(kept > 10);
-}
-
-/* Fails the n-th call, then resumes until it gets through, for growing n. while_resuming: the failure meets a run that
- * goes on with another's stages. */
-static void fail_each(void (*fail_after)(uint64_t n), strl_status failure, bool while_resuming)
-{
-    unsigned kept = 0;
-    make_input();
-    for (uint64_t n = 1;; n += 1 + n / STRIDE) {
-        strl_build_result result;
-        strl_error err;
-        stop middle = {.after = 2, .stage = "level 1"};
-        if (while_resuming && build(false, 1, &middle, &result, &err) == STRL_OK)
-            fail_msg("the build was over before it could be stopped");
-        fail_after(n);
-        strl_status status = build(while_resuming, 2, NULL, &result, &err);
-        fail_after(0);
-        if (status == STRL_OK)
-            break;
-        if (status != failure)
-            fail_msg("failure %llu: %s (%s)", (unsigned long long)n, err.message, strl_status_name(status));
-        kept += result.scratch_kept;
-        assert_true(!while_resuming || strl_path_exists(built_path("out.stroll.tmp/checkpoint")));
-        must_resume();
-    }
-    assert_output();
-    assert_true(kept >= 3);
-}
-
-static void on_a_full_disk_it_keeps_what_is_finished(void **state)
-{
-    (void)state;
-    fail_each(strl_file_fail_writes_after, STRL_ERR_DISK_FULL, false);
-}
-
-static void a_disk_that_is_still_full_loses_nothing(void **state)
-{
-    (void)state;
-    fail_each(strl_file_fail_writes_after, STRL_ERR_DISK_FULL, true);
-}
-
-static void without_memory_to_resume_nothing_is_lost(void **state)
-{
-    (void)state;
-    fail_each(strl__alloc_fail_after, STRL_ERR_MEMORY, true);
-}
-
-static void a_read_that_fails_while_resuming_loses_nothing(void **state)
-{
-    (void)state;
-    fail_each(strl_file_fail_reads_after, STRL_ERR_IO, true);
-}
-
-/* ---- scratch that lies ---- */
+/* ---- scratch folders, kept in memory ---- */
 typedef struct saved_file {
     char name[64];
     uint8_t *bytes;
@@ -222,6 +157,106 @@ static saved_file *find(saved_folder *saved, const char *name)
     return NULL;
 }
 
+/* Stops at the stage's call of that number. */
+static void stop_in(const char *stage, uint64_t call, saved_folder *saved)
+{
+    strl_build_result result;
+    strl_error err;
+    stop middle = {.after = call, .stage = stage};
+    assert_int_equal(build(false, 1, &middle, &result, &err), STRL_ERR_CANCELLED);
+    assert_true(result.scratch_kept);
+    load_folder(saved);
+}
+
+static void free_folder(saved_folder *saved)
+{
+    for (unsigned i = 0; i < saved->count; i++)
+        free(saved->file[i].bytes);
+}
+
+/* ---- stopped ---- */
+static void cancelled_at_any_call_it_resumes(void **state)
+{
+    (void)state;
+    make_input(THREE_LEVELS);
+    unsigned kept = 0, tried = 0;
+    for (uint64_t after = 1;; after += CALL_STRIDE, tried++) {
+        stop s = {.after = after};
+        strl_build_result result;
+        strl_error err;
+        strl_status status = build(false, 2, &s, &result, &err);
+        if (status == STRL_OK)
+            break;
+        assert_int_equal(status, STRL_ERR_CANCELLED);
+        assert_int_equal(result.scratch_kept, strl_path_exists(built_path("out.stroll.tmp")));
+        kept += result.scratch_kept;
+        assert_int_equal(strstr(err.message, "--resume") != NULL, result.scratch_kept);
+        must_resume();
+    }
+    assert_output();
+    assert_true(kept > 0 && kept < tried);
+}
+
+/* Fails the n-th call, then resumes until it gets through, for growing n. before: a folder with stages that each try goes on
+ * with, or NULL to begin anew. */
+static void fail_each(void (*fail_after)(uint64_t n), strl_status failure, const saved_folder *before)
+{
+    unsigned kept = 0;
+    for (uint64_t n = 1;; n += 1 + n / FAILURE_SHARE) {
+        strl_build_result result;
+        strl_error err;
+        if (before)
+            put_folder(before);
+        fail_after(n);
+        strl_status status = build(before != NULL, 2, NULL, &result, &err);
+        fail_after(0);
+        if (status == STRL_OK)
+            break;
+        if (status != failure)
+            fail_msg("failure %llu: %s (%s)", (unsigned long long)n, err.message, strl_status_name(status));
+        kept += result.scratch_kept;
+        assert_true(!before || strl_path_exists(built_path("out.stroll.tmp/checkpoint")));
+        must_resume();
+    }
+    assert_output();
+    assert_true(kept >= 3);
+}
+
+static void fail_each_while_resuming(void (*fail_after)(uint64_t n), strl_status failure)
+{
+    saved_folder before;
+    make_input(THREE_LEVELS);
+    stop_in("level 1", 2, &before);
+    fail_each(fail_after, failure, &before);
+    free_folder(&before);
+}
+
+static void on_a_full_disk_it_keeps_what_is_finished(void **state)
+{
+    (void)state;
+    make_input(TWO_LEVELS);
+    fail_each(strl_file_fail_writes_after, STRL_ERR_DISK_FULL, NULL);
+}
+
+static void a_disk_that_is_still_full_loses_nothing(void **state)
+{
+    (void)state;
+    fail_each_while_resuming(strl_file_fail_writes_after, STRL_ERR_DISK_FULL);
+}
+
+static void without_memory_to_resume_nothing_is_lost(void **state)
+{
+    (void)state;
+    fail_each_while_resuming(strl__alloc_fail_after, STRL_ERR_MEMORY);
+}
+
+static void a_read_that_fails_while_resuming_loses_nothing(void **state)
+{
+    (void)state;
+    fail_each_while_resuming(strl_file_fail_reads_after, STRL_ERR_IO);
+}
+
+/* ---- scratch that lies ---- */
 static void reseal(saved_file *checkpoint)
 {
     strl__store_le(checkpoint->bytes + 12, 8, strl__checksum(checkpoint->bytes + HEAD_BYTES, checkpoint->size - HEAD_BYTES));
@@ -250,29 +285,13 @@ static void resume_what_lies(const saved_folder *saved, unsigned *refused)
         assert_int_equal(remove(built_path("out.stroll")), 0);
 }
 
-static void stop_in(const char *stage, saved_folder *saved)
-{
-    strl_build_result result;
-    strl_error err;
-    stop middle = {.after = 1, .stage = stage};
-    make_input();
-    assert_int_equal(build(false, 1, &middle, &result, &err), STRL_ERR_CANCELLED);
-    assert_true(result.scratch_kept);
-    load_folder(saved);
-}
-
-static void free_folder(saved_folder *saved)
-{
-    for (unsigned i = 0; i < saved->count; i++)
-        free(saved->file[i].bytes);
-}
-
 static void any_byte_of_a_checkpoint_may_lie(void **state)
 {
     (void)state;
     saved_folder saved;
     unsigned refused = 0, tried = 0;
-    stop_in("level 2", &saved);
+    make_input(TWO_LEVELS);
+    stop_in("level 1", 1, &saved);
     saved_file *checkpoint = find(&saved, "checkpoint");
     for (size_t at = HEAD_BYTES; at < checkpoint->size; at += BYTE_STRIDE, tried++) {
         static const uint8_t masks[] = {0x01, 0x80, 0xff};
@@ -294,7 +313,8 @@ static void a_checkpoint_may_be_cut_off_anywhere(void **state)
     (void)state;
     saved_folder saved;
     unsigned refused = 0, tried = 0;
-    stop_in("level 2", &saved);
+    make_input(TWO_LEVELS);
+    stop_in("level 1", 1, &saved);
     saved_file *checkpoint = find(&saved, "checkpoint");
     size_t whole = checkpoint->size;
     for (checkpoint->size = 0; checkpoint->size < whole; checkpoint->size += 1 + checkpoint->size / 50, tried++) {
@@ -306,30 +326,39 @@ static void a_checkpoint_may_be_cut_off_anywhere(void **state)
     free_folder(&saved);
 }
 
+/* Of the step that a stage's stream begins with, with the checksum that it then has. */
+static void lie_in(const char *name, saved_folder *saved)
+{
+    unsigned refused = 0, tried = 0;
+    saved_file *checkpoint = find(saved, "checkpoint"), *stage = find(saved, name);
+    size_t size = stage->size < STEP_BYTES ? stage->size : STEP_BYTES;
+    for (size_t at = 0; at < size; at += 1 + at / WORD_SHARE, tried++) {
+        uint64_t before = strl__checksum(stage->bytes, size);
+        stage->bytes[at] ^= 0x41;
+        uint64_t after = strl__checksum(stage->bytes, size);
+        reseal_step(checkpoint, before, after);
+        resume_what_lies(saved, &refused);
+        stage->bytes[at] ^= 0x41;
+        reseal_step(checkpoint, after, before);
+    }
+    assert_true(refused > tried / 8);
+}
+
 static void any_word_of_a_stage_may_lie(void **state)
 {
     (void)state;
-    static const char *const names[] = {"ingest.spill", "partition.spill", "nodes-00.spill", "graph.spill"};
-    for (unsigned n = 0; n < 4; n++) {
-        saved_folder saved;
-        unsigned refused = 0, tried = 0;
-        stop_in(n == 3 ? "partition" : "level 2", &saved);
-        saved_file *checkpoint = find(&saved, "checkpoint"), *stage = find(&saved, names[n]);
-        size_t size = stage->size < STEP_BYTES ? stage->size : STEP_BYTES;
-        for (size_t at = 0; at < size; at += 1 + at / (STRIDE * 2), tried++) {
-            uint64_t before = strl__checksum(stage->bytes, size);
-            stage->bytes[at] ^= 0x41;
-            uint64_t after = strl__checksum(stage->bytes, size);
-            reseal_step(checkpoint, before, after);
-            resume_what_lies(&saved, &refused);
-            stage->bytes[at] ^= 0x41;
-            reseal_step(checkpoint, after, before);
-        }
-        assert_true(refused > tried / 8);
-        free_folder(&saved);
-        clean_up(state);
-        built_setup(state);
-    }
+    saved_folder saved;
+    make_input(TWO_LEVELS);
+    stop_in("partition", 1, &saved);
+    lie_in("graph.spill", &saved);
+    lie_in("ingest.spill", &saved);
+    free_folder(&saved);
+    stop_in("level 0", 2, &saved);
+    lie_in("partition.spill", &saved);
+    free_folder(&saved);
+    stop_in("level 1", 1, &saved);
+    lie_in("nodes-00.spill", &saved);
+    free_folder(&saved);
 }
 
 int main(void)
