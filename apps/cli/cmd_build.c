@@ -39,7 +39,7 @@ static int print_json(const strl_build_result *r)
 {
     uint64_t dropped = r->dropped_nonfinite + r->dropped_degenerate;
     json_t *object = json_pack(
-        "{s:I, s:I, s:{s:I, s:I, s:I, s:I, s:I}, s:{s:I, s:I}, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:f, s:I, s:I}",
+        "{s:I, s:I, s:{s:I, s:I, s:I, s:I, s:I}, s:{s:I, s:I}, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:f, s:I, s:I, s:b}",
         "triangles_in", (json_int_t)r->triangles_in, "triangles_leaf", (json_int_t)r->triangles_leaf, "dropped",
         "triangles", (json_int_t)dropped, "nonfinite", (json_int_t)r->dropped_nonfinite, "degenerate",
         (json_int_t)r->dropped_degenerate, "lines", (json_int_t)r->dropped_lines, "points",
@@ -48,7 +48,7 @@ static int print_json(const strl_build_result *r)
         (json_int_t)r->materials, "placements", (json_int_t)r->placements, "nodes", (json_int_t)r->nodes, "groups",
         (json_int_t)r->groups, "levels", (json_int_t)r->levels, "root_triangles", (json_int_t)r->root_triangles,
         "bytes_out", (json_int_t)r->bytes_out, "seconds", r->seconds, "cpu_seconds", r->cpu_seconds, "peak_rss_bytes",
-        (json_int_t)r->peak_rss_bytes, "scratch_bytes", (json_int_t)r->scratch_bytes);
+        (json_int_t)r->peak_rss_bytes, "scratch_bytes", (json_int_t)r->scratch_bytes, "resumed", r->resumed);
     if (!object)
         return strl_cli_fail(&(strl_error){STRL_ERR_MEMORY, "no memory to print the result"});
     json_dumpf(object, stdout, JSON_COMPACT);
@@ -57,11 +57,21 @@ static int print_json(const strl_build_result *r)
     return 0;
 }
 
-static void print_text(const strl_build_result *r, const char *output)
+/* Of a resumed build there is no rate: its seconds are those of the last run. */
+static void print_time(const strl_build_result *r)
 {
     char rate[16], processor_rate[16];
     format_rate(rate, r->triangles_in, r->seconds);
     format_rate(processor_rate, r->triangles_in, r->cpu_seconds);
+    if (r->resumed)
+        printf("%.1f s after it was resumed", r->seconds);
+    else
+        printf("%.1f s, %s triangles a second (%s a second of processor)", r->seconds, rate, processor_rate);
+    printf(", peak memory %.0f MB, scratch %.0f MB\n", (double)r->peak_rss_bytes / 1e6, (double)r->scratch_bytes / 1e6);
+}
+
+static void print_text(const strl_build_result *r, const char *output)
+{
     printf("%s: %llu triangle%s in %llu node%s on %u level%s, %.1f MB (%.2f bytes a triangle)\n", output,
            (unsigned long long)r->triangles_leaf, strl_cli_plural(r->triangles_leaf), (unsigned long long)r->nodes,
            strl_cli_plural(r->nodes), r->levels, strl_cli_plural(r->levels), (double)r->bytes_out / 1e6,
@@ -77,8 +87,7 @@ static void print_text(const strl_build_result *r, const char *output)
                r->missing_libraries == 1 ? "y" : "ies");
     if (r->coarse_lattices)
         printf("the lattice is coarser than a sixteenth of the short edges\n");
-    printf("%.1f s, %s triangles a second (%s a second of processor), peak memory %.0f MB, scratch %.0f MB\n",
-           r->seconds, rate, processor_rate, (double)r->peak_rss_bytes / 1e6, (double)r->scratch_bytes / 1e6);
+    print_time(r);
 }
 
 /* What was stopped by a signal says that it was, and how to go on. */
@@ -108,7 +117,7 @@ static int run(strl_cli_args *args)
         {.name = "jobs", .letter = 'j', .kind = STRL_CLI_COUNT, .value = &jobs, .help = "threads (one per processor)",
          .least = 1, .most = 256},
         {.name = "scratch", .kind = STRL_CLI_STRING, .value = &desc.scratch, .argument = "DIR",
-         .help = "folder in which OUT.stroll.tmp is made for the time of the build, with it where missing (beside the output)"},
+         .help = "folder in which OUT.stroll.tmp is made, with it where missing, until the build is done (beside the output)"},
         {.name = "resume", .kind = STRL_CLI_FLAG, .value = &desc.resume,
          .help = "go on where the same build was killed, interrupted or met a full disk (from the beginning)"},
         {.name = "grid", .kind = STRL_CLI_REAL, .value = &desc.grid, .argument = "STEP",
