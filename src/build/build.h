@@ -33,8 +33,8 @@ typedef struct strl_build_desc {
     /* A build that is stopped leaves its scratch folder, with the stages that are finished, for a later one that resumes.
      * Not set: nothing is left. */
     bool keep;
-    uint64_t keep_triangles; /* models of fewer are built before that is worth anything: nothing is kept of them; 0 = 65,536 */
-    bool resume;            /* goes on with what an earlier build of the same request has left, if there is anything; keeps, too */
+    uint64_t keep_triangles; /* of models of fewer nothing is kept: they are built at once; 0 = 65,536 */
+    bool resume; /* goes on with what an earlier build of the same request has left, if anything; keeps, too */
     bool no_dependencies;   /* for measuring what dependencies bring: every group has one member */
     /* Called on the caller's thread, often; false cancels. May be NULL. */
     bool (*progress)(void *context, const strl_build_progress *progress);
@@ -58,8 +58,8 @@ typedef struct strl_build_result {
     bool scratch_kept; /* of a failed build: there is something to resume */
 } strl_build_result;
 
-/* Writes desc->output, which appears only when whole. On failure nothing is left of it but what desc->keep asks for, and an older
- * file of that name stays. The bytes are the same whether the build was stopped and resumed, however often, or not. */
+/* Writes desc->output, which appears only when whole. On failure nothing is left of it but what desc->keep asks for, and
+ * an older file of that name stays. The bytes are the same whether the build was stopped and resumed, however often, or not. */
 strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err);
 
 #endif

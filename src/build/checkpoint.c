@@ -40,7 +40,7 @@ static strl_status put_in_place(const strl_build_context *context, const strl_wr
     if (!status)
         status = strl_file_write(strl_output_file(output), 0, file->data, file->size, err);
     if (!status)
-        status = strl_output_finish(output, false, err);
+        status = strl_output_finish(output, true, err);
     strl_output_close(output);
     strl__free(path);
     return status;
@@ -99,15 +99,18 @@ static strl_status check_head(const char *path, strl_cursor *cursor, strl_error 
     uint32_t format = strl_cursor_u32(cursor);
     uint64_t expected = strl_cursor_u64(cursor);
     if (cursor->failed || memcmp(magic, MAGIC, sizeof MAGIC))
-        return strl__fail(err, STRL_ERR_FORMAT, "%.300s is damaged: expected the words of a checkpoint at byte 0: leave --resume "
-                          "out to begin anew", path);
+        return strl__fail(err, STRL_ERR_FORMAT, "%.300s is damaged: expected the words of a checkpoint at byte 0",
+                          path);
     if (format != FORMAT)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "%.300s is of another version of the program: expected its format %u, found %u: "
-                          "leave --resume out to begin anew", path, FORMAT, format);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "%.300s is of another version of the program: expected its format %u, found %u", path, FORMAT,
+                          format);
     uint64_t found = strl__checksum(cursor->data + HEAD_BYTES, cursor->size - HEAD_BYTES);
     if (found != expected)
-        return strl__fail(err, STRL_ERR_FORMAT, "%.300s is damaged: expected the checksum %016" PRIx64 " of bytes %u to %zu, found %016"
-                          PRIx64 ": leave --resume out to begin anew", path, expected, HEAD_BYTES, cursor->size - 1, found);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "%.300s is damaged: expected the checksum %016" PRIx64
+                          " of bytes %u to %zu, found %016" PRIx64,
+                          path, expected, HEAD_BYTES, cursor->size - 1, found);
     return STRL_OK;
 }
 
@@ -125,8 +128,9 @@ static strl_status read_counters(strl_build_context *context, strl_cursor *curso
     result->coarse_lattices = strl_cursor_u32(cursor);
     context->progress.triangles_in = result->triangles_in;
     if (asked < context->memory_bytes)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "--memory is %" PRIu64 " bytes, and the build to be resumed was made for %" PRIu64
-                          ": give as much or more, or leave --resume out to begin anew", asked, context->memory_bytes);
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "--memory is %" PRIu64 " bytes, in the build to be resumed it was %" PRIu64, asked,
+                          context->memory_bytes);
     return STRL_OK;
 }
 
@@ -135,8 +139,7 @@ static strl_status read_words(strl_build_context *context, strl_cursor *cursor, 
     uint32_t size = strl_cursor_u32(cursor);
     const uint8_t *words = strl_cursor_take(cursor, size);
     if (!words || !size)
-        return strl__fail(err, STRL_ERR_FORMAT, "the checkpoint in %.300s is cut off: leave --resume out to begin anew",
-                          context->scratch_dir);
+        return strl__fail(err, STRL_ERR_FORMAT, "the checkpoint in %.300s is cut off", context->scratch_dir);
     strl_writer_bytes(&context->resumed, words, size);
     return context->resumed.failed ? strl__fail(err, STRL_ERR_MEMORY, "no memory for a checkpoint") : STRL_OK;
 }
@@ -149,17 +152,11 @@ static strl_status report_check(void *context, uint64_t done, uint64_t total, st
 static strl_status restore_streams(strl_build_context *context, strl_cursor *cursor, strl_error *err)
 {
     strl__build_stage(context, "check what was finished");
-    strl_error inner = {0};
-    strl_status status = strl_spill_set_restore(context->spills, cursor, &inner);
+    strl_status status = strl_spill_set_restore(context->spills, cursor, err);
     if (!status && strl_cursor_left(cursor))
-        status = strl__fail(&inner, STRL_ERR_FORMAT, "the checkpoint in %.300s has %zu bytes too many", context->scratch_dir,
-                            strl_cursor_left(cursor));
-    if (!status)
-        status = strl_spill_set_check(context->spills, report_check, context, &inner);
-    if (!status)
-        return STRL_OK;
-    bool is_bad = status == STRL_ERR_FORMAT || status == STRL_ERR_IO;
-    return strl__fail(err, status, "%.400s%s", inner.message, is_bad ? ": leave --resume out to begin anew" : "");
+        status = strl__fail(err, STRL_ERR_FORMAT, "the checkpoint in %.300s has %zu bytes too many",
+                            context->scratch_dir, strl_cursor_left(cursor));
+    return status ? status : strl_spill_set_check(context->spills, report_check, context, err);
 }
 
 static strl_status read_all(strl_build_context *context, const char *path, strl_error *err)

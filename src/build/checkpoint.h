@@ -1,10 +1,10 @@
 /* Checkpoints: what lets a build that was stopped, at any moment, be resumed.
  *
- * A checkpoint is one small file in the scratch folder, written beside and renamed into place: which request it is of, the
- * counters of the result, the builder's own words on what is finished, and lengths and checksums of the streams that
- * hold it (store/spill.h). Nothing that the checkpoint in place needs is taken from the disk; what was written after it is
- * cut off again by the run that resumes. It outlives the process; after a loss of power the checksums tell whether
- * the disk had it all. */
+ * A checkpoint is one small file in the scratch folder, written beside and renamed into place: which request it is of,
+ * the counters of the result, the builder's own words on what is finished, and lengths and checksums of the streams
+ * that hold it (store/spill.h). Nothing that the checkpoint in place needs is taken from the disk; what was written
+ * after it is cut off again by the run that resumes. It outlives the process. It is on the disk before it has its name,
+ * but the streams may not be: after a loss of power their checksums tell. */
 #ifndef STRL_BUILD_CHECKPOINT_H
 #define STRL_BUILD_CHECKPOINT_H
 

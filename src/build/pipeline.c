@@ -119,16 +119,28 @@ static strl_status resume(strl_build_context *context, strl_scratch *scratch, st
     return status;
 }
 
-/* What was stopped and not refused tells how to go on. */
-static strl_status tell_kept(const strl_build_context *context, strl_status status, strl_error *err)
+/* Whether the same command may come further another time. What an earlier build has left and cannot be read is of no
+ * use. */
+static bool is_stopped(const strl_build_context *context, bool resumes, strl_status status)
 {
-    bool is_stopped = status == STRL_ERR_DISK_FULL || status == STRL_ERR_CANCELLED || status == STRL_ERR_MEMORY ||
-                      status == STRL_ERR_IO;
-    if (!err || !context->result->scratch_kept || !is_stopped)
+    return status == STRL_ERR_DISK_FULL || status == STRL_ERR_CANCELLED || status == STRL_ERR_MEMORY ||
+           (status == STRL_ERR_IO && (!resumes || context->result->resumed));
+}
+
+/* What failed and left its scratch tells how to go on. */
+static strl_status tell_way_on(const strl_build_context *context, bool resumes, strl_status status, strl_error *err)
+{
+    if (!err || !context->result->scratch_kept)
         return status;
     char sentence[sizeof err->message];
-    const char *first = status == STRL_ERR_DISK_FULL ? "make room, then the same command" : "the same command";
-    snprintf(sentence, sizeof sentence, "%.300s; what is finished is kept: %s with --resume goes on", err->message, first);
+    const char *way = ": leave --resume out to begin anew";
+    if (is_stopped(context, resumes, status))
+        way = status == STRL_ERR_DISK_FULL
+                  ? "; what is finished is kept: make room, then the same command with --resume goes on"
+                  : "; what is finished is kept: the same command with --resume goes on";
+    else if (status == STRL_ERR_ARGUMENT && !context->result->resumed)
+        way = ": give what the earlier build was given, or leave --resume out to begin anew";
+    snprintf(sentence, sizeof sentence, "%.380s%s", err->message, way);
     return strl__fail(err, status, "%s", sentence);
 }
 
@@ -158,14 +170,15 @@ static strl_status run(strl_build_context *context, const char *target, strl_err
     if (status)
         return status;
     context->scratch_dir = strl_scratch_path(scratch);
-    context->has_checkpoint = context->desc->resume && strl__checkpoint_exists(context->scratch_dir);
+    bool resumes = context->desc->resume && strl__checkpoint_exists(context->scratch_dir);
+    context->has_checkpoint = resumes;
     status = run_in_scratch(context, scratch, err);
-    context->result->scratch_kept = status && context->has_checkpoint;
+    context->result->scratch_kept = status && context->has_checkpoint && (resumes || is_stopped(context, resumes, status));
     if (context->result->scratch_kept)
         strl_scratch_leave(scratch);
     else
         strl_scratch_destroy(scratch);
-    return status ? tell_kept(context, status, err) : STRL_OK;
+    return status ? tell_way_on(context, resumes, status, err) : STRL_OK;
 }
 
 strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err)

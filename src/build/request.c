@@ -6,8 +6,6 @@
 #include "build/checkpoint.h"
 #include "platform/file.h"
 
-#define BEGIN_ANEW "give what the earlier build was given, or leave --resume out to begin anew"
-
 static void write_text(strl_writer *writer, const char *text)
 {
     size_t length = strlen(text);
@@ -38,19 +36,25 @@ strl_status strl__request_write(const strl_build_desc *desc, strl_writer *writer
 /* A saved text, not terminated. */
 typedef struct saved_text {
     const char *text; /* borrowed */
-    int length;
+    uint32_t length;
 } saved_text;
+
+/* How much of it is for a sentence. */
+static int shown(saved_text saved)
+{
+    return saved.length < 120 ? (int)saved.length : 120;
+}
 
 static saved_text read_text(strl_cursor *saved)
 {
     uint32_t length = strl_cursor_u32(saved);
     const uint8_t *text = strl_cursor_take(saved, length);
-    return text ? (saved_text){(const char *)text, (int)length} : (saved_text){"", 0};
+    return text ? (saved_text){(const char *)text, length} : (saved_text){"", 0};
 }
 
 static bool is_same(saved_text saved, const char *text)
 {
-    return strlen(text) == (size_t)saved.length && memcmp(saved.text, text, (size_t)saved.length) == 0;
+    return strlen(text) == saved.length && memcmp(saved.text, text, saved.length) == 0;
 }
 
 static const char *or_default(const char *text, const char *without)
@@ -67,17 +71,17 @@ static strl_status compare_options(const strl_build_desc *desc, strl_cursor *sav
     const char *unit_now = desc->unit ? desc->unit : "";
     bool no_dependencies = strl_cursor_u8(saved);
     if (!(grid == desc->grid))
-        return strl__fail(err, STRL_ERR_ARGUMENT, "--grid is %g, in the build to be resumed it was %g (0 = chosen): " BEGIN_ANEW,
+        return strl__fail(err, STRL_ERR_ARGUMENT, "--grid is %g, in the build to be resumed it was %g (0 = chosen)",
                           desc->grid, grid);
     if (up != up_now)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "--up is %s, in the build to be resumed it was %s: " BEGIN_ANEW,
-                          axes[up_now & 3], axes[up & 3]);
+        return strl__fail(err, STRL_ERR_ARGUMENT, "--up is %s, in the build to be resumed it was %s", axes[up_now & 3],
+                          axes[up & 3]);
     if (!is_same(unit, unit_now))
-        return strl__fail(err, STRL_ERR_ARGUMENT, "--unit is %s, in the build to be resumed it was %.*s: " BEGIN_ANEW,
-                          or_default(unit_now, "unknown"), unit.length ? unit.length : 7,
+        return strl__fail(err, STRL_ERR_ARGUMENT, "--unit is %s, in the build to be resumed it was %.*s",
+                          or_default(unit_now, "unknown"), unit.length ? shown(unit) : 7,
                           unit.length ? unit.text : "unknown");
     if (no_dependencies != desc->no_dependencies)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "--no-dependencies is %s, in the build to be resumed it was not: " BEGIN_ANEW,
+        return strl__fail(err, STRL_ERR_ARGUMENT, "--no-dependencies is %s, in the build to be resumed it was not",
                           desc->no_dependencies ? "given" : "left out");
     return STRL_OK;
 }
@@ -88,17 +92,17 @@ static strl_status compare_input(const char *path, strl_cursor *saved, strl_erro
     uint64_t bytes = strl_cursor_u64(saved), modified_ns = strl_cursor_u64(saved);
     strl_file_info info;
     if (!is_same(name, path))
-        return strl__fail(err, STRL_ERR_ARGUMENT, "an input is %.120s, in the build to be resumed it was %.*s: " BEGIN_ANEW,
-                          path, name.length < 120 ? name.length : 120, name.text);
+        return strl__fail(err, STRL_ERR_ARGUMENT, "an input is %.120s, in the build to be resumed it was %.*s", path,
+                          shown(name), name.text);
     strl_status status = strl_path_stat(path, &info, err);
     if (status)
         return status;
     if (info.bytes != bytes)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "%.200s has %" PRIu64 " bytes, when the build to be resumed began it had %" PRIu64
-                          ": leave --resume out to begin anew", path, info.bytes, bytes);
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "%.200s has %" PRIu64 " bytes, when the build to be resumed began it had %" PRIu64, path,
+                          info.bytes, bytes);
     if (info.modified_ns != modified_ns)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "%.200s was changed after the build to be resumed began: leave --resume out to "
-                          "begin anew", path);
+        return strl__fail(err, STRL_ERR_ARGUMENT, "%.200s was changed after the build to be resumed began", path);
     return STRL_OK;
 }
 
@@ -106,12 +110,12 @@ strl_status strl__request_compare(const strl_build_desc *desc, strl_cursor *save
 {
     saved_text version = read_text(saved);
     if (!is_same(version, STRL_VERSION))
-        return strl__fail(err, STRL_ERR_ARGUMENT, "this is version %s, the build to be resumed was made by version %.*s: leave "
-                          "--resume out to begin anew", STRL_VERSION, version.length < 40 ? version.length : 40, version.text);
+        return strl__fail(err, STRL_ERR_FORMAT, "this is version %s, the build to be resumed was made by version %.*s",
+                          STRL_VERSION, shown(version), version.text);
     strl_status status = compare_options(desc, saved, err);
     uint32_t count = strl_cursor_u32(saved);
     if (!status && count != desc->input_count)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "the inputs are %u, in the build to be resumed they were %u: " BEGIN_ANEW,
+        return strl__fail(err, STRL_ERR_ARGUMENT, "the inputs are %u, in the build to be resumed they were %u",
                           desc->input_count, count);
     for (uint32_t i = 0; i < count && !status; i++)
         status = compare_input(desc->inputs[i], saved, err);

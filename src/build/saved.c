@@ -61,6 +61,5 @@ void strl_saved_reader_deinit(strl_saved_reader *reader)
 
 strl_status strl_saved_fail(const char *what, strl_error *err)
 {
-    return strl__fail(err, STRL_ERR_FORMAT, "the stages that an earlier build has saved cannot be used (%s): leave --resume out to "
-                      "begin anew", what);
+    return strl__fail(err, STRL_ERR_FORMAT, "the stages that an earlier build has saved cannot be used (%s)", what);
 }

@@ -16,9 +16,9 @@ strl_status strl_saved_put(strl_saved_writer *writer, strl_error *err);
 strl_status strl_saved_finish(strl_saved_writer *writer, strl_status status, strl_error *err);
 
 typedef struct strl_saved_reader {
-    strl_spill *spill;  /* borrowed */
-    uint64_t at;        /* of the next byte to be read into the buffer */
-    uint8_t *buffer;    /* owned */
+    strl_spill *spill; /* borrowed */
+    uint64_t at;       /* of the next byte to be read into the buffer */
+    uint8_t *buffer;   /* owned */
     size_t capacity;
     strl_cursor cursor; /* over the buffer: fields come out of here */
 } strl_saved_reader;

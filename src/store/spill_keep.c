@@ -246,9 +246,11 @@ static strl_status compare_step(const strl_spill *spill, uint64_t step, const ui
     uint64_t found = strl__checksum(bytes, size);
     if (spill->dropped[step] >= STRL__SPILL_STEP || found == spill->sums[step])
         return STRL_OK;
-    return strl__fail(err, STRL_ERR_FORMAT, "the scratch file %.250s is damaged: expected the checksum %016" PRIx64
-                      " of bytes %" PRIu64 " to %" PRIu64 ", found %016" PRIx64, strl_file_path(spill->file),
-                      spill->sums[step], step * STRL__SPILL_STEP, step * STRL__SPILL_STEP + size - 1, found);
+    return strl__fail(err, STRL_ERR_FORMAT,
+                      "the scratch file %.250s is damaged: expected the checksum %016" PRIx64 " of bytes %" PRIu64
+                      " to %" PRIu64 ", found %016" PRIx64,
+                      strl_file_path(spill->file), spill->sums[step], step * STRL__SPILL_STEP,
+                      step * STRL__SPILL_STEP + size - 1, found);
 }
 
 static bool all_gone(const strl_spill *spill, uint64_t step, uint64_t count)

@@ -51,9 +51,16 @@ static bool say_no(void *context, const strl_build_progress *progress)
 static strl_status build(bool resume, unsigned jobs, stop *s, strl_build_result *result, strl_error *err)
 {
     const char *input = built_path("in.ply");
-    strl_build_desc desc = {.inputs = &input, .input_count = 1, .output = built_path("out.stroll"),
-                            .memory_bytes = STRL_BUILD_LEAST_MEMORY, .jobs = jobs, .keep = true, .keep_triangles = 1, .resume = resume,
-                            .progress = s ? say_no : NULL, .context = s};
+    strl_build_desc desc = {.inputs = &input,
+                            .input_count = 1,
+                            .output = built_path("out.stroll"),
+                            .memory_bytes = STRL_BUILD_LEAST_MEMORY,
+                            .jobs = jobs,
+                            .keep = true,
+                            .keep_triangles = 1,
+                            .resume = resume,
+                            .progress = s ? say_no : NULL,
+                            .context = s};
     *err = (strl_error){0};
     return strl_build_clusters(&desc, result, err);
 }
@@ -259,7 +266,8 @@ static void a_read_that_fails_while_resuming_loses_nothing(void **state)
 /* ---- scratch that lies ---- */
 static void reseal(saved_file *checkpoint)
 {
-    strl__store_le(checkpoint->bytes + 12, 8, strl__checksum(checkpoint->bytes + HEAD_BYTES, checkpoint->size - HEAD_BYTES));
+    strl__store_le(checkpoint->bytes + 12, 8,
+                   strl__checksum(checkpoint->bytes + HEAD_BYTES, checkpoint->size - HEAD_BYTES));
 }
 
 /* Gives the checkpoint the checksum that a changed step has now. */

@@ -400,7 +400,8 @@ static bool is_x(void *context, const char *name)
 static void what_is_left_for_a_later_run_is_found_again(void **state)
 {
     (void)state;
-    strl_scratch_desc desc = {.path = in_folder("parent/s.tmp"), .parent = in_folder("parent"), .names = names, .keep = true};
+    strl_scratch_desc desc = {
+        .path = in_folder("parent/s.tmp"), .parent = in_folder("parent"), .names = names, .keep = true};
     strl_scratch *scratch = NULL;
     unsigned asked = 0;
     assert_int_equal(strl_scratch_create(&desc, &scratch, NULL), STRL_OK);

@@ -397,7 +397,8 @@ static void damage_is_found_where_the_bytes_are_needed(void **state)
     const struct {
         long at;
         const char *says;
-    } places[] = {{100, NULL}, {16384, "bytes 16384 to 32767"}, {32767, "bytes 16384 to 32767"}, {51199, "bytes 49152 to 51199"}};
+    } places[] = {
+        {100, NULL}, {16384, "bytes 16384 to 32767"}, {32767, "bytes 16384 to 32767"}, {51199, "bytes 49152 to 51199"}};
     for (size_t i = 0; i < sizeof places / sizeof *places; i++) {
         change_byte("a" STRL_SPILL_SUFFIX, places[i].at);
         set = restore(&saved);

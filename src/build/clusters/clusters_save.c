@@ -49,7 +49,8 @@ static strl_status take_stream(strl_build_context *context, const char *name, st
     return strl_spill_take(context->spills, name, spill, err);
 }
 
-static strl_status open_level(strl_hierarchy *hierarchy, uint32_t index, bool with_meshes, open_fn open, strl_error *err)
+static strl_status open_level(strl_hierarchy *hierarchy, uint32_t index, bool with_meshes, open_fn open,
+                              strl_error *err)
 {
     strl_level *level = &hierarchy->levels[index];
     char name[32];
@@ -75,7 +76,8 @@ strl_status strl_level_open(strl_hierarchy *hierarchy, uint32_t index, strl_erro
 }
 
 /* Of the levels below, all nodes; of the one that was being made, those that were taken. */
-static strl_status restore_level(strl_hierarchy *hierarchy, const strl_position *position, uint32_t index, strl_error *err)
+static strl_status restore_level(strl_hierarchy *hierarchy, const strl_position *position, uint32_t index,
+                                 strl_error *err)
 {
     strl_level *level = &hierarchy->levels[index];
     bool is_last = index == position->level, was_last = index + 1 == position->level;
@@ -92,7 +94,8 @@ static strl_status restore_level(strl_hierarchy *hierarchy, const strl_position 
     return status || is_last || count == level->count ? status : strl_saved_fail("the nodes of a level", err);
 }
 
-static strl_status read_position(strl_hierarchy *hierarchy, strl_cursor *words, strl_position *position, strl_error *err)
+static strl_status read_position(strl_hierarchy *hierarchy, strl_cursor *words, strl_position *position,
+                                 strl_error *err)
 {
     uint32_t finished = strl_cursor_u32(words);
     position->level = strl_cursor_u32(words);

@@ -105,14 +105,15 @@ strl_status strl_clusters_save(strl_hierarchy *hierarchy, const strl_position *p
 strl_status strl_clusters_note(strl_hierarchy *hierarchy, uint32_t level, uint32_t done, strl_error *err);
 /* Opens the streams of a level. */
 strl_status strl_level_open(strl_hierarchy *hierarchy, uint32_t index, strl_error *err);
-/* What an earlier build has finished: ingest, partition (with STRL_STAGE_PARTITION, levels too) and where to go on. *graph: a stream that
- * is to be deleted when the partition is made. */
+/* What an earlier build has finished: ingest, partition (with STRL_STAGE_PARTITION, levels too) and where to go on.
+ * *graph: a stream that is to be deleted when the partition is made. */
 strl_status strl_clusters_restore(strl_hierarchy *hierarchy, strl_ingest *ingest, strl_partition *partition,
                                   strl_position *position, strl_spill **graph, strl_error *err);
 
 /* Appends a node that was taken to its level's states. */
 strl_status strl_node_state_save(strl_level *level, uint32_t self, const strl_made_node *made, strl_error *err);
-/* Reads all states of a level: its nodes, and to `next` (may be NULL) the neighbours that they counted. *count: how many. */
+/* Reads all states of a level: its nodes, and to `next` (may be NULL) the neighbours that they counted. *count: how
+ * many. */
 strl_status strl_node_states_restore(strl_level *level, uint32_t groups, strl_adjacency *next, uint32_t *count,
                                      strl_error *err);
 

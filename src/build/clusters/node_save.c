@@ -16,11 +16,11 @@ static void write_record(const strl_node *record, strl_writer *writer)
 {
     const int64_t *const points[] = {record->anchor, record->box_min, record->box_max, record->group_box_min,
                                      record->group_box_max};
-    const float errors[] = {record->geometric_min, record->geometric_max, record->appearance_min,
+    const float errors[] = {record->geometric_min,  record->geometric_max,   record->appearance_min,
                             record->appearance_max, record->group_geometric, record->group_appearance};
-    const uint32_t counts[] = {record->group_size, record->vertex_count, record->base_vertex_count,
+    const uint32_t counts[] = {record->group_size,     record->vertex_count,        record->base_vertex_count,
                                record->triangle_count, record->base_triangle_count, record->step_count,
-                               record->boundary_steps, record->shared_vertices, record->rung};
+                               record->boundary_steps, record->shared_vertices,     record->rung};
     for (int i = 0; i < 5; i++)
         for (int k = 0; k < 3; k++)
             strl_writer_i64(writer, points[i][k]);
@@ -60,11 +60,11 @@ static bool read_record(strl_cursor *cursor, strl_node *record)
 {
     int64_t *const points[] = {record->anchor, record->box_min, record->box_max, record->group_box_min,
                                record->group_box_max};
-    float *const errors[] = {&record->geometric_min, &record->geometric_max, &record->appearance_min,
+    float *const errors[] = {&record->geometric_min,  &record->geometric_max,   &record->appearance_min,
                              &record->appearance_max, &record->group_geometric, &record->group_appearance};
-    uint32_t *const counts[] = {&record->group_size, &record->vertex_count, &record->base_vertex_count,
+    uint32_t *const counts[] = {&record->group_size,     &record->vertex_count,        &record->base_vertex_count,
                                 &record->triangle_count, &record->base_triangle_count, &record->step_count,
-                                &record->boundary_steps, &record->shared_vertices, &record->rung};
+                                &record->boundary_steps, &record->shared_vertices,     &record->rung};
     bool good = true;
     for (int i = 0; i < 5; i++)
         for (int k = 0; k < 3; k++) {

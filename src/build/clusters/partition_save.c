@@ -6,8 +6,6 @@
 #include "build/clusters/partition.h"
 #include "build/saved.h"
 
-#define MOST_DEPTH 26u
-
 static strl_status write_words(strl_saved_writer *saved, const uint32_t *words, size_t count, strl_error *err)
 {
     strl_status status = STRL_OK;
@@ -42,32 +40,40 @@ static strl_status read_words(strl_saved_reader *saved, uint32_t *words, size_t 
     return status;
 }
 
-/* Fills cluster[]; every cell must be in one cluster. */
-static bool name_clusters(strl_partition *partition, uint32_t cells)
+/* Fills cluster[]; every cell must be in one cluster, and a cluster must fit a node. */
+static bool name_clusters(const strl_ingest *ingest, strl_partition *partition)
 {
-    uint32_t clusters = 1u << partition->depth;
+    uint32_t clusters = 1u << partition->depth, cells = ingest->cell_count;
     if (partition->cluster_first[0] != 0 || partition->cluster_first[clusters] != cells)
         return false;
     for (uint32_t i = 0; i < clusters; i++)
         if (partition->cluster_first[i] > partition->cluster_first[i + 1])
             return false;
     memset(partition->cluster, 0xff, cells * sizeof *partition->cluster);
-    for (uint32_t i = 0; i < clusters; i++)
+    for (uint32_t i = 0; i < clusters; i++) {
+        uint64_t triangles = 0;
         for (uint32_t c = partition->cluster_first[i]; c < partition->cluster_first[i + 1]; c++) {
             uint32_t cell = partition->cell[c];
             if (cell >= cells || partition->cluster[cell] != UINT32_MAX)
                 return false;
             partition->cluster[cell] = i;
+            triangles += ingest->cells[cell].count;
         }
+        if (triangles == 0 || triangles > STRL_PM_MAX_TRIANGLES)
+            return false;
+    }
     return true;
 }
 
-static strl_status read_partition(strl_saved_reader *saved, uint32_t cells, strl_partition *partition, strl_error *err)
+static strl_status read_partition(strl_saved_reader *saved, const strl_ingest *ingest, strl_partition *partition,
+                                  strl_error *err)
 {
+    uint32_t cells = ingest->cell_count;
     strl_status status = strl_saved_get(saved, 4, err);
     partition->depth = status ? 0 : strl_cursor_u32(&saved->cursor);
-    uint64_t firsts = partition->depth <= MOST_DEPTH ? (UINT64_C(1) << partition->depth) + 1 : 0;
-    if (!status && (!firsts || strl_saved_left(saved) != (firsts + cells) * 4))
+    bool fits = partition->depth == strl_partition_depth(ingest);
+    uint64_t firsts = fits ? (UINT64_C(1) << partition->depth) + 1 : 0;
+    if (!status && (!fits || strl_saved_left(saved) != (firsts + cells) * 4))
         status = strl_saved_fail("the number of clusters", err);
     if (status)
         return status;
@@ -79,7 +85,7 @@ static strl_status read_partition(strl_saved_reader *saved, uint32_t cells, strl
     status = read_words(saved, partition->cluster_first, (size_t)firsts, err);
     if (!status)
         status = read_words(saved, partition->cell, cells, err);
-    return status || name_clusters(partition, cells) ? status : strl_saved_fail("the cells of the clusters", err);
+    return status || name_clusters(ingest, partition) ? status : strl_saved_fail("the cells of the clusters", err);
 }
 
 strl_status strl_partition_restore(strl_build_context *context, const strl_ingest *ingest, strl_partition *partition,
@@ -89,7 +95,7 @@ strl_status strl_partition_restore(strl_build_context *context, const strl_inges
     *partition = (strl_partition){0};
     strl_status status = strl_spill_take(context->spills, "partition", &saved.spill, err);
     if (!status)
-        status = read_partition(&saved, ingest->cell_count, partition, err);
+        status = read_partition(&saved, ingest, partition, err);
     strl_saved_reader_deinit(&saved);
     return status;
 }

@@ -81,7 +81,8 @@ static strl_status write_edges(const strl_ingest *ingest, strl_saved_writer *sav
     return status;
 }
 
-strl_status strl_ingest_save(strl_build_context *context, const strl_ingest *ingest, strl_spill **graph, strl_error *err)
+strl_status strl_ingest_save(strl_build_context *context, const strl_ingest *ingest, strl_spill **graph,
+                             strl_error *err)
 {
     strl_saved_writer saved = {0};
     *graph = NULL;
@@ -186,7 +187,8 @@ static strl_status read_name(strl_saved_reader *saved, strl_names *names, bool i
     return strlen(copy) == length ? STRL_OK : strl_saved_fail("a name", err);
 }
 
-static strl_status read_names(strl_saved_reader *saved, strl_ingest *ingest, uint64_t parts, uint64_t materials, strl_error *err)
+static strl_status read_names(strl_saved_reader *saved, strl_ingest *ingest, uint64_t parts, uint64_t materials,
+                              strl_error *err)
 {
     strl_status status = STRL_OK;
     for (uint64_t i = 0; i < parts && !status; i++)
@@ -222,6 +224,8 @@ static strl_status read_edges(strl_saved_reader *saved, strl_ingest *ingest, str
 {
     uint64_t count = strl_saved_left(saved) / EDGE_BYTES;
     strl_status status = STRL_OK;
+    if (strl_saved_left(saved) % EDGE_BYTES || count > INT32_MAX / 2) /* METIS counts both directions */
+        return strl_saved_fail("the graph of the cells", err);
     ingest->edges = strl__alloc((size_t)count, sizeof *ingest->edges);
     if (!ingest->edges)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for the graph of %u cells", ingest->cell_count);
@@ -233,7 +237,7 @@ static strl_status read_edges(strl_saved_reader *saved, strl_ingest *ingest, str
         edge->a = strl_cursor_u32(&saved->cursor);
         edge->b = strl_cursor_u32(&saved->cursor);
         edge->weight = strl_cursor_u32(&saved->cursor);
-        if (edge->a >= edge->b || edge->b >= ingest->cell_count)
+        if (edge->a >= edge->b || edge->b >= ingest->cell_count || !edge->weight || edge->weight > INT32_MAX)
             status = strl_saved_fail("the graph of the cells", err);
     }
     return status;
@@ -244,7 +248,8 @@ static strl_status take_soup(strl_build_context *context, strl_ingest *ingest, s
     strl_status status = strl_spill_take(context->spills, "soup", &ingest->soup, err);
     if (!status)
         status = strl_spill_take(context->spills, "shared", &ingest->shared, err);
-    if (!status && strl_spill_bytes(ingest->soup) != ingest->triangle_count * strl_soup_bytes(ingest))
+    uint64_t bytes = status ? 0 : strl_spill_bytes(ingest->soup), each = strl_soup_bytes(ingest);
+    if (!status && (bytes % each != 0 || bytes / each != ingest->triangle_count))
         status = strl_saved_fail("the number of triangles", err);
     return status;
 }
