@@ -5,6 +5,7 @@
 #include "base/fail.h"
 #include "geometry/simplify_plan.h"
 
+#define HEAP_WAYS 4u     /* children of a candidate: of 8 bytes each, half a cache line */
 #define ESTIMATE_SHARE 0.5f /* of what is likely: too little costs time, too much spoils the order */
 #define FREE_DIVISOR 8   /* collapses that add no error go on below the target, down to this part of it */
 #define LADDER_RATIO 4.f /* the first rung gives up where its next collapse costs so many times its middle one */
@@ -12,59 +13,36 @@
 #define LARGE_SHARE 0.01 /* of a piece's diagonal: errors above are out of proportion where not even half of what is wanted is done */
 #define LEAST_ERROR 1.f  /* lattice units: below, all errors count as equal */
 
-static void heap_place(simplifier *s, uint32_t at, candidate c)
-{
-    s->heap[at] = c;
-    s->sites[c.point].heap_at = at;
-}
-
 /* Ties are broken by index, so that the order does not depend on the heap's history. */
 static bool before(candidate a, candidate b)
 {
     return a.key < b.key || (a.key == b.key && a.point < b.point);
 }
 
-static void heap_up(simplifier *s, uint32_t at)
-{
-    candidate c = s->heap[at];
-    while (at > 0 && before(c, s->heap[(at - 1) / 2])) {
-        heap_place(s, at, s->heap[(at - 1) / 2]);
-        at = (at - 1) / 2;
-    }
-    heap_place(s, at, c);
-}
-
-static void heap_down(simplifier *s, uint32_t at)
-{
-    candidate c = s->heap[at];
-    for (;;) {
-        uint32_t child = 2 * at + 1;
-        if (child >= s->heap_count)
-            break;
-        if (child + 1 < s->heap_count && before(s->heap[child + 1], s->heap[child]))
-            child++;
-        if (!before(s->heap[child], c))
-            break;
-        heap_place(s, at, s->heap[child]);
-        at = child;
-    }
-    heap_place(s, at, c);
-}
-
 static void heap_push(simplifier *s, uint32_t point, float key)
 {
-    s->heap[s->heap_count] = (candidate){key, point};
-    heap_up(s, s->heap_count++);
+    candidate c = {key, point}, *heap = s->heap;
+    uint32_t at = s->heap_count++;
+    s->sites[point].in_heap = true;
+    for (uint32_t parent; at > 0 && before(c, heap[parent = (at - 1) / HEAP_WAYS]); at = parent)
+        heap[at] = heap[parent];
+    heap[at] = c;
 }
 
 static candidate heap_pop(simplifier *s)
 {
-    candidate first = s->heap[0];
-    s->sites[first.point].heap_at = NO_INDEX;
-    if (--s->heap_count > 0) {
-        heap_place(s, 0, s->heap[s->heap_count]);
-        heap_down(s, 0);
+    candidate *heap = s->heap, first = heap[0], c = heap[--s->heap_count];
+    uint32_t at = 0, count = s->heap_count;
+    s->sites[first.point].in_heap = false;
+    for (uint32_t child; (child = HEAP_WAYS * at + 1) < count; at = child) {
+        uint32_t end = child + HEAP_WAYS < count ? child + HEAP_WAYS : count;
+        for (uint32_t other = child + 1; other < end; other++)
+            child = before(heap[other], heap[child]) ? other : child;
+        if (!before(heap[child], c))
+            break;
+        heap[at] = heap[child];
     }
+    heap[at] = c;
     return first;
 }
 
@@ -124,8 +102,8 @@ static void mark_stale(simplifier *s, uint32_t point, float key)
     site *p = &s->sites[point];
     if (p->flags & STRL_POINT_KEPT)
         return;
-    p->stale = true;
-    if (p->heap_at == NO_INDEX)
+    p->state = STATE_STALE;
+    if (!p->in_heap)
         heap_push(s, point, key);
 }
 
@@ -158,9 +136,9 @@ static void push_all(simplifier *s)
 {
     for (uint32_t p = 0; p < s->mesh->point_count; p++) {
         site *own = &s->sites[p];
-        if ((own->flags & STRL_POINT_KEPT) || own->head == NO_INDEX || own->heap_at != NO_INDEX)
+        if ((own->flags & STRL_POINT_KEPT) || own->head == NO_INDEX || own->in_heap)
             continue;
-        own->stale = true;
+        own->state = STATE_ESTIMATED;
         heap_push(s, p, estimate_key(s, p));
     }
 }
@@ -201,7 +179,7 @@ static double diagonal_of(const strl_mesh *mesh)
 static bool plan_again(simplifier *s, uint32_t point)
 {
     collapse_plan *plan = &s->plan[point];
-    s->sites[point].stale = false;
+    s->sites[point].state = STATE_PLANNED;
     if (!strl__plan_best(s, point, plan))
         return false;
     candidate planned = {plan->key, point};
@@ -227,13 +205,16 @@ static bool recall_plan(simplifier *s, uint32_t point)
 static uint32_t next_point(simplifier *s)
 {
     uint32_t point = heap_pop(s).point;
-    if (!s->sites[point].stale && recall_plan(s, point))
+    site *own = &s->sites[point];
+    if (own->state == STATE_PLANNED && recall_plan(s, point))
         return point;
-    candidate estimated = {estimate_key(s, point), point};
-    if (s->heap_count > 0 && before(s->heap[0], estimated)) { /* others are likely to be better: no plan yet */
-        s->sites[point].stale = true;
-        heap_push(s, point, estimated.key);
-        return NO_INDEX;
+    if (own->state != STATE_ESTIMATED) {
+        candidate estimated = {estimate_key(s, point), point};
+        if (s->heap_count > 0 && before(s->heap[0], estimated)) { /* others are likely to be better: no plan yet */
+            own->state = STATE_ESTIMATED;
+            heap_push(s, point, estimated.key);
+            return NO_INDEX;
+        }
     }
     return plan_again(s, point) ? point : NO_INDEX;
 }
@@ -272,7 +253,7 @@ static float run_rung(simplifier *s, float limit, bool adaptive, strl_simplified
             mark_stale(s, s->star.neighbour[i], key);
     }
     while (s->heap_count)
-        s->sites[s->heap[--s->heap_count].point].heap_at = NO_INDEX;
+        s->sites[s->heap[--s->heap_count].point].in_heap = false;
     return reached;
 }
 

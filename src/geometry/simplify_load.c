@@ -133,7 +133,7 @@ static void load_points(simplifier *s)
 {
     const strl_mesh *mesh = s->mesh;
     for (uint32_t p = 0; p < mesh->point_count; p++) {
-        s->sites[p] = (site){.head = NO_INDEX, .tail = NO_INDEX, .heap_at = NO_INDEX, .only_wedge = NO_INDEX,
+        s->sites[p] = (site){.head = NO_INDEX, .tail = NO_INDEX, .only_wedge = NO_INDEX,
                              .flags = mesh->flags[p], .holders = mesh->holders ? mesh->holders[p] : 0};
         for (unsigned k = 0; k < 3; k++)
             s->sites[p].position[k] = mesh->position[p][k];
