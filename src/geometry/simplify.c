@@ -1,11 +1,11 @@
 #include "geometry/simplify.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "base/fail.h"
 #include "geometry/simplify_plan.h"
 
-#define HEAP_WAYS 4u     /* children of a candidate: of 8 bytes each, half a cache line */
 #define ESTIMATE_SHARE 0.5f /* of what is likely: too little costs time, too much spoils the order */
 #define FREE_DIVISOR 8   /* collapses that add no error go on below the target, down to this part of it */
 #define LADDER_RATIO 4.f /* the first rung gives up where its next collapse costs so many times its middle one */
@@ -13,36 +13,52 @@
 #define LARGE_SHARE 0.01 /* of a piece's diagonal: errors above are out of proportion where not even half of what is wanted is done */
 #define LEAST_ERROR 1.f  /* lattice units: below, all errors count as equal */
 
-/* Ties are broken by index, so that the order does not depend on the heap's history. */
-static bool before(candidate a, candidate b)
+static candidate candidate_of(uint32_t point, float key)
 {
-    return a.key < b.key || (a.key == b.key && a.point < b.point);
+    uint32_t bits;
+    key = key > 0 ? key : 0; /* not -0 */
+    memcpy(&bits, &key, sizeof bits);
+    return (candidate)bits << 32 | point;
+}
+
+static float key_of(candidate c)
+{
+    uint32_t bits = (uint32_t)(c >> 32);
+    float key;
+    memcpy(&key, &bits, sizeof key);
+    return key;
 }
 
 static void heap_push(simplifier *s, uint32_t point, float key)
 {
-    candidate c = {key, point}, *heap = s->heap;
+    candidate c = candidate_of(point, key), *heap = s->heap;
     uint32_t at = s->heap_count++;
     s->sites[point].in_heap = true;
-    for (uint32_t parent; at > 0 && before(c, heap[parent = (at - 1) / HEAP_WAYS]); at = parent)
+    for (uint32_t parent; at > 0 && c < heap[parent = (at - 1) / HEAP_WAYS]; at = parent)
         heap[at] = heap[parent];
     heap[at] = c;
 }
 
-static candidate heap_pop(simplifier *s)
+static uint32_t heap_pop(simplifier *s)
 {
-    candidate *heap = s->heap, first = heap[0], c = heap[--s->heap_count];
-    uint32_t at = 0, count = s->heap_count;
-    s->sites[first.point].in_heap = false;
-    for (uint32_t child; (child = HEAP_WAYS * at + 1) < count; at = child) {
-        uint32_t end = child + HEAP_WAYS < count ? child + HEAP_WAYS : count;
-        for (uint32_t other = child + 1; other < end; other++)
-            child = before(heap[other], heap[child]) ? other : child;
-        if (!before(heap[child], c))
+    candidate *heap = s->heap, c = heap[--s->heap_count];
+    uint32_t at = 0, first = (uint32_t)heap[0];
+    s->sites[first].in_heap = false;
+    heap[s->heap_count] = NO_CANDIDATE;
+    for (uint32_t child; (child = HEAP_WAYS * at + 1) < s->heap_count;) {
+        candidate least = heap[child];
+        uint32_t best = child;
+        for (uint32_t other = child + 1; other < child + HEAP_WAYS; other++) {
+            best = heap[other] < least ? other : best;
+            least = heap[other] < least ? heap[other] : least;
+        }
+        if (c < least)
             break;
-        heap[at] = heap[child];
+        heap[at] = least;
+        at = best;
     }
-    heap[at] = c;
+    if (s->heap_count)
+        heap[at] = c;
     return first;
 }
 
@@ -182,8 +198,7 @@ static bool plan_again(simplifier *s, uint32_t point)
     s->sites[point].state = STATE_PLANNED;
     if (!strl__plan_best(s, point, plan))
         return false;
-    candidate planned = {plan->key, point};
-    if (s->heap_count == 0 || before(planned, s->heap[0]))
+    if (candidate_of(point, plan->key) < s->heap[0])
         return true;
     heap_push(s, point, plan->key);
     return false;
@@ -204,15 +219,15 @@ static bool recall_plan(simplifier *s, uint32_t point)
 /* Takes the best candidate and makes sure that its plan holds; NO_INDEX where it had to be put back. */
 static uint32_t next_point(simplifier *s)
 {
-    uint32_t point = heap_pop(s).point;
+    uint32_t point = heap_pop(s);
     site *own = &s->sites[point];
     if (own->state == STATE_PLANNED && recall_plan(s, point))
         return point;
     if (own->state != STATE_ESTIMATED) {
-        candidate estimated = {estimate_key(s, point), point};
-        if (s->heap_count > 0 && before(s->heap[0], estimated)) { /* others are likely to be better: no plan yet */
+        float estimate = estimate_key(s, point);
+        if (s->heap[0] < candidate_of(point, estimate)) { /* others are likely to be better: no plan yet */
             own->state = STATE_ESTIMATED;
-            heap_push(s, point, estimated.key);
+            heap_push(s, point, estimate);
             return NO_INDEX;
         }
     }
@@ -235,7 +250,7 @@ static float run_rung(simplifier *s, float limit, bool adaptive, strl_simplified
     uint32_t half = all - (all > target ? all - target : 0) / 2;
     float reached = 0;
     push_all(s);
-    while (s->heap_count && s->heap[0].key <= limit && wants_more(s, s->heap[0].key)) {
+    while (s->heap_count && key_of(s->heap[0]) <= limit && wants_more(s, key_of(s->heap[0]))) {
         uint32_t point = next_point(s);
         if (point == NO_INDEX)
             continue;
@@ -252,8 +267,11 @@ static float run_rung(simplifier *s, float limit, bool adaptive, strl_simplified
         for (uint32_t i = 0; i < s->star.neighbour_count; i++)
             mark_stale(s, s->star.neighbour[i], key);
     }
-    while (s->heap_count)
-        s->sites[s->heap[--s->heap_count].point].in_heap = false;
+    while (s->heap_count) {
+        candidate *last = &s->heap[--s->heap_count];
+        s->sites[(uint32_t)*last].in_heap = false;
+        *last = NO_CANDIDATE;
+    }
     return reached;
 }
 

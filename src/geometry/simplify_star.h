@@ -132,10 +132,10 @@ typedef struct collapse_effect {
     float spoke_reach;       /* how far from v a point of the patch can be */
 } collapse_effect;
 
-typedef struct candidate {
-    float key;
-    uint32_t point;
-} candidate;
+/* A point below the bits of its key: keys are not negative, so their bits are ordered as they are, and ties go by point. */
+typedef uint64_t candidate;
+#define NO_CANDIDATE UINT64_MAX
+#define HEAP_WAYS 4u /* children of a candidate: half a cache line */
 
 typedef struct simplifier {
     const strl_mesh *mesh;
@@ -155,8 +155,7 @@ typedef struct simplifier {
     double diagonal;        /* of the points' box */
     float free_key;         /* the largest key that was claimed before anything collapsed */
     strl_simplify_rung rung;
-    /* candidates: a binary heap of points by key */
-    candidate *heap;
+    candidate *heap;        /* the least first; NO_CANDIDATE after the last */
     uint32_t heap_count;
     collapse_plan *plan;    /* per point: the best collapse, valid where not stale */
     /* the star that was planned last, with the effect of its plan: most plans are carried out at once */
