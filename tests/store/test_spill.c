@@ -14,29 +14,15 @@
 #include "jobs/pool.h"
 #include "platform/file.h"
 #include "store/spill.h"
+#include "support/folder.h"
 
 #define KIB ((size_t)1 << 10)
-
-static char folder[64];
-
-static int set_up(void **state)
-{
-    (void)state;
-    snprintf(folder, sizeof folder, "/tmp/strl-spill-XXXXXX");
-    return mkdtemp(folder) ? 0 : -1;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    return strl_path_remove_directory(folder, NULL) == STRL_OK ? 0 : -1;
-}
 
 static strl_spill_set *make_set(uint64_t limit_bytes)
 {
     strl_spill_set *set = NULL;
     strl_error err = {0};
-    if (strl_spill_set_create(folder, limit_bytes, &set, &err) != STRL_OK)
+    if (strl_spill_set_create(strl_test_folder, limit_bytes, &set, &err) != STRL_OK)
         fail_msg("%s", err.message);
     return set;
 }
@@ -54,7 +40,7 @@ static bool on_disk(const char *name)
 {
     char file[64];
     snprintf(file, sizeof file, "%s" STRL_SPILL_SUFFIX, name);
-    char *path = strl_path_join(folder, file);
+    char *path = strl_path_join(strl_test_folder, file);
     bool exists = strl_path_exists(path);
     strl__free(path);
     return exists;
@@ -149,7 +135,7 @@ static void the_set_counts_what_is_on_disk_now_and_at_most(void **state)
     assert_int_equal(strl_spill_close_and_delete(a, NULL), STRL_OK);
     assert_int_equal(strl_spill_set_bytes(set), 256 * KIB);
     assert_int_equal(strl_spill_set_peak_bytes(set), 512 * KIB);
-    char *path = strl_path_join(folder, "b" STRL_SPILL_SUFFIX);
+    char *path = strl_path_join(strl_test_folder, "b" STRL_SPILL_SUFFIX);
     struct stat facts;
     strl_spill_drop(b, 90 * KIB, 40 * KIB); /* 96 to 128 KiB are whole steps of it */
     strl_spill_drop(b, 1 * KIB, 89 * KIB);  /* all but the first */
@@ -186,7 +172,7 @@ static void the_limit_holds_over_all_streams_and_frees_with_them(void **state)
     assert_int_equal(append_pattern(a, 1, 6000, NULL), STRL_OK);
     assert_int_equal(append_pattern(b, 2, 4001, &err), STRL_ERR_LIMIT);
     assert_non_null(strstr(err.message, "holds 6000 bytes, 4001 more would pass its limit of 10000"));
-    assert_non_null(strstr(err.message, folder));
+    assert_non_null(strstr(err.message, strl_test_folder));
     assert_int_equal(strl_spill_bytes(b), 0);
     assert_int_equal(append_pattern(b, 2, 4000, NULL), STRL_OK);
     assert_int_equal(strl_spill_close_and_delete(a, NULL), STRL_OK);
@@ -210,7 +196,7 @@ static void a_full_disk_loses_nothing_and_the_stream_goes_on(void **state)
     strl_file_fail_writes_after(0);
     assert_int_equal(appended, STRL_ERR_DISK_FULL);
     assert_int_equal(flushed, STRL_ERR_DISK_FULL);
-    assert_non_null(strstr(err.message, folder));
+    assert_non_null(strstr(err.message, strl_test_folder));
     assert_int_equal(strl_spill_bytes(spill), 900);
     assert_int_equal(strl_spill_set_bytes(set), 0);
     assert_int_equal(strl_spill_set_peak_bytes(set), 0);
@@ -290,7 +276,7 @@ static strl_status check(strl_spill_set *set, strl_error *err)
 
 static void change_byte(const char *file, long at)
 {
-    char *path = strl_path_join(folder, file);
+    char *path = strl_path_join(strl_test_folder, file);
     FILE *stream = fopen(path, "r+b");
     assert_non_null(stream);
     fseek(stream, at, SEEK_SET);
@@ -407,7 +393,7 @@ static void damage_is_found_where_the_bytes_are_needed(void **state)
         strl_spill_set_destroy(set);
         change_byte("a" STRL_SPILL_SUFFIX, places[i].at);
     }
-    char *path = strl_path_join(folder, "a" STRL_SPILL_SUFFIX);
+    char *path = strl_path_join(strl_test_folder, "a" STRL_SPILL_SUFFIX);
     assert_int_equal(truncate(path, 51199), 0);
     set = make_set(0);
     strl_cursor cursor = strl_cursor_make(saved.data, saved.size);
@@ -483,7 +469,7 @@ static strl_status use_everything(strl_error *err)
 {
     strl_spill_set *set = NULL;
     strl_spill *spill = NULL;
-    strl_status status = strl_spill_set_create(folder, 1 << 20, &set, err);
+    strl_status status = strl_spill_set_create(strl_test_folder, 1 << 20, &set, err);
     if (status == STRL_OK)
         status = strl_spill_open(set, "fault", 1000, &spill, err);
     for (unsigned i = 0; status == STRL_OK && i < 20; i++)
@@ -540,5 +526,5 @@ int main(void)
         cmocka_unit_test(streams_of_several_threads_share_one_count),
         cmocka_unit_test(every_injected_failure_is_reported),
     };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    return cmocka_run_group_tests(tests, strl_test_folder_make, strl_test_folder_remove);
 }
