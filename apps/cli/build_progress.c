@@ -60,7 +60,10 @@ void strl_cli_build_progress_format(char *text, unsigned size, const strl_build_
     format_bytes(used, resident_bytes);
     format_bytes(budget, now->memory_bytes);
     format_bytes(scratch, now->scratch_bytes);
-    snprintf(stage, sizeof stage, "%u/%u %-10.40s ", now->stage_index, now->stage_count, now->stage);
+    if (now->stage_index)
+        snprintf(stage, sizeof stage, "%u/%u %-10.40s ", now->stage_index, now->stage_count, now->stage);
+    else
+        snprintf(stage, sizeof stage, "%.40s ", now->stage); /* before a resumed build goes on */
     if (now->triangles_per_s > 0) {
         strl_cli_format_amount(amount, now->triangles_per_s);
         snprintf(rate, sizeof rate, "  %s triangles/s", amount);

@@ -13,7 +13,7 @@
 
 typedef struct strl_build_progress {
     const char *stage;   /* "read", "sort", "level 3", ...; static */
-    uint32_t stage_index, stage_count; /* from 1; all levels are one stage */
+    uint32_t stage_index, stage_count; /* from 1; all levels are one stage; index 0 = a resumed build checks what it has */
     uint64_t done, total; /* items of the stage; total 0 = unknown */
     uint64_t triangles_in; /* as announced by the inputs, until they have been read once */
     double share;          /* of the whole build, 0 to 1 */
@@ -43,6 +43,11 @@ typedef struct strl_build_desc {
                                is less than about a 2^30th of the extent */
     int up_axis;            /* 1 x, 2 y, 3 z; 0 = the inputs' own */
     const char *unit;       /* NULL = unknown */
+    /* A build that is stopped leaves its scratch folder, with the stages that are finished, for a later one that resumes.
+     * Not set: nothing is left. */
+    bool keep;
+    uint64_t keep_triangles; /* of models of fewer nothing is kept: they are built at once; 0 = 65,536 */
+    bool resume; /* goes on with what an earlier build of the same request has left, if anything; keeps, too */
     bool no_dependencies;   /* for measuring what dependencies bring: every group has one member */
     /* Called on the caller's thread, often; false cancels. May be NULL. */
     bool (*progress)(void *context, const strl_build_progress *progress);
@@ -64,9 +69,12 @@ typedef struct strl_build_result {
     uint64_t placements;
     double seconds, cpu_seconds;
     uint64_t peak_rss_bytes;
+    bool resumed;      /* an earlier build's stages were used; seconds and cpu_seconds are of this run alone */
+    bool scratch_kept; /* of a failed build: there is something to resume */
 } strl_build_result;
 
-/* Writes desc->output, which appears only when whole. On failure nothing is left of it, and an older file of that name stays. */
+/* Writes desc->output, which appears only when whole. On failure nothing is left of it but what desc->keep asks for, and
+ * an older file of that name stays. The bytes are the same whether the build was stopped and resumed, however often, or not. */
 strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err);
 
 #endif

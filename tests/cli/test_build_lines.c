@@ -51,6 +51,16 @@ static void what_is_not_known_is_left_out(void **state)
     assert_string_equal(text, "1/7 survey       0 %  mem 9M/1.5G  scratch 0K");
 }
 
+static void what_is_checked_before_resuming_is_no_stage(void **state)
+{
+    (void)state;
+    char text[256];
+    const strl_build_progress check = {
+        .stage = "check what was finished", .stage_count = 7, .memory_bytes = 1ull << 30, .scratch_bytes = 4096};
+    strl_cli_build_progress_format(text, sizeof text, &check, 9ull << 20, 60);
+    assert_string_equal(text, "check what was finished   0 %  mem 9M/1G  scratch 4K");
+}
+
 static void the_estimate_warns_of_a_small_disk(void **state)
 {
     (void)state;
@@ -113,6 +123,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_line_says_all_that_one_wants_to_know),
         cmocka_unit_test(what_is_not_known_is_left_out),
+        cmocka_unit_test(what_is_checked_before_resuming_is_no_stage),
         cmocka_unit_test(the_estimate_warns_of_a_small_disk),
         cmocka_unit_test(a_log_gets_a_line_a_minute),
     };

@@ -8,6 +8,8 @@
 #include "platform/file.h"
 
 #define LEAST_READER_BYTES (8u << 20)
+/* Of a few nodes a level, what is used up and waits for a checkpoint is a large share of all. */
+#define KEEP_TRIANGLES 65536u
 
 static strl_status open_readers(strl_build_context *context, strl_reader **readers, strl_ingest *ingest, strl_error *err)
 {
@@ -99,6 +101,7 @@ strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, st
     context->result->triangles_in = survey.triangles;
     note_drops(context, readers);
     strl__build_expect(context, survey.triangles);
+    context->keep &= survey.triangles >= (context->desc->keep_triangles ? context->desc->keep_triangles : KEEP_TRIANGLES);
     status = survey.triangles ? check_disk(context, survey.triangles, err)
                               : strl__ingest_refuse_empty(context, readers, err);
     if (status)
@@ -151,8 +154,8 @@ static void names_deinit(strl_names *names)
 
 void strl_ingest_deinit(strl_ingest *ingest)
 {
-    strl_spill_close_and_delete(ingest->soup, NULL);
-    strl_spill_close_and_delete(ingest->shared, NULL);
+    strl_spill_close(ingest->soup);
+    strl_spill_close(ingest->shared);
     strl__free(ingest->cells);
     strl__free(ingest->edges);
     strl__free(ingest->palette);
