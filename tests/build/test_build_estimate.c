@@ -7,6 +7,8 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "build/context.h"
+#include "build/ingest/internal.h"
 #include "build/progress.h"
 
 #define SECOND 1000000000u
@@ -156,6 +158,20 @@ static void without_anything_known_nothing_is_said(void **state)
     assert_true(strl__estimate_seconds(1000000, 2) < strl__estimate_seconds(1000000, 1));
 }
 
+static void more_triangles_need_more_memory(void **state)
+{
+    (void)state;
+    strl_error err = {0};
+    strl_build_context context = {.memory_bytes = STRL_BUILD_LEAST_MEMORY};
+    assert_int_equal(strl__ingest_check_memory(&context, 33000000, &err), STRL_OK);
+    assert_int_equal(strl__ingest_check_memory(&context, 34000000, &err), STRL_ERR_ARGUMENT);
+    assert_string_equal(err.message, "--memory 64M is below the least that a build of 34000000 triangles needs, 65M");
+    context.memory_bytes = 65u << 20;
+    assert_int_equal(strl__ingest_check_memory(&context, 34000000, &err), STRL_OK);
+    context.memory_bytes = 1u << 30;
+    assert_int_equal(strl__ingest_check_memory(&context, 372000000, &err), STRL_OK);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -165,6 +181,7 @@ int main(void)
         cmocka_unit_test(a_resumed_build_counts_from_where_it_began),
         cmocka_unit_test(a_stage_that_stands_still_moves_the_end_away),
         cmocka_unit_test(without_anything_known_nothing_is_said),
+        cmocka_unit_test(more_triangles_need_more_memory),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

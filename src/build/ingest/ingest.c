@@ -62,6 +62,19 @@ static strl_status check_disk(const strl_build_context *context, uint64_t triang
     return status;
 }
 
+/* Cells are bounded by the budget (sort.c), and a leaf is some cells: with fewer bytes a triangle leaves have more triangles
+ * than STRL_CLUSTER_TRIANGLES. */
+#define MEMORY_BYTES_OF_TRIANGLE 2u
+
+strl_status strl__ingest_check_memory(const strl_build_context *context, uint64_t triangles, strl_error *err)
+{
+    uint64_t least = triangles * MEMORY_BYTES_OF_TRIANGLE;
+    if (least <= context->memory_bytes)
+        return STRL_OK;
+    return strl__fail(err, STRL_ERR_ARGUMENT, "--memory %" PRIu64 "M is below the least that a build of %" PRIu64
+                      " triangles needs, %" PRIu64 "M", context->memory_bytes >> 20, triangles, (least >> 20) + 1);
+}
+
 static strl_status tell_estimate(strl_build_context *context, strl_reader *const *readers, strl_error *err)
 {
     strl_build_estimate estimate = {0};
@@ -104,6 +117,8 @@ strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, st
     context->keep &= survey.triangles >= (context->desc->keep_triangles ? context->desc->keep_triangles : KEEP_TRIANGLES);
     status = survey.triangles ? check_disk(context, survey.triangles, err)
                               : strl__ingest_refuse_empty(context, readers, err);
+    if (!status)
+        status = strl__ingest_check_memory(context, survey.triangles, err);
     if (status)
         goto done;
     ingest->has_normals = survey.any_normal;
