@@ -62,14 +62,12 @@ static uint32_t heap_pop(simplifier *s)
     return first;
 }
 
-/* Where every wedge of u goes. At most STAR_MAX of them. */
+/* Where every wedge of u goes. */
 static void map_wedges(simplifier *s, const strl_star *star, uint32_t to, strl_simplified *result)
 {
-    for (uint32_t i = 0; i < star->count; i++) {
-        uint32_t wedge = s->corner[star->triangle[i]][star->corner[i]];
+    for (uint32_t i = 0; i < star->wedge_count; i++) {
+        uint32_t wedge = star->wedge[i];
         bool exact;
-        if (result->wedge_parent[wedge] != wedge)
-            continue;
         uint32_t target = strl__wedge_target(s, star, to, wedge, &exact);
         result->wedge_parent[wedge] = target;
         for (int k = 0; k < 3; k++)

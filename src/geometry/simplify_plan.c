@@ -118,25 +118,19 @@ bool strl__leaves_surface_at(const simplifier *s, const strl_star *star, uint32_
 /* Every wedge of u needs a wedge of v to fall onto; on the first rung, each its own. */
 static bool wedges_can_follow(const simplifier *s, const strl_star *u_star, uint32_t to)
 {
-    uint32_t seen[STAR_MAX], targets[STAR_MAX], count = 0;
+    uint32_t targets[STAR_MAX];
     const site *u = &s->sites[u_star->point], *v = &s->sites[to];
     if (u->only_wedge != NO_INDEX && v->only_wedge != NO_INDEX && u->palette == v->palette)
         return true;
-    for (uint32_t i = 0; i < u_star->count; i++) {
-        uint32_t wedge = s->corner[u_star->triangle[i]][u_star->corner[i]];
-        bool known = false, exact;
-        for (uint32_t k = 0; k < count; k++)
-            known |= seen[k] == wedge;
-        if (known)
-            continue;
-        uint32_t target = strl__wedge_target(s, u_star, to, wedge, &exact);
+    for (uint32_t i = 0; i < u_star->wedge_count; i++) {
+        bool exact;
+        uint32_t target = strl__wedge_target(s, u_star, to, u_star->wedge[i], &exact);
         if (target == NO_INDEX || (!exact && s->rung < STRL_SIMPLIFY_SEAMS))
             return false;
-        for (uint32_t k = 0; k < count && s->rung < STRL_SIMPLIFY_SEAMS; k++)
+        for (uint32_t k = 0; k < i && s->rung < STRL_SIMPLIFY_SEAMS; k++)
             if (targets[k] == target)
                 return false; /* two wedges would become one: the seam ends here */
-        seen[count] = wedge;
-        targets[count++] = target;
+        targets[i] = target;
     }
     return true;
 }
@@ -191,9 +185,8 @@ static float attribute_change(const simplifier *s, const strl_star *star, uint32
         for (unsigned i = 0; i < 3 && length > 0; i++)
             mixed_normal[i] /= length;
     }
-    uint32_t wedges = s->sites[star->point].only_wedge != NO_INDEX ? 1 : star->count;
-    for (uint32_t i = 0; i < wedges; i++) {
-        uint32_t wedge = s->corner[star->triangle[i]][star->corner[i]];
+    for (uint32_t i = 0; i < star->wedge_count; i++) {
+        uint32_t wedge = star->wedge[i];
         if (wedge == own) {
             worst = strl__larger(worst, wedge_change(s, wedge, mixed_normal, mixed_colour));
             continue;
@@ -241,12 +234,20 @@ static void list_costs(const simplifier *s, const strl_star *star, double *cost)
     }
 }
 
+/* On the first rung a manifold fan's wedges follow along one edge, which has two sides. */
+static bool can_stay_manifold(const strl_star *star)
+{
+    return star->manifold && star->wedge_count <= 2;
+}
+
 bool strl__plan_best(simplifier *s, uint32_t point, collapse_plan *plan)
 {
     const strl_star *star = &s->star;
     double cost[2 * STAR_MAX], first_cost = 0;
     unsigned found = 0;
     if (!strl__star_gather(s, point, &s->star) || star->count == 0)
+        return false;
+    if (s->rung < STRL_SIMPLIFY_SEAMS && !can_stay_manifold(star))
         return false;
     list_costs(s, star, cost);
     for (uint32_t tried = 0; tried < star->neighbour_count && found < 2; tried++) {

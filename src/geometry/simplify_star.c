@@ -166,6 +166,19 @@ static void flatten(const simplifier *s, strl_star *star, const uint8_t *order)
     }
 }
 
+static void list_wedges(const simplifier *s, strl_star *star)
+{
+    uint32_t only = s->sites[star->point].only_wedge, count = 0;
+    for (uint32_t i = 0; i < star->count && only == NO_INDEX; i++) {
+        uint32_t wedge = s->corner[star->triangle[i]][star->corner[i]];
+        star->wedge[count] = wedge;
+        count += find_point(star->wedge, count, wedge) == count;
+    }
+    if (only != NO_INDEX && star->count > 0)
+        star->wedge[count++] = only;
+    star->wedge_count = count;
+}
+
 bool strl__star_gather(simplifier *s, uint32_t point, strl_star *star)
 {
     site *own = &s->sites[point];
@@ -193,6 +206,7 @@ bool strl__star_gather(simplifier *s, uint32_t point, strl_star *star)
         star->previous[count++] = f->point[c == 0 ? 2 : c - 1];
     }
     star->count = count;
+    list_wedges(s, star);
     uint8_t order[STAR_MAX];
     star->manifold = count > 0 && order_fan(star, order) && list_ring(s, star, order);
     if (star->manifold)

@@ -102,6 +102,8 @@ typedef struct strl_star {
     bool on_boundary;             /* some edge is used by an odd number of triangles */
     bool manifold;                /* one closed or open fan */
     bool closed;                  /* the fan is closed */
+    uint32_t wedge_count;
+    uint32_t wedge[STAR_MAX];     /* the point's wedges in this star, different ones */
     strl_fan fan;                 /* where manifold */
 } strl_star;
 
@@ -158,6 +160,8 @@ typedef struct simplifier {
     candidate *heap;        /* the least first; NO_CANDIDATE after the last */
     uint32_t heap_count;
     collapse_plan *plan;    /* per point: the best collapse, valid where not stale */
+    float (*known)[2];      /* per point: what its plan cost on the first rung and on later ones, if its neighbourhood has not changed since;
+                             * INFINITY = none was allowed, 0 = not known */
     /* the star that was planned last, with the effect of its plan: most plans are carried out at once */
     strl_star star;
     collapse_effect effect, other_effect;
