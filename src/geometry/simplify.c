@@ -117,6 +117,7 @@ static void mark_stale(simplifier *s, uint32_t point, float key)
     if (p->flags & STRL_POINT_KEPT)
         return;
     p->state = STATE_STALE;
+    strl__forget_known(s, point);
     if (!p->in_heap)
         heap_push(s, point, key);
 }
@@ -146,14 +147,32 @@ static float estimate_key(const simplifier *s, uint32_t point)
     return strl__larger(shift, strl_mesh_error(s->mesh, drift));
 }
 
+static unsigned known_index(const simplifier *s)
+{
+    return s->rung >= STRL_SIMPLIFY_SEAMS;
+}
+
+/* Remembers what a plan cost, if one was found. */
+static void note_known(simplifier *s, uint32_t point, bool found)
+{
+    float *known = s->known[point], key = found ? s->plan[point].key : INFINITY;
+    unsigned index = known_index(s);
+    known[index] = key;
+    if (index > 0) /* where more is allowed, it costs no less */
+        known[0] = strl__larger(known[0], key);
+}
+
 static void push_all(simplifier *s)
 {
     for (uint32_t p = 0; p < s->mesh->point_count; p++) {
         site *own = &s->sites[p];
         if ((own->flags & STRL_POINT_KEPT) || own->head == NO_INDEX || own->in_heap)
             continue;
+        float known = s->known[p][known_index(s)];
+        if (known == INFINITY)
+            continue;
         own->state = STATE_ESTIMATED;
-        heap_push(s, p, estimate_key(s, p));
+        heap_push(s, p, known > 0 ? known : estimate_key(s, p));
     }
 }
 
@@ -194,7 +213,9 @@ static bool plan_again(simplifier *s, uint32_t point)
 {
     collapse_plan *plan = &s->plan[point];
     s->sites[point].state = STATE_PLANNED;
-    if (!strl__plan_best(s, point, plan))
+    bool found = strl__plan_best(s, point, plan);
+    note_known(s, point, found);
+    if (!found)
         return false;
     if (candidate_of(point, plan->key) < s->heap[0])
         return true;
@@ -265,6 +286,8 @@ static float run_rung(simplifier *s, float limit, bool adaptive, strl_simplified
         for (uint32_t i = 0; i < s->star.neighbour_count; i++)
             mark_stale(s, s->star.neighbour[i], key);
     }
+    if (s->heap_count)
+        s->least_left = smaller(s->least_left, key_of(s->heap[0]));
     while (s->heap_count) {
         candidate *last = &s->heap[--s->heap_count];
         s->sites[(uint32_t)*last].in_heap = false;
@@ -273,12 +296,26 @@ static float run_rung(simplifier *s, float limit, bool adaptive, strl_simplified
     return reached;
 }
 
+/* The next limit: at least twice as much, and no more rounds in which nothing can happen. A point joins another of its cell only
+ * where an edge lies in one cell, or nearly so. */
+static float next_limit(const simplifier *s, float limit, float most, bool changed)
+{
+    float least = smaller(s->least_left, s->shortest_edge);
+    limit *= 2;
+    while (!changed && limit < most && limit < least)
+        limit *= 2;
+    return smaller(limit, most);
+}
+
 /* All rungs up to one error, then all again up to twice that, until the target is met. False without memory. */
 static bool climb_ladder(simplifier *s, float start, strl_arena *arena, strl_simplified *result)
 {
     float limit = start, most = smaller(s->desc->error_limit, 2 * strl__larger(start, (float)s->diagonal)); /* nothing is further away */
+    bool changed = true;
     while (s->triangles_left > s->desc->target_triangles && s->triangles_left > s->desc->soft_triangles && limit < most) {
-        limit = smaller(limit * 2, most);
+        uint32_t before = result->collapse_count;
+        limit = next_limit(s, limit, most, changed);
+        s->least_left = INFINITY;
         for (int rung = STRL_SIMPLIFY_TOPOLOGY; rung <= STRL_SIMPLIFY_SEAMS; rung++) {
             s->rung = (strl_simplify_rung)rung;
             if (rung <= (int)s->desc->last_rung && s->triangles_left > s->desc->target_triangles)
@@ -287,6 +324,7 @@ static bool climb_ladder(simplifier *s, float start, strl_arena *arena, strl_sim
         if (s->desc->last_rung >= STRL_SIMPLIFY_DISJOINT && s->triangles_left > s->desc->target_triangles &&
             !strl__simplify_clustering(s, limit, arena, result))
             return false;
+        changed = result->collapse_count > before;
     }
     return true;
 }

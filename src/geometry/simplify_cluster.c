@@ -62,6 +62,12 @@ static cell_slot *find_cell(clustering *c, const double p[3], double size)
     return &c->slots[at];
 }
 
+static double squared_distance(const double a[3], const double b[3])
+{
+    double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return x * x + y * y + z * z;
+}
+
 static bool prepare(clustering *c, simplifier *s, strl_arena *arena)
 {
     uint32_t points = s->mesh->point_count, size = 16;
@@ -80,9 +86,15 @@ static bool prepare(clustering *c, simplifier *s, strl_arena *arena)
         for (unsigned k = 0; k < 3; k++)
             c->origin[k] = fmin(c->origin[k], s->sites[p].position[k]);
     }
-    for (uint32_t t = 0; t < s->mesh->triangle_count; t++)
-        for (unsigned k = 1; k < 3 && !s->faces[t].gone; k++)
-            unite(c->component, s->faces[t].point[0], s->faces[t].point[k]);
+    double shortest = INFINITY;
+    for (uint32_t t = 0; t < s->mesh->triangle_count; t++) {
+        const uint32_t *point = s->faces[t].point;
+        for (unsigned k = 0; k < 3 && !s->faces[t].gone; k++) {
+            unite(c->component, point[0], point[k]);
+            shortest = fmin(shortest, squared_distance(s->sites[point[k]].position, s->sites[point[(k + 1) % 3]].position));
+        }
+    }
+    s->shortest_edge = (float)sqrt(shortest);
     return true;
 }
 
@@ -171,6 +183,13 @@ static bool makes_hub(const simplifier *s, const strl_star *star, uint32_t to)
     return s->sites[to].degree + star->count > STAR_MAX && strl__star_uses(s, star, to) == 0;
 }
 
+static void forget_around(simplifier *s, const strl_star *star, uint32_t to)
+{
+    for (uint32_t i = 0; i < star->neighbour_count; i++)
+        strl__forget_known(s, star->neighbour[i]);
+    strl__forget_known(s, to);
+}
+
 static void merge_cells(clustering *c, double size, float limit, bool disjoint_only, strl_simplified *result)
 {
     simplifier *s = c->s;
@@ -199,6 +218,7 @@ static void merge_cells(clustering *c, double size, float limit, bool disjoint_o
         if (plan.key > limit)
             continue;
         strl__apply_collapse(s, star, &plan, &s->effect, result);
+        forget_around(s, star, to);
         unite(c->component, p, to);
     }
 }

@@ -100,7 +100,9 @@ static bool allocate(simplifier *s, strl_arena *arena)
     s->normal_sum = strl_arena_alloc_zero(arena, wedges, sizeof *s->normal_sum);
     s->heap = strl_arena_alloc(arena, points + HEAP_WAYS, sizeof *s->heap);
     s->plan = strl_arena_alloc_zero(arena, points, sizeof *s->plan);
-    return s->sites && s->faces && s->pulls && s->quadrics && s->normal && s->colour && s->normal_sum && s->heap && s->plan;
+    s->known = strl_arena_alloc_zero(arena, points, sizeof *s->known);
+    return s->sites && s->faces && s->pulls && s->quadrics && s->normal && s->colour && s->normal_sum && s->heap && s->plan &&
+           s->known;
 }
 
 static bool allocate_result(const simplifier *s, strl_simplified *result, strl_arena *arena)

@@ -155,6 +155,8 @@ typedef struct simplifier {
     uint32_t triangles_left;
     uint64_t moves;         /* of all collapses so far, see strl__moves_of */
     double diagonal;        /* of the points' box */
+    float shortest_edge;    /* of what is left when clustering last began */
+    float least_left;       /* the least key that was above the limits of this round */
     float free_key;         /* the largest key that was claimed before anything collapsed */
     strl_simplify_rung rung;
     candidate *heap;        /* the least first; NO_CANDIDATE after the last */
@@ -170,6 +172,11 @@ typedef struct simplifier {
 static inline float strl__larger(float a, float b)
 {
     return a > b ? a : b;
+}
+
+static inline void strl__forget_known(simplifier *s, uint32_t point)
+{
+    s->known[point][0] = s->known[point][1] = 0;
 }
 
 /* Never negative. */
