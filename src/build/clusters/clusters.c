@@ -247,7 +247,8 @@ strl_status strl__clusters_run(strl_build_context *context, strl_error *err)
 {
     strl_ingest ingest = {0};
     strl_partition partition = {0};
-    strl_hierarchy hierarchy = {.context = context, .ingest = &ingest, .partition = &partition, .growth = FIRST_GROWTH};
+    strl_hierarchy hierarchy = {.context = context, .ingest = &ingest, .partition = &partition, .growth = FIRST_GROWTH,
+                                .soft_triangles = STRL_SOFT_TRIANGLES};
     strl_status status = run_stages(&hierarchy, &partition, err);
     if (!status) {
         fill_result(&hierarchy, context->result);

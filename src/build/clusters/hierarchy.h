@@ -50,6 +50,9 @@ typedef struct strl_adjacency {
 bool strl_adjacency_add(strl_adjacency *adjacency, uint32_t a, uint32_t b, uint32_t count);
 void strl_adjacency_deinit(strl_adjacency *adjacency);
 
+/* A base mesh of so many triangles is good enough where fewer would cost many times the error. */
+#define STRL_SOFT_TRIANGLES 6144u
+
 typedef struct strl_hierarchy {
     strl_build_context *context;
     strl_ingest *ingest; /* gives up its streams when they are used up */
@@ -58,6 +61,7 @@ typedef struct strl_hierarchy {
     strl_adjacency current; /* of the level being made, until its groups are chosen */
     strl_adjacency next;    /* of the level above it */
     float even_error;       /* lattice units: where the nodes of the level being made are to end; 0 = at half their triangles */
+    uint32_t soft_triangles; /* STRL_SOFT_TRIANGLES but while leaves are sampled */
     float growth;           /* by which even_error grows from level to level, so that about half the triangles go */
     uint32_t saved_done;    /* groups of the level being made that the last checkpoint has */
     uint64_t saved_at_ns;   /* when it was made */

@@ -350,7 +350,9 @@ static strl_status sample_error(leaf_stage *stage, uint32_t clusters, strl_error
     if (clusters < 2 * SAMPLE_LEAVES)
         return STRL_OK;
     sample.stride = clusters / sample.count;
+    stage->hierarchy->soft_triangles = 0; /* whatever half of them costs: the leaves will end there alike */
     strl_status status = strl_pool_for(stage->hierarchy->context->pool, sample.count, sample_leaf, &sample, NULL, err);
+    stage->hierarchy->soft_triangles = STRL_SOFT_TRIANGLES;
     if (!status)
         stage->hierarchy->even_error = strl_median(sample.errors, sample.count);
     return status;

@@ -8,8 +8,6 @@
 #include "geometry/record.h"
 #include "geometry/simplify.h"
 
-/* A base mesh of so many triangles is good enough where fewer would cost many times the error. */
-#define SOFT_TRIANGLES 6144u
 /* How far from half its triangles a node may end so that all nodes of a level end at one error. */
 #define LEAST_OF_TARGET 0.8
 #define MOST_OF_TARGET 1.25
@@ -22,12 +20,12 @@ void strl_made_node_deinit(strl_made_node *made)
     *made = (strl_made_node){0};
 }
 
-static strl_status simplify(const strl_mesh *mesh, uint32_t target, float even_error, strl_arena *arena, strl_simplified *result,
+static strl_status simplify(const strl_hierarchy *hierarchy, const strl_mesh *mesh, uint32_t target, strl_arena *arena, strl_simplified *result,
                             strl_error *err)
 {
-    strl_simplify_desc desc = {.target_triangles = target, .soft_triangles = SOFT_TRIANGLES, .error_limit = INFINITY,
+    strl_simplify_desc desc = {.target_triangles = target, .soft_triangles = hierarchy->soft_triangles, .error_limit = INFINITY,
                                .last_rung = STRL_SIMPLIFY_CLUSTERING, .normal_weight = STRL_NORMAL_WEIGHT,
-                               .colour_weight = STRL_COLOUR_WEIGHT, .even_error = even_error,
+                               .colour_weight = STRL_COLOUR_WEIGHT, .even_error = hierarchy->even_error,
                                .least_triangles = (uint32_t)(target * LEAST_OF_TARGET),
                                .most_triangles = (uint32_t)(target * MOST_OF_TARGET)};
     return strl_simplify(mesh, &desc, arena, result, err);
@@ -130,7 +128,7 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
     strl_pm pm, decoded;
     strl_node_mesh base = {0};
     uint32_t *point_map = strl_arena_alloc(arena, node->mesh.point_count, sizeof *point_map);
-    strl_status status = point_map ? simplify(&node->mesh, target, hierarchy->even_error, arena, &simplified, err)
+    strl_status status = point_map ? simplify(hierarchy, &node->mesh, target, arena, &simplified, err)
                                    : strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
     if (!status)
         status = strl_pm_record(&node->mesh, &simplified, ingest->palette, (uint32_t)ingest->palette_count, arena, &pm, err);
