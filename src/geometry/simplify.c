@@ -274,8 +274,10 @@ static float run_rung(simplifier *s, float limit, bool adaptive, strl_simplified
         if (point == NO_INDEX)
             continue;
         float key = s->plan[point].key;
-        if (key > limit || !wants_more(s, key))
+        if (key > limit || !wants_more(s, key)) {
+            s->least_left = smaller(s->least_left, key);
             break;
+        }
         strl__apply_collapse(s, &s->star, &s->plan[point], &s->effect, result);
         reached = strl__larger(reached, key);
         if (adaptive && s->triangles_left <= half) {
@@ -307,6 +309,14 @@ static float next_limit(const simplifier *s, float limit, float most, bool chang
     return smaller(limit, most);
 }
 
+/* Where no plan was allowed: that hangs on points two edges away, too. */
+static void retry_failures(simplifier *s)
+{
+    for (uint32_t p = 0; p < s->mesh->point_count; p++)
+        for (unsigned i = 0; i < 2; i++)
+            s->known[p][i] = s->known[p][i] == INFINITY ? 0 : s->known[p][i];
+}
+
 /* All rungs up to one error, then all again up to twice that, until the target is met. False without memory. */
 static bool climb_ladder(simplifier *s, float start, strl_arena *arena, strl_simplified *result)
 {
@@ -315,6 +325,8 @@ static bool climb_ladder(simplifier *s, float start, strl_arena *arena, strl_sim
     while (s->triangles_left > s->desc->target_triangles && s->triangles_left > s->desc->soft_triangles && limit < most) {
         uint32_t before = result->collapse_count;
         limit = next_limit(s, limit, most, changed);
+        if (changed)
+            retry_failures(s);
         s->least_left = INFINITY;
         for (int rung = STRL_SIMPLIFY_TOPOLOGY; rung <= STRL_SIMPLIFY_SEAMS; rung++) {
             s->rung = (strl_simplify_rung)rung;
