@@ -6,7 +6,7 @@
 
 #include "base/fail.h"
 
-enum { FLAG_COLOUR = 1, FLAG_PALETTE_INDEX = 2 };
+enum { FLAG_COLOUR = 1, FLAG_PALETTE_INDEX = 2, FLAG_COPIES = 4 };
 
 static strl_status read_head(strl_cursor *cursor, strl_payload_sizes *sizes, uint8_t *flags, strl_error *err)
 {
@@ -20,8 +20,8 @@ static strl_status read_head(strl_cursor *cursor, strl_payload_sizes *sizes, uin
     sizes->base_triangle_count = strl_cursor_u32(cursor);
     if (cursor->failed)
         return strl__fail(err, STRL_ERR_FORMAT, "node payload of %zu bytes is too short for its head", cursor->size);
-    if (version != 1 || *flags > (FLAG_COLOUR | FLAG_PALETTE_INDEX))
-        return strl__fail(err, STRL_ERR_FORMAT, "node payload has version %u and flags %u, expected 1 and at most 3",
+    if (version != 1 || *flags > (FLAG_COLOUR | FLAG_PALETTE_INDEX | FLAG_COPIES))
+        return strl__fail(err, STRL_ERR_FORMAT, "node payload has version %u and flags %u, expected 1 and at most 7",
                           version, *flags);
     if (sizes->triangle_count > STRL_PM_MAX_TRIANGLES || sizes->base_triangle_count > sizes->triangle_count ||
         sizes->base_vertex_count > sizes->vertex_count || sizes->palette_count < 1 ||
@@ -85,7 +85,9 @@ static strl_status decode_parts(struct strl__decoder *d, strl_cursor *cursor)
     d->from = strl_arena_alloc(d->scratch, sizes->base_vertex_count, sizeof *d->from);
     if (!d->from || !strl__mesh_init(&d->mesh, sizes->vertex_count, sizes->triangle_count, d->pm->position, d->scratch))
         return strl__fail(d->err, STRL_ERR_MEMORY, "no memory to decode a node payload");
-    status = strl__decode_base(d);
+    status = strl__decode_copies(d);
+    if (!status)
+        status = strl__decode_base(d);
     if (!status)
         status = strl__decode_steps(d);
     if (!status)
@@ -111,17 +113,21 @@ static void reserve(const struct strl__decoder *d, size_t size, const strl_arena
     strl_arena_rewind(scratch, empty);
 }
 
-strl_status strl_payload_decode(const void *data, size_t size, strl_arena *arena, strl_pm *pm, strl_error *err)
+strl_status strl_payload_decode(const void *data, size_t size, const strl_payload_reference *reference, strl_arena *arena,
+                                strl_pm *pm, strl_error *err)
 {
     strl_cursor cursor = strl_cursor_make(data, size);
     strl_pm mesh = {0};
     strl_arena scratch;
-    struct strl__decoder decoder = {.pm = &mesh, .scratch = &scratch, .err = err};
+    struct strl__decoder decoder = {.pm = &mesh, .reference = reference, .scratch = &scratch, .err = err};
     uint8_t flags;
     *pm = mesh;
     strl_status status = read_head(&cursor, &decoder.sizes, &flags, err);
     if (status)
         return status;
+    if (!(flags & FLAG_COPIES) != !reference)
+        return strl__fail(err, STRL_ERR_FORMAT, "node payload %s another node's mesh, which was %s",
+                          reference ? "does not use" : "needs", reference ? "given" : "not given");
     strl_arena_mark before = strl_arena_get_mark(arena);
     status = allocate(&decoder.sizes, flags, arena, &mesh, err);
     reserve(&decoder, size, arena, &scratch);

@@ -11,12 +11,16 @@ struct strl__decoder {
     struct strl__streams_in in;
     struct strl__mesh mesh;
     strl_pm *pm;
+    const strl_payload_reference *reference; /* or NULL */
+    uint32_t copied;       /* vertices copied from it: the first numbers */
+    uint16_t *copied_from; /* [copied], vertices of the reference */
     uint16_t *from; /* [base vertices], the vertex that predicts colour and palette index */
     strl_arena *scratch;
     strl_error *err;
 };
 
-/* Base vertices and triangles. */
+/* What the base mesh has of the reference, then its other vertices and triangles. */
+strl_status strl__decode_copies(struct strl__decoder *decoder);
 strl_status strl__decode_base(struct strl__decoder *decoder);
 /* All steps: vertices, parents, triangles. */
 strl_status strl__decode_steps(struct strl__decoder *decoder);

@@ -3,16 +3,25 @@
 #include "geometry/payload_decode.h"
 
 #include "base/fail.h"
+#include "geometry/payload_reference.h"
+
+static void decode_normal(struct strl__decoder *d, uint32_t v, const uint32_t predicted[2], unsigned stream)
+{
+    for (unsigned k = 0; k < 2; k++)
+        d->pm->normal[v][k] = (uint16_t)((predicted[k] + strl__unzigzag(strl__pull(&d->in, stream + k))) & 1023u);
+}
 
 static bool decode_normals(struct strl__decoder *d)
 {
     uint64_t(*sum)[4] = strl__normal_sums(&d->mesh, d->scratch);
-    for (uint32_t v = 0; sum && v < d->sizes.vertex_count; v++) {
+    for (uint32_t v = 0; v < d->copied; v++) {
+        const uint16_t *there = strl__reference_normal(d->reference, d->copied_from[v]);
+        decode_normal(d, v, (uint32_t[2]){there[0], there[1]}, STRL__STREAM_COPY_NORMAL);
+    }
+    for (uint32_t v = d->copied; sum && v < d->sizes.vertex_count; v++) {
         uint32_t predicted[2];
         strl__normal_predict(sum[v], predicted);
-        for (unsigned k = 0; k < 2; k++)
-            d->pm->normal[v][k] =
-                (uint16_t)((predicted[k] + strl__unzigzag(strl__pull(&d->in, STRL__STREAM_NORMAL + k))) & 1023u);
+        decode_normal(d, v, predicted, STRL__STREAM_NORMAL);
     }
     return sum;
 }

@@ -3,6 +3,7 @@
 #include "geometry/payload_encode.h"
 
 #include "base/fail.h"
+#include "geometry/payload_reference.h"
 
 /* pm's vertex with the decoder's number v. */
 static uint32_t pm_vertex(const struct strl__encoder *e, uint32_t v)
@@ -22,10 +23,16 @@ static bool encode_normals(struct strl__encoder *e)
     uint64_t(*sum)[4] = strl__normal_sums(&e->mesh, e->scratch);
     for (uint32_t v = 0; sum && v < count; v++) {
         uint32_t predicted[2];
+        unsigned stream = STRL__STREAM_NORMAL;
         strl__normal_predict(sum[v], predicted);
+        if (v < e->copied) {
+            stream = STRL__STREAM_COPY_NORMAL;
+            const uint16_t *n = strl__reference_normal(e->reference, e->copied_from[v]);
+            predicted[0]=n[0]; predicted[1]=n[1];
+        }
         for (unsigned k = 0; k < 2; k++) {
             uint32_t difference = (e->pm->normal[pm_vertex(e, v)][k] - predicted[k] + 512u) & 1023u;
-            strl__push(&e->out, STRL__STREAM_NORMAL + k, strl__zigzag(difference - 512u));
+            strl__push(&e->out, stream + k, strl__zigzag(difference - 512u));
         }
     }
     return sum;

@@ -32,7 +32,10 @@ enum {
     STRL__STREAM_PALETTE_INDEX = STRL__STREAM_NORMAL + 2,
     STRL__STREAM_COLOUR,
     STRL__STREAM_PALETTE = STRL__STREAM_COLOUR + 4,
-    STRL__STREAM_COUNT = STRL__STREAM_PALETTE + 3
+    STRL__STREAM_SELECT = STRL__STREAM_PALETTE + 3, /* one a context */
+    STRL__STREAM_COPY = STRL__STREAM_SELECT + 4,
+    STRL__STREAM_COPY_NORMAL,
+    STRL__STREAM_COUNT = STRL__STREAM_COPY_NORMAL + 2
 };
 
 #define STRL__OPERATION_CONTEXTS 6u
@@ -102,6 +105,8 @@ static inline void strl__push(struct strl__streams_out *streams, unsigned id, ui
  * format asks; item_count = vertices + triangles + palette entries. */
 strl_status strl__streams_write(const struct strl__streams_out *streams, size_t start, uint64_t item_count,
                                 strl_writer *writer, strl_error *err);
+/* What each stream costs, its count and its table included. */
+void strl__streams_bits(const struct strl__streams_out *streams, double bits[STRL__STREAM_COUNT]);
 void strl__streams_deinit(struct strl__streams_out *streams);
 
 /* ---- reading ---- */

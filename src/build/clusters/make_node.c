@@ -135,13 +135,13 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
     if (!status)
         status = strl_pm_record(&node->mesh, &simplified, ingest->palette, (uint32_t)ingest->palette_count, arena, &pm, err);
     if (!status)
-        status = strl_payload_encode(&pm, arena, &made->payload, err);
+        status = strl_payload_encode(&pm, NULL, arena, &made->payload, err);
     if (!status)
         status = strl_mesh_after(&node->mesh, &simplified, point_map, arena, &base.mesh, err);
     /* where hardly any triangles share points, positions are most of a base mesh: they are not spilled twice */
     made->state.needs_payload = !status && base.mesh.point_count / 3 > base.mesh.triangle_count / 4;
     if (made->state.needs_payload) /* it comes back in an order of its own */
-        status = strl_payload_decode(made->payload.data, made->payload.size, arena, &decoded, err);
+        status = strl_payload_decode(made->payload.data, made->payload.size, NULL, arena, &decoded, err);
     if (status)
         goto done;
     memcpy(base.anchor, node->anchor, sizeof base.anchor);

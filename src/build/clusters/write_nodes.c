@@ -1,0 +1,192 @@
+/* The last stage: nodes into the container, breadth first. Until here every payload is self-contained, because children are made
+ * before their parents; now each is told by its parent's finest state, which holds most of its base mesh. */
+#include <stdio.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "build/clusters/hierarchy.h"
+#include "container/treelet.h"
+#include "geometry/payload.h"
+
+typedef struct written_node {
+    strl_node record;
+    strl_writer payload;
+    strl_writer finest; /* for its children; empty at leaves */
+} written_node;
+
+typedef struct write_stage {
+    const strl_hierarchy *hierarchy;
+    strl_container_writer *writer;
+    strl_arena *arenas;         /* [workers] */
+    written_node *slots;        /* [window] */
+    strl_level *level, *above;  /* above: NULL at the root */
+    uint32_t index, group_base; /* of the level; its first group */
+    uint64_t done, total;
+} write_stage;
+
+/* ---- finest states on their way to the next level, in the machine's own byte order */
+
+typedef struct finest_head {
+    uint32_t vertex_count, triangle_count;
+} finest_head;
+
+static void keep_finest(const strl_pm *pm, strl_writer *out)
+{
+    const finest_head head = {pm->vertex_count, pm->triangle_count};
+    strl_writer_bytes(out, &head, sizeof head);
+    strl_writer_bytes(out, pm->position, pm->vertex_count * sizeof *pm->position);
+    strl_writer_bytes(out, pm->normal, pm->vertex_count * sizeof *pm->normal);
+    strl_writer_bytes(out, pm->triangle, pm->triangle_count * sizeof *pm->triangle);
+}
+
+static strl_status load_finest(const strl_level *level, uint32_t node, strl_arena *arena, strl_payload_reference *reference,
+                               strl_error *err)
+{
+    const strl_node_state *state = &level->nodes[node];
+    uint8_t *bytes = strl_arena_alloc(arena, state->mesh_bytes, 1);
+    if (!bytes)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u bytes", state->mesh_bytes);
+    strl_status status = strl_spill_read(level->meshes, state->mesh_at, bytes, state->mesh_bytes, err);
+    if (status)
+        return status;
+    finest_head head;
+    memcpy(&head, bytes, sizeof head);
+    strl_pm pm = {.vertex_count = head.vertex_count, .triangle_count = head.triangle_count};
+    pm.position = (int32_t(*)[3])(void *)(bytes + sizeof head);
+    pm.normal = (uint16_t(*)[2])(void *)(pm.position + head.vertex_count);
+    pm.triangle = (uint16_t(*)[3])(void *)(pm.normal + head.vertex_count);
+    *reference = strl_payload_reference_of(&pm);
+    return STRL_OK;
+}
+
+/* ---- one node */
+
+/* Node ids are breadth first: node i of the level at depth d has id 2^d - 1 + i. */
+static void place_in_tree(const write_stage *stage, uint32_t index, strl_node *record)
+{
+    uint32_t depth = stage->hierarchy->partition->depth - stage->index, id = (1u << depth) - 1 + index;
+    record->parent = record->decode_parent = depth ? (id - 1) / 2 : STRL_NONE;
+    record->first_child = stage->index ? 2 * id + 1 : STRL_NONE;
+    record->child_count = stage->index ? 2 : 0;
+    record->level = stage->index;
+    record->group = stage->group_base + stage->level->nodes[index].group;
+}
+
+static strl_status read_alone(const strl_level *level, const strl_node_state *state, strl_arena *arena, strl_pm *pm,
+                              strl_error *err)
+{
+    void *payload = strl_arena_alloc(arena, state->payload_bytes, 1);
+    if (!payload)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a payload of %u bytes", state->payload_bytes);
+    strl_status status = strl_spill_read(level->payloads, state->payload_at, payload, state->payload_bytes, err);
+    return status ? status : strl_payload_decode(payload, state->payload_bytes, NULL, arena, pm, err);
+}
+
+static strl_status encode_node(const write_stage *stage, uint32_t index, written_node *node, strl_arena *arena, strl_error *err)
+{
+    strl_pm alone, final;
+    strl_payload_reference parent, *reference = stage->above ? &parent : NULL;
+    strl_status status = read_alone(stage->level, &stage->level->nodes[index], arena, &alone, err);
+    if (!status && reference)
+        status = load_finest(stage->above, index / 2, arena, reference, err);
+    if (!status && reference)
+        strl_page_place(reference, stage->above->nodes[index / 2].record.anchor, &node->record);
+    if (!status)
+        status = strl_payload_encode(&alone, reference, arena, &node->payload, err);
+    if (status || stage->index == 0)
+        return status;
+    /* The children's payloads are told in the order in which a reader will have its vertices and triangles. */
+    status = strl_payload_decode(node->payload.data, node->payload.size, reference, arena, &final, err);
+    if (!status)
+        keep_finest(&final, &node->finest);
+    return status || !node->finest.failed ? status : strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
+}
+
+static strl_status work(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
+{
+    write_stage *stage = context;
+    written_node *node = &stage->slots[slot];
+    strl_arena *arena = &stage->arenas[worker];
+    strl_arena_mark mark = strl_arena_get_mark(arena);
+    node->payload.size = node->finest.size = 0;
+    node->record = stage->level->nodes[index].record;
+    place_in_tree(stage, (uint32_t)index, &node->record);
+    strl_status status = encode_node(stage, (uint32_t)index, node, arena, err);
+    strl_arena_rewind(arena, mark);
+    return status;
+}
+
+static strl_status finish(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
+{
+    write_stage *stage = context;
+    const written_node *node = &stage->slots[slot];
+    strl_node_state *state = &stage->level->nodes[index];
+    (void)worker;
+    strl_spill_drop(stage->level->payloads, state->payload_at, state->payload_bytes);
+    state->mesh_bytes = (uint32_t)node->finest.size;
+    if (stage->index)
+        state->mesh_at = strl_spill_bytes(stage->level->meshes);
+    strl_status status = strl_container_writer_add_node(stage->writer, &node->record, node->payload.data, node->payload.size, err);
+    if (!status && stage->index)
+        status = strl_spill_append(stage->level->meshes, node->finest.data, node->finest.size, err);
+    if (!status && (++stage->done & 63) == 0)
+        status = strl__build_report(stage->hierarchy->context, stage->done, stage->total, err);
+    return status;
+}
+
+/* ---- levels */
+
+static strl_status write_level(write_stage *stage, strl_error *err)
+{
+    strl_build_context *context = stage->hierarchy->context;
+    char name[32];
+    snprintf(name, sizeof name, "finest-%02u", stage->index);
+    strl_status status = stage->index ? strl_spill_open(context->spills, name, 0, &stage->level->meshes, err) : STRL_OK;
+    if (!status)
+        status = strl_pool_ordered(context->pool, stage->level->count, 0, work, finish, stage, NULL, err);
+    if (!status && stage->index)
+        status = strl_spill_flush(stage->level->meshes, err);
+    if (!status && stage->above) {
+        status = strl_spill_close_and_delete(stage->above->meshes, err);
+        stage->above->meshes = NULL;
+    }
+    return status;
+}
+
+static strl_status write_levels(write_stage *stage, strl_error *err)
+{
+    uint32_t depth = stage->hierarchy->partition->depth;
+    strl_status status = STRL_OK;
+    stage->total = (2ull << depth) - 1;
+    for (uint32_t d = 0; d <= depth && !status; d++) {
+        stage->above = stage->level;
+        stage->index = depth - d;
+        stage->level = &stage->hierarchy->levels[stage->index];
+        status = write_level(stage, err);
+        stage->group_base += stage->level->group_count;
+    }
+    stage->hierarchy->context->result->groups = stage->group_base;
+    return status;
+}
+
+strl_status strl_write_nodes(const strl_hierarchy *hierarchy, strl_container_writer *writer, strl_error *err)
+{
+    strl_pool *pool = hierarchy->context->pool;
+    unsigned workers = strl_pool_workers(pool), window = strl_pool_window(pool, 0);
+    write_stage stage = {.hierarchy = hierarchy, .writer = writer};
+    strl_status status = STRL_OK;
+    strl__build_stage(hierarchy->context, "write");
+    stage.arenas = strl__alloc_zero(workers, sizeof *stage.arenas);
+    stage.slots = strl__alloc_zero(window, sizeof *stage.slots);
+    status = stage.arenas && stage.slots ? write_levels(&stage, err)
+                                         : strl__fail(err, STRL_ERR_MEMORY, "no memory to write nodes");
+    for (unsigned i = 0; stage.arenas && i < workers; i++)
+        strl_arena_deinit(&stage.arenas[i]);
+    for (unsigned i = 0; stage.slots && i < window; i++) {
+        strl__free(stage.slots[i].payload.data);
+        strl__free(stage.slots[i].finest.data);
+    }
+    strl__free(stage.arenas);
+    strl__free(stage.slots);
+    return status;
+}
