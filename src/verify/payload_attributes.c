@@ -57,9 +57,15 @@ static strl_status read_normals(strl__v_payload *self)
     add_normals(mesh, sum);
     for (uint32_t v = 0; v < mesh->vertex_count; v++) {
         uint32_t predicted[2];
-        predict_normal(sum[v], predicted);
+        unsigned stream = v < self->copied ? STRL__V_COPY_NORMAL : STRL__V_NORMAL;
+        if (v < self->copied) {
+            predicted[0] = self->told_by->normal[self->copied_from[v]][0];
+            predicted[1] = self->told_by->normal[self->copied_from[v]][1];
+        } else {
+            predict_normal(sum[v], predicted);
+        }
         for (unsigned i = 0; i < 2; i++)
-            mesh->normal[v][i] = (uint16_t)((predicted[i] + strl__v_residual(self, STRL__V_NORMAL + i)) % 1024);
+            mesh->normal[v][i] = (uint16_t)((predicted[i] + strl__v_residual(self, stream + i)) % 1024);
     }
     return STRL_OK;
 }
@@ -149,8 +155,10 @@ strl_status strl__v_payload_attributes(strl__v_payload *self, bool with_looks)
         status = read_normals(self);
         read_colours(self);
     } else {
-        for (unsigned i = 0; i < 2; i++)
-            skip_stream(self, STRL__V_NORMAL + i, self->vertices);
+        for (unsigned i = 0; i < 2; i++) {
+            skip_stream(self, STRL__V_COPY_NORMAL + i, self->copied);
+            skip_stream(self, STRL__V_NORMAL + i, self->vertices - self->copied);
+        }
         for (unsigned i = 0; i < 4 && self->mesh->colour; i++)
             skip_stream(self, STRL__V_COLOUR + i, self->vertices);
     }

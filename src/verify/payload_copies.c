@@ -1,0 +1,92 @@
+/* docs/format-payload.md, "Copies". */
+#include "base/fail.h"
+#include "verify/payload.h"
+
+#define NONE UINT32_MAX
+
+typedef struct copying {
+    strl__v_payload *payload;
+    const strl__vmesh *from;
+    uint32_t *copy;     /* [its vertices] number of the copy, or NONE */
+    bool *taken, *left; /* [its vertices] a triangle at it was */
+} copying;
+
+static unsigned context_of(const copying *self, const uint16_t corners[3])
+{
+    unsigned context = 0;
+    for (unsigned k = 0; k < 3; k++) {
+        bool taken = self->taken[corners[k]], left = self->left[corners[k]];
+        context |= taken && !left ? 1u : 0u;
+        context |= left && !taken ? 2u : 0u;
+    }
+    return context;
+}
+
+static bool copy_vertex(copying *self, uint32_t vertex, uint32_t before)
+{
+    strl__v_payload *p = self->payload;
+    uint32_t value = strl__v_pull(p, STRL__V_COPY), number = p->vertex_count, other = NONE;
+    int32_t position[3];
+    for (unsigned k = 0; k < 3; k++)
+        position[k] = (int32_t)((uint32_t)self->from->position[vertex][k] + p->offset[k]);
+    if (value > 0) {
+        uint32_t distance = (value - 1) / 2;
+        if (distance >= number)
+            return false;
+        other = number - 1 - distance;
+        if (memcmp(p->mesh->position[other], position, sizeof position) != 0)
+            return false;
+    }
+    if (value > 0 && value % 2 == 0) {
+        self->copy[vertex] = other;
+        return true;
+    }
+    if (number == p->base_vertices)
+        return false;
+    memcpy(p->mesh->position[number], position, sizeof position);
+    if (other != NONE)
+        strl__v_join(p, number, other);
+    p->from[number] = (uint16_t)before;
+    p->copied_from[number] = (uint16_t)vertex;
+    self->copy[vertex] = p->vertex_count++;
+    return true;
+}
+
+static bool copy_triangle(copying *self, const uint16_t corners[3])
+{
+    strl__v_payload *p = self->payload;
+    uint32_t before = p->vertex_count ? p->vertex_count - 1 : 0;
+    if (p->triangle_count == p->base_triangles)
+        return false;
+    for (unsigned k = 0; k < 3; k++) {
+        if (self->copy[corners[k]] == NONE && !copy_vertex(self, corners[k], before))
+            return false;
+        before = self->copy[corners[k]];
+    }
+    return strl__v_add_triangle(p, self->copy[corners[0]], self->copy[corners[1]], self->copy[corners[2]]);
+}
+
+strl_status strl__v_payload_copies(strl__v_payload *payload)
+{
+    copying self = {.payload = payload, .from = payload->told_by};
+    if (!self.from)
+        return STRL_OK;
+    uint32_t vertices = self.from->vertex_count;
+    self.copy = strl_arena_alloc(payload->arena, vertices, sizeof *self.copy);
+    self.taken = strl_arena_alloc_zero(payload->arena, vertices, sizeof *self.taken);
+    self.left = strl_arena_alloc_zero(payload->arena, vertices, sizeof *self.left);
+    payload->copied_from = strl_arena_alloc(payload->arena, payload->base_vertices, sizeof *payload->copied_from);
+    if (!self.copy || !self.taken || !self.left || !payload->copied_from)
+        return strl__fail(payload->err, STRL_ERR_MEMORY, "no memory for copies of %u vertices", vertices);
+    memset(self.copy, 0xff, vertices * sizeof *self.copy);
+    for (uint32_t t = 0; t < self.from->triangle_count; t++) {
+        const uint16_t *corners = self.from->triangle[t];
+        uint32_t leave = strl__v_pull(payload, STRL__V_SELECT + context_of(&self, corners));
+        if (payload->starved || leave > 1 || (leave == 0 && !copy_triangle(&self, corners)))
+            return strl__fail(payload->err, STRL_ERR_FORMAT, "copies, triangle %u of the parent: out of range", t);
+        for (unsigned k = 0; k < 3; k++)
+            (leave ? self.left : self.taken)[corners[k]] = true;
+    }
+    payload->copied = payload->vertex_count;
+    return STRL_OK;
+}
