@@ -14,8 +14,8 @@ static void encode_again(const strl_pm *pm, strl_arena *arena)
     strl_error err = {0};
     strl_writer writer = {0};
     strl_pm again;
-    if (strl_payload_encode(pm, arena, &writer, &err) ||
-        strl_payload_decode(writer.data, writer.size, arena, &again, &err) || again.vertex_count != pm->vertex_count ||
+    if (strl_payload_encode(pm, NULL, arena, &writer, &err) ||
+        strl_payload_decode(writer.data, writer.size, NULL, arena, &again, &err) || again.vertex_count != pm->vertex_count ||
         again.triangle_count != pm->triangle_count ||
         memcmp(again.vertex_end, pm->vertex_end, (pm->step_count + 1) * sizeof *pm->vertex_end) ||
         memcmp(again.triangle_end, pm->triangle_end, (pm->step_count + 1) * sizeof *pm->triangle_end) ||
@@ -32,7 +32,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     strl_payload_sizes sizes;
     strl_arena_init(&arena, (size_t)512 << 20);
     strl_status peek = strl_payload_peek(data, size, &sizes, &err);
-    strl_status status = strl_payload_decode(data, size, &arena, &pm, &err);
+    strl_status status = strl_payload_decode(data, size, NULL, &arena, &pm, &err);
     if ((peek && !status) || (status && (status != STRL_ERR_FORMAT || !err.message[0])))
         abort();
     if (!status) {

@@ -102,6 +102,8 @@ static int run(strl_cli_args *args)
         {.name = "grid", .kind = STRL_CLI_REAL, .value = &desc.grid, .argument = "STEP",
          .help = "largest lattice step, model units; one below a 2^30th of the extent is refused (chosen from the model)",
          .least = 1e-300, .most = 1e300},
+        {.name = "compact", .kind = STRL_CLI_FLAG, .value = &desc.compact,
+         .help = "for the network: a lattice step of at most a 32nd of the median edge unless --grid is given, normals of 2 x 8 bits"},
         {.name = "up", .kind = STRL_CLI_ENUM, .value = &desc.up_axis, .argument = "auto|x|y|z",
          .help = "which axis points up; stored, never applied (auto: y for OBJ, z for PLY and STL)"},
         {.name = "unit", .kind = STRL_CLI_ENUM, .value = &unit, .given = &unit_given, .argument = STRL_CLI_UNITS,

@@ -28,6 +28,7 @@ typedef struct strl_build_desc {
     unsigned jobs;          /* threads that work; 0 = one per processor */
     double grid;            /* lattice step wanted, model units; 0 = chosen; rounded down to a power of two; refused where it
                                is less than about a 2^30th of the extent */
+    bool compact;           /* for the network: a coarser lattice where grid is 0, normals of 2 x 8 bits */
     int up_axis;            /* 1 x, 2 y, 3 z; 0 = the inputs' own */
     const char *unit;       /* NULL = unknown */
     bool no_dependencies;   /* for measuring what dependencies bring: every group has one member */

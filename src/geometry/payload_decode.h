@@ -8,6 +8,7 @@
 
 struct strl__decoder {
     strl_payload_sizes sizes;
+    uint32_t normal_most; /* the largest coordinate of a normal, as the payload holds it */
     struct strl__streams_in in;
     struct strl__mesh mesh;
     strl_pm *pm;

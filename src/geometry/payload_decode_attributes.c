@@ -7,20 +7,23 @@
 
 static void decode_normal(struct strl__decoder *d, uint32_t v, const uint32_t predicted[2], unsigned stream)
 {
-    for (unsigned k = 0; k < 2; k++)
-        d->pm->normal[v][k] = (uint16_t)((predicted[k] + strl__unzigzag(strl__pull(&d->in, stream + k))) & 1023u);
+    for (unsigned k = 0; k < 2; k++) {
+        uint32_t narrow = (predicted[k] + strl__unzigzag(strl__pull(&d->in, stream + k))) & d->normal_most;
+        d->pm->normal[v][k] = (uint16_t)strl__normal_widen(narrow, d->normal_most);
+    }
 }
 
 static bool decode_normals(struct strl__decoder *d)
 {
     uint64_t(*sum)[4] = strl__normal_sums(&d->mesh, d->scratch);
+    uint32_t predicted[2];
     for (uint32_t v = 0; v < d->copied; v++) {
-        const uint16_t *there = strl__reference_normal(d->reference, d->copied_from[v]);
-        decode_normal(d, v, (uint32_t[2]){there[0], there[1]}, STRL__STREAM_COPY_NORMAL);
+        for (unsigned k = 0; k < 2; k++)
+            predicted[k] = strl__normal_narrow(strl__reference_normal(d->reference, d->copied_from[v])[k], d->normal_most);
+        decode_normal(d, v, predicted, STRL__STREAM_COPY_NORMAL);
     }
     for (uint32_t v = d->copied; sum && v < d->sizes.vertex_count; v++) {
-        uint32_t predicted[2];
-        strl__normal_predict(sum[v], predicted);
+        strl__normal_predict(sum[v], d->normal_most, predicted);
         decode_normal(d, v, predicted, STRL__STREAM_NORMAL);
     }
     return sum;

@@ -32,6 +32,9 @@ strl_status strl__encode_base(struct strl__encoder *encoder);
 strl_status strl__encode_steps(struct strl__encoder *encoder);
 strl_status strl__encode_attributes(struct strl__encoder *encoder);
 
+/* 8 where that is enough for all normals, else 10. */
+unsigned strl__normal_bits(const strl_pm *pm);
+
 /* All that a payload says, for strl__streams_write; *streams is the caller's to deinit, on failure too. */
 strl_status strl__payload_collect(const strl_pm *pm, const strl_payload_reference *reference, strl_arena *scratch,
                                   struct strl__streams_out *streams, strl_error *err);

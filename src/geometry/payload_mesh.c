@@ -50,7 +50,7 @@ uint64_t (*strl__normal_sums(const struct strl__mesh *mesh, strl_arena *scratch)
 }
 
 /* strl_oct_encode in integers, after scaling the sum to 18 bits. */
-void strl__normal_predict(const uint64_t sum[4], uint32_t predicted[2])
+void strl__normal_predict(const uint64_t sum[4], uint32_t most, uint32_t predicted[2])
 {
     uint64_t magnitude[3], all = 1;
     for (unsigned k = 0; k < 3; k++) {
@@ -62,7 +62,7 @@ void strl__normal_predict(const uint64_t sum[4], uint32_t predicted[2])
             z = (int32_t)(magnitude[2] >> shift);
     int32_t length = x + y + z;
     if (length == 0) {
-        predicted[0] = predicted[1] = 512;
+        predicted[0] = predicted[1] = (most + 1) / 2;
         return;
     }
     if (sum[2] >> 63) { /* fold the lower half outward */
@@ -72,6 +72,6 @@ void strl__normal_predict(const uint64_t sum[4], uint32_t predicted[2])
     }
     x = sum[0] >> 63 ? -x : x;
     y = sum[1] >> 63 ? -y : y;
-    predicted[0] = ((uint32_t)(x + length) * 1023u + (uint32_t)length) / (2 * (uint32_t)length);
-    predicted[1] = ((uint32_t)(y + length) * 1023u + (uint32_t)length) / (2 * (uint32_t)length);
+    predicted[0] = ((uint32_t)(x + length) * most + (uint32_t)length) / (2 * (uint32_t)length);
+    predicted[1] = ((uint32_t)(y + length) * most + (uint32_t)length) / (2 * (uint32_t)length);
 }

@@ -162,6 +162,16 @@ static inline void strl__mean_get(const struct strl__mean *mean, const int32_t p
 /* ---- attributes: predicted over the finest state ---- */
 /* Integer normals of all vertices from the finest triangles; sums wrap. NULL without memory. */
 uint64_t (*strl__normal_sums(const struct strl__mesh *mesh, strl_arena *scratch))[4];
-void strl__normal_predict(const uint64_t sum[4], uint32_t predicted[2]);
+void strl__normal_predict(const uint64_t sum[4], uint32_t most, uint32_t predicted[2]);
+
+/* A normal's coordinate, 0 to 1023, in a payload whose coordinates go up to `most`, and back. */
+static inline uint32_t strl__normal_narrow(uint32_t coordinate, uint32_t most)
+{
+    return (coordinate * most + 511) / 1023;
+}
+static inline uint32_t strl__normal_widen(uint32_t narrow, uint32_t most)
+{
+    return (narrow * 1023 + most / 2) / most;
+}
 
 #endif

@@ -6,7 +6,7 @@
 
 #include "base/fail.h"
 
-#define HEAD_BYTES 38u
+#define HEAD_BYTES 39u
 #define MOST_TRIANGLES 131072u
 
 bool strl__v_add_triangle(strl__v_payload *self, uint32_t a, uint32_t b, uint32_t c)
@@ -31,6 +31,7 @@ static strl_status read_head(strl__v_payload *self, strl_cursor *cursor)
 {
     uint32_t version = strl_cursor_u8(cursor);
     self->flags = strl_cursor_u8(cursor);
+    self->normal_bits = strl_cursor_u8(cursor);
     self->vertices = strl_cursor_u16(cursor);
     self->base_vertices = strl_cursor_u16(cursor);
     self->steps = strl_cursor_u16(cursor);
@@ -45,6 +46,8 @@ static strl_status read_head(strl__v_payload *self, strl_cursor *cursor)
     if (version != 1 || self->flags > 7)
         return strl__fail(self->err, STRL_ERR_FORMAT, "payload of version %" PRIu32 " with flags %" PRIu32, version,
                           self->flags);
+    if (self->normal_bits != 8 && self->normal_bits != 10)
+        return strl__fail(self->err, STRL_ERR_FORMAT, "payload with normals of %" PRIu32 " bits", self->normal_bits);
     if ((self->flags & 4) == 0 ? self->told_by != NULL : self->told_by == NULL)
         return strl__fail(self->err, STRL_ERR_FORMAT, "payload with flags %" PRIu32 ", but its record says that it is %s",
                           self->flags, self->told_by ? "told by its parent's" : "self-contained");

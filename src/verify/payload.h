@@ -41,7 +41,7 @@ typedef struct strl__v_payload {
     strl__vmesh *mesh;
     strl_arena *arena; /* for what stays and what does not */
     strl_error *err;
-    uint32_t flags, words, coder[4];
+    uint32_t flags, normal_bits, words, coder[4];
     uint32_t base_vertices, base_triangles, vertices, triangles, steps, entries; /* Vb, Tb, V, T, S, P */
     const strl__vmesh *told_by; /* the parent's mesh; NULL: self-contained */
     uint32_t offset[3];         /* to be added to its positions */

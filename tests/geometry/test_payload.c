@@ -92,7 +92,7 @@ static void encode(const strl_pm *pm, strl_writer *writer)
     strl_arena scratch;
     strl_error err = {0};
     strl_arena_init(&scratch, 0);
-    if (strl_payload_encode(pm, &scratch, writer, &err))
+    if (strl_payload_encode(pm, NULL, &scratch, writer, &err))
         fail_msg("%s", err.message);
     strl_arena_deinit(&scratch);
 }
@@ -112,14 +112,14 @@ static size_t assert_round_trip(const strl_pm *pm)
     assert_int_equal(strl_payload_peek(writer.data, writer.size, &sizes, &err), STRL_OK);
     assert_int_equal(sizes.vertex_count, pm->vertex_count);
     assert_int_equal(sizes.base_triangle_count, pm->triangle_end[0]);
-    if (strl_payload_decode(writer.data, writer.size, &arena, &decoded, &err) || strl_pm_check(&decoded, &err))
+    if (strl_payload_decode(writer.data, writer.size, NULL, &arena, &decoded, &err) || strl_pm_check(&decoded, &err))
         fail_msg("%s", err.message);
     assert_same_states(pm, &decoded);
     /* What came back is a fixed point but for the order of base vertices, so its size can differ only a little. */
     strl_writer again = {0};
     encode(&decoded, &again);
     strl_pm twice;
-    assert_int_equal(strl_payload_decode(again.data, again.size, &arena, &twice, &err), STRL_OK);
+    assert_int_equal(strl_payload_decode(again.data, again.size, NULL, &arena, &twice, &err), STRL_OK);
     assert_same_states(&decoded, &twice);
     size_t size = writer.size;
     strl__free(again.data);
@@ -389,7 +389,7 @@ static strl_status decode_and_check(const uint8_t *data, size_t size)
     uint8_t *exact = malloc(size ? size : 1); /* so that a sanitizer sees a read past the end */
     assert_non_null(exact);
     memcpy(exact, data, size);
-    strl_status status = strl_payload_decode(exact, size, &arena, &pm, &err);
+    strl_status status = strl_payload_decode(exact, size, NULL, &arena, &pm, &err);
     if (!status && strl_pm_check(&pm, &err))
         fail_msg("accepted, but: %s", err.message);
     if (status)
@@ -493,8 +493,8 @@ static void without_memory_both_directions_fail_cleanly(void **state)
             strl_pm decoded;
             strl_arena_init(&scratch, 0);
             strl__alloc_fail_after(n);
-            status = direction ? strl_payload_encode(&pm, &scratch, &writer, &err)
-                               : strl_payload_decode(sound.data, sound.size, &scratch, &decoded, &err);
+            status = direction ? strl_payload_encode(&pm, NULL, &scratch, &writer, &err)
+                               : strl_payload_decode(sound.data, sound.size, NULL, &scratch, &decoded, &err);
             strl__alloc_fail_after(0);
             assert_true(status == STRL_OK || status == STRL_ERR_MEMORY);
             assert_true(n > 1 || status == STRL_ERR_MEMORY);
@@ -545,7 +545,7 @@ static void the_checker_finds_what_is_broken(void **state)
     pm.normal[0][0] = 5000;
     strl_arena scratch;
     strl_arena_init(&scratch, 0);
-    assert_int_not_equal(strl_payload_encode(&pm, &scratch, &writer, &err), STRL_OK);
+    assert_int_not_equal(strl_payload_encode(&pm, NULL, &scratch, &writer, &err), STRL_OK);
     assert_int_equal(writer.size, 0);
     strl_arena_deinit(&scratch);
     strl__free(writer.data);

@@ -68,8 +68,8 @@ static void compare_decoders(const uint8_t *data, size_t size, decode_tally *tal
     strl__vmesh own;
     strl_arena_init(&a, 0);
     strl_arena_init(&b, 0);
-    strl_status one = strl_payload_decode(data, size, &a, &mesh, NULL);
-    strl_status other = strl__v_payload_decode(data, size, &b, true, &own, NULL);
+    strl_status one = strl_payload_decode(data, size, NULL, &a, &mesh, NULL);
+    strl_status other = strl__v_payload_decode(data, size, NULL, &b, true, &own, NULL);
     if (other == STRL_OK)
         other = strl__v_mesh_check_ranges(&own, NULL);
     if (other == STRL_OK)
@@ -103,7 +103,7 @@ static void visit(void *context, uint32_t id, strl_node *record, strl_pm *mesh, 
     (void)record;
     if (id % 2)
         paint(mesh, arena, id);
-    assert_int_equal(strl_payload_encode(mesh, arena, &payload, NULL), STRL_OK);
+    assert_int_equal(strl_payload_encode(mesh, NULL, arena, &payload, NULL), STRL_OK);
     uint32_t before = tally->accepted;
     compare_decoders(payload.data, payload.size, tally);
     assert_int_equal(tally->accepted, before + 1);
