@@ -6,45 +6,27 @@
 #include "base/fail.h"
 #include "geometry/payload_reference.h"
 
-/* The copy of the reference's vertex `from`: a new vertex, one beside another copy, or that copy itself. */
-static bool copy_vertex(struct strl__decoder *d, struct strl__copy *copy, uint32_t from, uint32_t before, uint32_t *vertex)
-{
-    struct strl__mesh *mesh = &d->mesh;
-    uint32_t code = strl__pull(&d->in, STRL__STREAM_COPY), count = mesh->vertex_count;
-    uint32_t other = count - 1 - ((code - 1) >> 1);
-    int32_t position[3];
-    strl__reference_place(d->reference, from, position);
-    if (code && ((code - 1) >> 1 >= count || !strl__is_at(mesh->position[other], position)))
-        return false;
-    if (code && !(code & 1)) {
-        *vertex = other;
-    } else if (count >= d->sizes.base_vertex_count) {
-        return false;
-    } else {
-        *vertex = mesh->vertex_count++;
-        d->copied_from[count] = (uint16_t)from;
-        d->from[count] = (uint16_t)before;
-        for (unsigned k = 0; k < 3; k++)
-            mesh->position[count][k] = position[k];
-        if (code)
-            strl__twin_join(mesh->twin, other, count);
-    }
-    copy->number[from] = (uint16_t)*vertex;
-    return true;
-}
-
 static bool copy_triangle(struct strl__decoder *d, struct strl__copy *copy, const uint16_t from[3])
 {
-    uint32_t corner[3], before = d->mesh.vertex_count ? d->mesh.vertex_count - 1 : 0;
-    if (d->mesh.triangle_count >= d->sizes.base_triangle_count)
+    struct strl__mesh *mesh = &d->mesh;
+    uint32_t corner[3], before = mesh->vertex_count ? mesh->vertex_count - 1 : 0;
+    if (mesh->triangle_count >= d->sizes.base_triangle_count)
         return false;
     for (unsigned k = 0; k < 3; k++) {
         corner[k] = copy->number[from[k]];
-        if (corner[k] == STRL__NO_NUMBER && !copy_vertex(d, copy, from[k], before, &corner[k]))
-            return false;
+        if (corner[k] == STRL__NO_NUMBER) {
+            corner[k] = mesh->vertex_count;
+            if (corner[k] >= d->sizes.base_vertex_count)
+                return false;
+            mesh->vertex_count++;
+            copy->number[from[k]] = (uint16_t)corner[k];
+            d->copied_from[corner[k]] = from[k];
+            d->from[corner[k]] = (uint16_t)before;
+            strl__reference_place(d->reference, from[k], mesh->position[corner[k]]);
+        }
         before = corner[k];
     }
-    strl__mesh_add_triangle(&d->mesh, corner[0], corner[1], corner[2]);
+    strl__mesh_add_triangle(mesh, corner[0], corner[1], corner[2]);
     return true;
 }
 

@@ -89,13 +89,12 @@ static bool is_numbered(const struct strl__encoder *e, uint32_t vertex)
     return number < e->mesh.vertex_count && e->vertex[number] == vertex;
 }
 
-/* Whether the reference's corners can be the base triangle's from its corner `first` on: vertices correspond one to one,
- * but that two of the reference may be one here. */
+/* Whether the reference's corners can be the base triangle's from its corner `first` on: vertices correspond one to one. */
 static bool agrees(const struct matcher *m, const uint16_t from[3], uint32_t t, unsigned first)
 {
     for (unsigned k = 0; k < 3; k++) {
         uint32_t vertex = m->e->birth[t][(first + k) % 3], number = m->copy.number[from[k]];
-        if (number != STRL__NO_NUMBER && m->e->vertex[number] != vertex)
+        if (number == STRL__NO_NUMBER ? is_numbered(m->e, vertex) : m->e->vertex[number] != vertex)
             return false;
     }
     return true;
@@ -122,36 +121,26 @@ static uint32_t find_triangle(const struct matcher *m, const uint16_t from[3])
     return STRL__NONE;
 }
 
-/* The number of the base vertex as a copy of the reference's. *twin: [base vertices], the newest copy at each place. */
-static uint32_t number_copy(struct matcher *m, uint32_t vertex, uint32_t from, uint32_t before, uint32_t *newest)
+/* Numbers the base vertex as the copy of the reference's. */
+static uint32_t number_copy(struct matcher *m, uint32_t vertex, uint32_t from, uint32_t before)
 {
     struct strl__encoder *e = m->e;
-    uint32_t count = e->mesh.vertex_count, *twin = &newest[m->place[vertex]];
-    if (is_numbered(e, vertex)) {
-        strl__push(&e->out, STRL__STREAM_COPY, STRL__COPY_SAME + 2 * (count - 1 - e->number[vertex]));
-    } else {
-        strl__push(&e->out, STRL__STREAM_COPY, *twin == STRL__NONE ? STRL__COPY_NEW : STRL__COPY_TWIN + 2 * (count - 1 - *twin));
-        e->number[vertex] = (uint16_t)count;
-        e->vertex[count] = (uint16_t)vertex;
-        e->copied_from[count] = (uint16_t)from;
-        e->from[count] = (uint16_t)before;
-        memcpy(e->mesh.position[count], e->pm->position[vertex], sizeof *e->pm->position);
-        e->mesh.vertex_count++;
-        if (*twin != STRL__NONE)
-            strl__twin_join(e->mesh.twin, *twin, count);
-        *twin = count;
-    }
-    m->copy.number[from] = e->number[vertex];
-    return e->number[vertex];
+    uint32_t number = e->mesh.vertex_count++;
+    e->number[vertex] = m->copy.number[from] = (uint16_t)number;
+    e->vertex[number] = (uint16_t)vertex;
+    e->copied_from[number] = (uint16_t)from;
+    e->from[number] = (uint16_t)before;
+    memcpy(e->mesh.position[number], e->pm->position[vertex], sizeof *e->pm->position);
+    return number;
 }
 
-static void encode_triangle(struct matcher *m, const uint16_t from[3], uint32_t found, uint32_t *newest)
+static void encode_triangle(struct matcher *m, const uint16_t from[3], uint32_t found)
 {
     uint32_t corner[3], count = m->e->mesh.vertex_count, before = count ? count - 1 : 0;
     for (unsigned k = 0; k < 3; k++) {
         corner[k] = m->copy.number[from[k]];
         if (corner[k] == STRL__NO_NUMBER)
-            corner[k] = number_copy(m, m->e->birth[found / 3][(found % 3 + k) % 3], from[k], before, newest);
+            corner[k] = number_copy(m, m->e->birth[found / 3][(found % 3 + k) % 3], from[k], before);
         before = corner[k];
     }
     strl__encode_triangle(m->e, found / 3, found % 3, corner);
@@ -162,17 +151,15 @@ strl_status strl__encode_copies(struct strl__encoder *e)
     struct matcher m = {.e = e};
     if (!e->reference)
         return STRL_OK;
-    uint32_t *newest = strl_arena_alloc(e->scratch, e->pm->vertex_end[0], sizeof *newest);
-    if (!newest || !matcher_init(&m))
+    if (!matcher_init(&m))
         return strl__fail(e->err, STRL_ERR_MEMORY, "no memory to encode a node payload");
-    memset(newest, 0xff, e->pm->vertex_end[0] * sizeof *newest);
     for (uint32_t t = 0; t < e->reference->triangle_count; t++) {
         const uint16_t *from = e->reference->triangle[t];
         uint32_t found = find_triangle(&m, from);
         strl__push(&e->out, STRL__STREAM_SELECT + strl__copy_context(&m.copy, from), found == STRL__NONE);
         strl__copy_mark(&m.copy, from, found == STRL__NONE);
         if (found != STRL__NONE)
-            encode_triangle(&m, from, found, newest);
+            encode_triangle(&m, from, found);
     }
     e->copied = e->mesh.vertex_count;
     return STRL_OK;

@@ -16,9 +16,6 @@ struct strl__copy {
     uint8_t *seen;    /* [its vertices], bit 0: a triangle at it was taken; bit 1: one was left */
 };
 
-/* What a copied vertex is, beside its position. */
-enum { STRL__COPY_NEW = 0, STRL__COPY_TWIN = 1, STRL__COPY_SAME = 2 }; /* + 2 * distance for the latter two */
-
 static inline bool strl__copy_init(struct strl__copy *copy, const strl_payload_reference *from, strl_arena *scratch)
 {
     copy->from = from;

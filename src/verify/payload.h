@@ -27,9 +27,8 @@ enum strl__v_stream_number {
     STRL__V_COLOUR,
     STRL__V_PALETTE = 30,
     STRL__V_SELECT = 33, /* one a context */
-    STRL__V_COPY = 37,
-    STRL__V_COPY_NORMAL,
-    STRL__V_STREAMS = 40
+    STRL__V_COPY_NORMAL = 37,
+    STRL__V_STREAMS = 39
 };
 
 typedef struct strl__v_stream {

@@ -25,27 +25,11 @@ static unsigned context_of(const copying *self, const uint16_t corners[3])
 static bool copy_vertex(copying *self, uint32_t vertex, uint32_t before)
 {
     strl__v_payload *p = self->payload;
-    uint32_t value = strl__v_pull(p, STRL__V_COPY), number = p->vertex_count, other = NONE;
-    int32_t position[3];
-    for (unsigned k = 0; k < 3; k++)
-        position[k] = (int32_t)((uint32_t)self->from->position[vertex][k] + p->offset[k]);
-    if (value > 0) {
-        uint32_t distance = (value - 1) / 2;
-        if (distance >= number)
-            return false;
-        other = number - 1 - distance;
-        if (memcmp(p->mesh->position[other], position, sizeof position) != 0)
-            return false;
-    }
-    if (value > 0 && value % 2 == 0) {
-        self->copy[vertex] = other;
-        return true;
-    }
+    uint32_t number = p->vertex_count;
     if (number == p->base_vertices)
         return false;
-    memcpy(p->mesh->position[number], position, sizeof position);
-    if (other != NONE)
-        strl__v_join(p, number, other);
+    for (unsigned k = 0; k < 3; k++)
+        p->mesh->position[number][k] = (int32_t)((uint32_t)self->from->position[vertex][k] + p->offset[k]);
     p->from[number] = (uint16_t)before;
     p->copied_from[number] = (uint16_t)vertex;
     self->copy[vertex] = p->vertex_count++;
