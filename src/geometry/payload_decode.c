@@ -102,7 +102,7 @@ static strl_status decode_parts(struct strl__decoder *d, strl_cursor *cursor)
     if (!status && !strl__streams_done(&d->in))
         status = strl__fail(d->err, STRL_ERR_FORMAT, "node payload has numbers left over or too few");
     for (uint32_t t = 0; !status && t < sizes->triangle_count; t++)
-        strl__mesh_get_triangle(&d->mesh, t, d->pm->triangle[t]);
+        memcpy(d->pm->triangle[t], d->mesh.triangle[t], sizeof *d->pm->triangle);
     return status;
 }
 
@@ -110,7 +110,7 @@ static strl_status decode_parts(struct strl__decoder *d, strl_cursor *cursor)
  * decoding. Where more is needed, the arena grows as usual. It keeps to what the caller's arena may still take. */
 static void reserve(const struct strl__decoder *d, size_t size, const strl_arena *arena, strl_arena *scratch)
 {
-    size_t limit = 0, wanted = 2 * size + (size_t)d->sizes.vertex_count * 128 + (size_t)d->sizes.triangle_count * 64 +
+    size_t limit = 0, wanted = 2 * size + (size_t)d->sizes.vertex_count * 160 + (size_t)d->sizes.triangle_count * 64 +
                                (size_t)d->sizes.base_triangle_count * 60 + 32768;
     if (arena->limit_bytes)
         limit = arena->limit_bytes > arena->total_bytes ? arena->limit_bytes - arena->total_bytes : 1;

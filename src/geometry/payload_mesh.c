@@ -3,17 +3,45 @@
 bool strl__mesh_init(struct strl__mesh *mesh, uint32_t vertices, uint32_t triangles, int32_t (*position)[3],
                      strl_arena *scratch)
 {
-    *mesh = (struct strl__mesh){.position = position, .heads = triangles * 4};
-    mesh->corner = strl_arena_alloc(scratch, (size_t)triangles * 4 + vertices, sizeof *mesh->corner);
+    *mesh = (struct strl__mesh){.position = position, .chunk_count = vertices, .free_chunk = STRL__NONE};
+    /* Older chunks are always full. */
+    size_t chunks = (size_t)vertices + (size_t)triangles * 3 / STRL__CHUNK_CORNERS + 1;
+    uint8_t *lines = strl_arena_alloc(scratch, chunks + 1, sizeof *mesh->chunk);
+    mesh->triangle = strl_arena_alloc(scratch, triangles, sizeof *mesh->triangle);
     mesh->twin = strl_arena_alloc(scratch, vertices, sizeof *mesh->twin);
-    if (!mesh->corner || !mesh->twin)
+    if (!lines || !mesh->triangle || !mesh->twin)
         return false;
+    mesh->chunk = (struct strl__chunk *)(void *)(lines + (0 - (uintptr_t)lines) % sizeof *mesh->chunk);
     for (uint32_t v = 0; v < vertices; v++) {
-        uint32_t head = mesh->heads + v;
-        mesh->corner[head] = (struct strl__corner){.next = head, .previous = head};
+        mesh->chunk[v].count = 0;
+        mesh->chunk[v].older = STRL__NONE;
         mesh->twin[v] = (uint16_t)v;
     }
     return true;
+}
+
+void strl__mesh_age_chunk(struct strl__mesh *mesh, uint32_t vertex)
+{
+    uint32_t aged = mesh->free_chunk;
+    if (aged == STRL__NONE)
+        aged = mesh->chunk_count++;
+    else
+        mesh->free_chunk = mesh->chunk[aged].older;
+    mesh->chunk[aged] = mesh->chunk[vertex];
+    mesh->chunk[vertex].count = 0;
+    mesh->chunk[vertex].older = aged;
+}
+
+void strl__mesh_clear(struct strl__mesh *mesh, uint32_t vertex)
+{
+    struct strl__chunk *chunk = &mesh->chunk[vertex];
+    while (chunk->older != STRL__NONE) {
+        uint32_t freed = chunk->older;
+        chunk->older = mesh->chunk[freed].older;
+        mesh->chunk[freed].older = mesh->free_chunk;
+        mesh->free_chunk = freed;
+    }
+    chunk->count = 0;
 }
 
 bool strl__star_init(struct strl__star *star, uint32_t vertices, uint32_t triangles, strl_arena *scratch)
@@ -31,8 +59,7 @@ uint64_t (*strl__normal_sums(const struct strl__mesh *mesh, strl_arena *scratch)
     const int32_t(*position)[3] = (const int32_t(*)[3])mesh->position;
     uint64_t(*sum)[4] = strl_arena_alloc_zero(scratch, mesh->vertex_count, sizeof *sum);
     for (uint32_t t = 0; sum && t < mesh->triangle_count; t++) {
-        uint16_t corner[3];
-        strl__mesh_get_triangle(mesh, t, corner);
+        const uint16_t *corner = mesh->triangle[t];
         const int32_t *p = position[corner[0]], *q = position[corner[1]], *r = position[corner[2]];
         uint64_t a[3], b[3], n[4] = {0};
         for (unsigned k = 0; k < 3; k++) {

@@ -12,18 +12,21 @@
 
 #define STRL__NONE 0xffffffffu
 
-/* Corner k of triangle t has the number 4 t + k; every fourth is unused. Behind them lies one head for each vertex: the
- * list of the corners at a vertex is a ring through its head, newest first. What a walk round a vertex needs lies
- * together. */
-struct strl__corner {
-    uint32_t next, previous;
-    uint16_t wing[2]; /* the vertices that follow in the triangle */
+/* Corner k of triangle t has the number 4 t + k; every fourth is unused. */
+#define STRL__CHUNK_CORNERS 14u
+
+/* The newest corners at a vertex, oldest first: one cache line, which is enough for most. */
+struct strl__chunk {
+    uint32_t corner[STRL__CHUNK_CORNERS];
+    uint32_t count;
+    uint32_t older; /* a full chunk, or STRL__NONE */
 };
 
 struct strl__mesh {
     int32_t (*position)[3];
-    struct strl__corner *corner;
-    uint32_t heads;                        /* the number of vertex 0's head */
+    uint16_t (*triangle)[4];   /* [triangles], three corners */
+    struct strl__chunk *chunk; /* vertex v's is number v; behind those of all vertices lie the older ones */
+    uint32_t chunk_count, free_chunk; /* older chunks come from a list of free ones, or from the end */
     uint16_t *twin;                        /* [vertices], rings of vertices known to share a position */
     uint32_t vertex_count, triangle_count; /* so far */
 };
@@ -41,46 +44,28 @@ static inline unsigned strl__last3(unsigned k)
     return 18u >> (2 * k) & 3;
 }
 
+/* Puts the full chunk of a vertex behind a new one. */
+void strl__mesh_age_chunk(struct strl__mesh *mesh, uint32_t vertex);
+/* Empties a vertex's list. */
+void strl__mesh_clear(struct strl__mesh *mesh, uint32_t vertex);
+
 static inline void strl__mesh_push_corner(struct strl__mesh *mesh, uint32_t corner, uint32_t vertex)
 {
-    struct strl__corner *corners = mesh->corner;
-    uint32_t head = mesh->heads + vertex, next = corners[head].next;
-    corners[corner].next = next;
-    corners[corner].previous = head;
-    corners[next].previous = corner;
-    corners[head].next = corner;
+    struct strl__chunk *chunk = &mesh->chunk[vertex];
+    if (chunk->count == STRL__CHUNK_CORNERS)
+        strl__mesh_age_chunk(mesh, vertex);
+    chunk->corner[chunk->count++] = corner;
 }
 
 static inline void strl__mesh_add_triangle(struct strl__mesh *mesh, uint32_t a, uint32_t b, uint32_t c)
 {
-    uint32_t corner = 4 * mesh->triangle_count++;
-    struct strl__corner *corners = &mesh->corner[corner];
-    corners[0].wing[0] = corners[2].wing[1] = (uint16_t)b;
-    corners[1].wing[0] = corners[0].wing[1] = (uint16_t)c;
-    corners[2].wing[0] = corners[1].wing[1] = (uint16_t)a;
-    strl__mesh_push_corner(mesh, corner, a);
-    strl__mesh_push_corner(mesh, corner + 1, b);
-    strl__mesh_push_corner(mesh, corner + 2, c);
-}
-
-/* Takes a corner out of its list and puts it in front of vertex's. */
-static inline void strl__mesh_move_corner(struct strl__mesh *mesh, uint32_t corner, uint32_t vertex)
-{
-    struct strl__corner *corners = mesh->corner;
-    uint32_t next = corners[corner].next, previous = corners[corner].previous;
-    corners[previous].next = next;
-    corners[next].previous = previous;
-    strl__mesh_push_corner(mesh, corner, vertex);
-    corners[(corner & ~3u) + strl__next3(corner & 3)].wing[1] = (uint16_t)vertex;
-    corners[(corner & ~3u) + strl__last3(corner & 3)].wing[0] = (uint16_t)vertex;
-}
-
-static inline void strl__mesh_get_triangle(const struct strl__mesh *mesh, uint32_t t, uint16_t vertex[3])
-{
-    const struct strl__corner *corner = &mesh->corner[4 * t];
-    vertex[0] = corner[1].wing[1];
-    vertex[1] = corner[0].wing[0];
-    vertex[2] = corner[0].wing[1];
+    uint32_t t = mesh->triangle_count++;
+    mesh->triangle[t][0] = (uint16_t)a;
+    mesh->triangle[t][1] = (uint16_t)b;
+    mesh->triangle[t][2] = (uint16_t)c;
+    strl__mesh_push_corner(mesh, 4 * t, a);
+    strl__mesh_push_corner(mesh, 4 * t + 1, b);
+    strl__mesh_push_corner(mesh, 4 * t + 2, c);
 }
 
 static inline bool strl__is_at(const int32_t p[3], const int32_t q[3])
@@ -113,16 +98,39 @@ bool strl__star_init(struct strl__star *star, uint32_t vertices, uint32_t triang
 
 static inline void strl__star_build(struct strl__star *star, const struct strl__mesh *mesh, uint32_t vertex)
 {
-    const struct strl__corner *corners = mesh->corner;
-    uint32_t count = 0, heads = mesh->heads, *corner = star->corner, *begins = star->begins;
+    const uint16_t(*triangle)[4] = (const uint16_t(*)[4])mesh->triangle;
+    uint32_t count = 0, *corner = star->corner, *begins = star->begins;
     uint16_t(*wing)[2] = star->wing;
-    for (uint32_t c = corners[heads + vertex].next; c < heads; c = corners[c].next) {
-        corner[count] = c;
-        wing[count][0] = corners[c].wing[0];
-        wing[count][1] = corners[c].wing[1];
-        begins[corners[c].wing[0]] = count++;
+    for (uint32_t c = vertex; c != STRL__NONE; c = mesh->chunk[c].older) {
+        const struct strl__chunk *chunk = &mesh->chunk[c];
+        for (uint32_t i = chunk->count; i-- > 0; count++) {
+            uint32_t at = chunk->corner[i], k = at & 3;
+            uint16_t x = triangle[at >> 2][strl__next3(k)];
+            corner[count] = at;
+            wing[count][0] = x;
+            wing[count][1] = triangle[at >> 2][strl__last3(k)];
+            begins[x] = count;
+        }
     }
     star->count = count;
+}
+
+/* The corners at `moved` places, for which star->moves is set, go from the star's vertex to another, which had none in
+ * the star; the last of them comes to its front. Clears star->moves. */
+static inline void strl__star_move(struct strl__star *star, struct strl__mesh *mesh, uint32_t from, uint32_t to,
+                                   const uint32_t *place, uint32_t moved)
+{
+    if (moved)
+        strl__mesh_clear(mesh, from);
+    for (uint32_t i = moved ? star->count : 0; i-- > 0;)
+        if (!star->moves[i])
+            strl__mesh_push_corner(mesh, star->corner[i], from);
+    for (uint32_t i = 0; i < moved; i++) {
+        uint32_t corner = star->corner[place[i]];
+        star->moves[place[i]] = 0;
+        mesh->triangle[corner >> 2][corner & 3] = (uint16_t)to;
+        strl__mesh_push_corner(mesh, corner, to);
+    }
 }
 
 /* The place of the triangle that follows (vertex, x, y) round the vertex: the last with y for its x. STRL__NONE without
