@@ -89,7 +89,7 @@ static strl_status decode_parts(struct strl__decoder *d, strl_cursor *cursor)
     strl_status status = strl__streams_read(cursor, cursor->size, items, d->scratch, &d->in, d->err);
     if (status)
         return status;
-    d->from = strl_arena_alloc(d->scratch, sizes->base_vertex_count, sizeof *d->from);
+    d->from = strl_arena_alloc(d->scratch, (size_t)sizes->base_vertex_count + 3, sizeof *d->from);
     if (!d->from || !strl__mesh_init(&d->mesh, sizes->vertex_count, sizes->triangle_count, d->pm->position, d->scratch))
         return strl__fail(d->err, STRL_ERR_MEMORY, "no memory to decode a node payload");
     status = strl__decode_copies(d);

@@ -5,26 +5,27 @@
 #include "base/fail.h"
 #include "geometry/payload_reference.h"
 
-static void decode_normal(struct strl__decoder *d, uint32_t v, const uint32_t predicted[2], unsigned stream)
+static inline void decode_normal(struct strl__decoder *d, uint32_t v, const uint32_t predicted[2], unsigned stream, uint32_t most)
 {
     for (unsigned k = 0; k < 2; k++) {
-        uint32_t narrow = (predicted[k] + strl__unzigzag(strl__pull(&d->in, stream + k))) & d->normal_most;
-        d->pm->normal[v][k] = (uint16_t)strl__normal_widen(narrow, d->normal_most);
+        uint32_t narrow = (predicted[k] + strl__unzigzag(strl__pull(&d->in, stream + k))) & most;
+        d->pm->normal[v][k] = (uint16_t)strl__normal_widen(narrow, most);
     }
 }
 
-static bool decode_normals(struct strl__decoder *d)
+/* Inlined with `most` a constant, by which it divides. */
+static inline __attribute__((always_inline)) bool decode_normals(struct strl__decoder *d, uint32_t most)
 {
     uint64_t(*sum)[4] = strl__normal_sums(&d->mesh, d->scratch);
     uint32_t predicted[2];
     for (uint32_t v = 0; v < d->copied; v++) {
         for (unsigned k = 0; k < 2; k++)
-            predicted[k] = strl__normal_narrow(strl__reference_normal(d->reference, d->copied_from[v])[k], d->normal_most);
-        decode_normal(d, v, predicted, STRL__STREAM_COPY_NORMAL);
+            predicted[k] = strl__normal_narrow(strl__reference_normal(d->reference, d->copied_from[v])[k], most);
+        decode_normal(d, v, predicted, STRL__STREAM_COPY_NORMAL, most);
     }
     for (uint32_t v = d->copied; sum && v < d->sizes.vertex_count; v++) {
-        strl__normal_predict(sum[v], d->normal_most, predicted);
-        decode_normal(d, v, predicted, STRL__STREAM_NORMAL);
+        strl__normal_predict(sum[v], most, predicted);
+        decode_normal(d, v, predicted, STRL__STREAM_NORMAL, most);
     }
     return sum;
 }
@@ -96,7 +97,7 @@ static bool decode_errors(struct strl__decoder *d, unsigned id, float *error)
 
 strl_status strl__decode_attributes(struct strl__decoder *d)
 {
-    if (!decode_normals(d))
+    if (!(d->normal_most == 255 ? decode_normals(d, 255) : decode_normals(d, 1023)))
         return strl__fail(d->err, STRL_ERR_MEMORY, "no memory to decode a node payload");
     if (d->pm->colour)
         decode_colours(d);

@@ -146,9 +146,26 @@ static void encode_triangle(struct matcher *m, const uint16_t from[3], uint32_t 
     strl__encode_triangle(m->e, found / 3, found % 3, corner);
 }
 
+/* Lengths of runs of triangles that are taken and left in turn, one sequence a context. */
+struct runs {
+    uint32_t length[STRL__SELECT_CONTEXTS];
+    bool leaves[STRL__SELECT_CONTEXTS];
+};
+
+static void push_choice(struct matcher *m, struct runs *runs, unsigned context, bool leave)
+{
+    if (runs->leaves[context] != leave) {
+        strl__push(&m->e->out, STRL__STREAM_SELECT + context, runs->length[context]);
+        runs->length[context] = 0;
+        runs->leaves[context] = leave;
+    }
+    runs->length[context]++;
+}
+
 strl_status strl__encode_copies(struct strl__encoder *e)
 {
     struct matcher m = {.e = e};
+    struct runs runs = {0};
     if (!e->reference)
         return STRL_OK;
     if (!matcher_init(&m))
@@ -156,11 +173,14 @@ strl_status strl__encode_copies(struct strl__encoder *e)
     for (uint32_t t = 0; t < e->reference->triangle_count; t++) {
         const uint16_t *from = e->reference->triangle[t];
         uint32_t found = find_triangle(&m, from);
-        strl__push(&e->out, STRL__STREAM_SELECT + strl__copy_context(&m.copy, from), found == STRL__NONE);
+        push_choice(&m, &runs, strl__copy_context(&m.copy, from), found == STRL__NONE);
         strl__copy_mark(&m.copy, from, found == STRL__NONE);
         if (found != STRL__NONE)
             encode_triangle(&m, from, found);
     }
+    for (unsigned i = 0; i < STRL__SELECT_CONTEXTS; i++)
+        if (runs.length[i])
+            strl__push(&e->out, STRL__STREAM_SELECT + i, runs.length[i]);
     e->copied = e->mesh.vertex_count;
     return STRL_OK;
 }

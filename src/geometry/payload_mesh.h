@@ -120,11 +120,20 @@ static inline void strl__star_build(struct strl__star *star, const struct strl__
 static inline void strl__star_move(struct strl__star *star, struct strl__mesh *mesh, uint32_t from, uint32_t to,
                                    const uint32_t *place, uint32_t moved)
 {
-    if (moved)
+    struct strl__chunk *chunk = &mesh->chunk[from];
+    if (chunk->older == STRL__NONE) {
+        uint32_t kept = 0;
+        for (uint32_t i = star->count; i-- > 0;) { /* without a branch on what moves: it cannot be foreseen */
+            chunk->corner[kept] = star->corner[i];
+            kept += !star->moves[i];
+        }
+        chunk->count = kept;
+    } else {
         strl__mesh_clear(mesh, from);
-    for (uint32_t i = moved ? star->count : 0; i-- > 0;)
-        if (!star->moves[i])
-            strl__mesh_push_corner(mesh, star->corner[i], from);
+        for (uint32_t i = star->count; i-- > 0;)
+            if (!star->moves[i])
+                strl__mesh_push_corner(mesh, star->corner[i], from);
+    }
     for (uint32_t i = 0; i < moved; i++) {
         uint32_t corner = star->corner[place[i]];
         star->moves[place[i]] = 0;

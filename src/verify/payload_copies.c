@@ -9,6 +9,8 @@ typedef struct copying {
     const strl__vmesh *from;
     uint32_t *copy;     /* [its vertices] number of the copy, or NONE */
     bool *taken, *left; /* [its vertices] a triangle at it was */
+    uint32_t run[4];    /* what is left of a context's run */
+    bool leaving[4];
 } copying;
 
 static unsigned context_of(const copying *self, const uint16_t corners[3])
@@ -20,6 +22,21 @@ static unsigned context_of(const copying *self, const uint16_t corners[3])
         context |= left && !taken ? 2u : 0u;
     }
     return context;
+}
+
+/* False where there is no run left. */
+static bool next_choice(copying *self, const uint16_t corners[3], bool *leave)
+{
+    unsigned context = context_of(self, corners);
+    while (self->run[context] == 0) {
+        self->run[context] = strl__v_pull(self->payload, STRL__V_SELECT + context);
+        self->leaving[context] = !self->leaving[context];
+        if (self->payload->starved)
+            return false;
+    }
+    self->run[context]--;
+    *leave = self->leaving[context];
+    return true;
 }
 
 static bool copy_vertex(copying *self, uint32_t vertex, uint32_t before)
@@ -52,7 +69,7 @@ static bool copy_triangle(copying *self, const uint16_t corners[3])
 
 strl_status strl__v_payload_copies(strl__v_payload *payload)
 {
-    copying self = {.payload = payload, .from = payload->told_by};
+    copying self = {.payload = payload, .from = payload->told_by, .leaving = {true, true, true, true}};
     if (!self.from)
         return STRL_OK;
     uint32_t vertices = self.from->vertex_count;
@@ -65,12 +82,14 @@ strl_status strl__v_payload_copies(strl__v_payload *payload)
     memset(self.copy, 0xff, vertices * sizeof *self.copy);
     for (uint32_t t = 0; t < self.from->triangle_count; t++) {
         const uint16_t *corners = self.from->triangle[t];
-        uint32_t leave = strl__v_pull(payload, STRL__V_SELECT + context_of(&self, corners));
-        if (payload->starved || leave > 1 || (leave == 0 && !copy_triangle(&self, corners)))
+        bool leave;
+        if (!next_choice(&self, corners, &leave) || (!leave && !copy_triangle(&self, corners)))
             return strl__fail(payload->err, STRL_ERR_FORMAT, "copies, triangle %u of the parent: out of range", t);
         for (unsigned k = 0; k < 3; k++)
             (leave ? self.left : self.taken)[corners[k]] = true;
     }
+    if (self.run[0] || self.run[1] || self.run[2] || self.run[3])
+        return strl__fail(payload->err, STRL_ERR_FORMAT, "copies: a run goes on past the parent's triangles");
     payload->copied = payload->vertex_count;
     return STRL_OK;
 }
