@@ -7,12 +7,13 @@ bool strl__mesh_init(struct strl__mesh *mesh, uint32_t vertices, uint32_t triang
     /* Older chunks are always full. */
     size_t chunks = (size_t)vertices + (size_t)triangles * 3 / STRL__CHUNK_CORNERS + 1;
     uint8_t *lines = strl_arena_alloc(scratch, chunks + 1, sizeof *mesh->chunk);
-    mesh->triangle = strl_arena_alloc(scratch, triangles, sizeof *mesh->triangle);
+    mesh->triangle = strl_arena_alloc_zero(scratch, (size_t)triangles + 1, sizeof *mesh->triangle);
     mesh->twin = strl_arena_alloc(scratch, vertices, sizeof *mesh->twin);
     if (!lines || !mesh->triangle || !mesh->twin)
         return false;
     mesh->chunk = (struct strl__chunk *)(void *)(lines + (0 - (uintptr_t)lines) % sizeof *mesh->chunk);
     for (uint32_t v = 0; v < vertices; v++) {
+        mesh->chunk[v].corner[0] = 0;
         mesh->chunk[v].count = 0;
         mesh->chunk[v].older = STRL__NONE;
         mesh->twin[v] = (uint16_t)v;
@@ -46,11 +47,12 @@ void strl__mesh_clear(struct strl__mesh *mesh, uint32_t vertex)
 
 bool strl__star_init(struct strl__star *star, uint32_t vertices, uint32_t triangles, strl_arena *scratch)
 {
-    *star = (struct strl__star){0};
-    star->corner = strl_arena_alloc(scratch, triangles, sizeof *star->corner);
-    star->wing = strl_arena_alloc(scratch, triangles, sizeof *star->wing);
-    star->moves = strl_arena_alloc_zero(scratch, triangles, sizeof *star->moves);
-    star->begins = strl_arena_alloc_zero(scratch, vertices, sizeof *star->begins);
+    size_t places = (size_t)triangles + STRL__STAR_SMALL;
+    *star = (struct strl__star){.spare = vertices};
+    star->corner = strl_arena_alloc(scratch, places, sizeof *star->corner);
+    star->wing = strl_arena_alloc(scratch, places, sizeof *star->wing);
+    star->moves = strl_arena_alloc_zero(scratch, places, sizeof *star->moves);
+    star->begins = strl_arena_alloc_zero(scratch, (size_t)vertices + 1, sizeof *star->begins);
     return star->corner && star->wing && star->moves && star->begins;
 }
 
@@ -92,13 +94,13 @@ void strl__normal_predict(const uint64_t sum[4], uint32_t most, uint32_t predict
         predicted[0] = predicted[1] = (most + 1) / 2;
         return;
     }
-    if (sum[2] >> 63) { /* fold the lower half outward */
-        int32_t folded = length - y;
-        y = length - x;
-        x = folded;
-    }
-    x = sum[0] >> 63 ? -x : x;
-    y = sum[1] >> 63 ? -y : y;
+    /* Signs are masks, all ones for negative: as branches they could not be foreseen. */
+    int32_t lower = -(int32_t)(sum[2] >> 63), west = -(int32_t)(sum[0] >> 63), south = -(int32_t)(sum[1] >> 63);
+    int32_t folded_x = length - y, folded_y = length - x; /* the lower half is folded outward */
+    x ^= (x ^ folded_x) & lower;
+    y ^= (y ^ folded_y) & lower;
+    x = (x ^ west) - west;
+    y = (y ^ south) - south;
     /* One division for both. The quotients are below 2^11 and a multiple of 1 / 2^22 away from the next integer, so that
      * with half a unit added to the dividend no rounding reaches it. */
     double inverse = 0.5 / length;

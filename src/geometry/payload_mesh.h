@@ -70,7 +70,7 @@ static inline void strl__mesh_add_triangle(struct strl__mesh *mesh, uint32_t a, 
 
 static inline bool strl__is_at(const int32_t p[3], const int32_t q[3])
 {
-    return p[0] == q[0] && p[1] == q[1] && p[2] == q[2];
+    return ((p[0] ^ q[0]) | (p[1] ^ q[1]) | (p[2] ^ q[2])) == 0; /* one branch: on coarse lattices the parts cannot be foreseen */
 }
 
 static inline bool strl__same_position(const int32_t (*position)[3], uint32_t a, uint32_t b)
@@ -84,48 +84,65 @@ static inline void strl__twin_join(uint16_t *twin, uint32_t ring, uint32_t verte
     twin[ring] = (uint16_t)vertex;
 }
 
+#define STRL__STAR_SMALL 8u
+
 /* ---- the star of a vertex: its corners in the order of its list, each with a place from 0 ---- */
 struct strl__star {
     uint32_t count;
     uint32_t *corner;    /* [count] */
     uint16_t (*wing)[2]; /* [count], x and y of the triangle (vertex, x, y) */
     uint8_t *moves;      /* [count], for the users of the star: the corner goes to the new vertex; false at first */
-    uint32_t *begins;    /* [vertices], the last place with this x; stale entries are recognised */
+    uint32_t *begins;    /* [vertices + 1], the last place with this x; stale entries are recognised */
+    uint32_t spare;      /* the entry of begins that is no vertex's */
 };
 
 /* Room for stars of up to `triangles`. */
 bool strl__star_init(struct strl__star *star, uint32_t vertices, uint32_t triangles, strl_arena *scratch);
 
+/* Sets a place; returns its x. */
+static inline uint16_t strl__star_set(struct strl__star *star, const struct strl__mesh *mesh, uint32_t place, uint32_t corner)
+{
+    const uint16_t *triangle = mesh->triangle[corner >> 2];
+    uint16_t x = triangle[strl__next3(corner & 3)];
+    star->corner[place] = corner;
+    star->wing[place][0] = x;
+    star->wing[place][1] = triangle[strl__last3(corner & 3)];
+    return x;
+}
+
+/* Most stars are small: their loops run a fixed number of times, because the number of corners cannot be foreseen. What
+ * lies past the count is a corner too, and means nothing. */
 static inline void strl__star_build(struct strl__star *star, const struct strl__mesh *mesh, uint32_t vertex)
 {
-    const uint16_t(*triangle)[4] = (const uint16_t(*)[4])mesh->triangle;
-    uint32_t count = 0, *corner = star->corner, *begins = star->begins;
-    uint16_t(*wing)[2] = star->wing;
-    for (uint32_t c = vertex; c != STRL__NONE; c = mesh->chunk[c].older) {
-        const struct strl__chunk *chunk = &mesh->chunk[c];
-        for (uint32_t i = chunk->count; i-- > 0; count++) {
-            uint32_t at = chunk->corner[i], k = at & 3;
-            uint16_t x = triangle[at >> 2][strl__next3(k)];
-            corner[count] = at;
-            wing[count][0] = x;
-            wing[count][1] = triangle[at >> 2][strl__last3(k)];
-            begins[x] = count;
+    const struct strl__chunk *chunk = &mesh->chunk[vertex];
+    uint32_t count = chunk->count, *begins = star->begins;
+    if (chunk->older == STRL__NONE && count <= STRL__STAR_SMALL) {
+        for (uint32_t place = 0; place < STRL__STAR_SMALL; place++) {
+            uint32_t is_there = 0u - (place < count);
+            uint16_t x = strl__star_set(star, mesh, place, chunk->corner[(count - 1 - place) & is_there]);
+            begins[star->spare ^ ((star->spare ^ x) & is_there)] = place;
         }
+        star->count = count;
+        return;
     }
+    count = 0;
+    for (uint32_t c = vertex; c != STRL__NONE; c = mesh->chunk[c].older)
+        for (uint32_t i = mesh->chunk[c].count; i-- > 0; count++)
+            begins[strl__star_set(star, mesh, count, mesh->chunk[c].corner[i])] = count;
     star->count = count;
 }
 
-/* The corners at `moved` places, for which star->moves is set, go from the star's vertex to another, which had none in
- * the star; the last of them comes to its front. Clears star->moves. */
-static inline void strl__star_move(struct strl__star *star, struct strl__mesh *mesh, uint32_t from, uint32_t to,
+/* The corners at `moved` places, for which star->moves is set, go from the star's vertex to another one; the last of them
+ * comes to its front. Clears star->moves. False where a wing of such a place is at the other vertex's position. */
+static inline bool strl__star_move(struct strl__star *star, struct strl__mesh *mesh, uint32_t from, uint32_t to,
                                    const uint32_t *place, uint32_t moved)
 {
     struct strl__chunk *chunk = &mesh->chunk[from];
     if (chunk->older == STRL__NONE) {
-        uint32_t kept = 0;
-        for (uint32_t i = star->count; i-- > 0;) { /* without a branch on what moves: it cannot be foreseen */
+        uint32_t kept = 0, most = star->count > STRL__STAR_SMALL ? star->count : STRL__STAR_SMALL;
+        for (uint32_t i = most; i-- > 0;) { /* without a branch on what moves: it cannot be foreseen */
             chunk->corner[kept] = star->corner[i];
-            kept += !star->moves[i];
+            kept += !star->moves[i] & (i < star->count);
         }
         chunk->count = kept;
     } else {
@@ -134,12 +151,17 @@ static inline void strl__star_move(struct strl__star *star, struct strl__mesh *m
             if (!star->moves[i])
                 strl__mesh_push_corner(mesh, star->corner[i], from);
     }
+    const int32_t(*position)[3] = (const int32_t(*)[3])mesh->position;
+    bool sound = true;
     for (uint32_t i = 0; i < moved; i++) {
         uint32_t corner = star->corner[place[i]];
+        const uint16_t *wing = star->wing[place[i]];
+        sound &= !strl__same_position(position, to, wing[0]) & !strl__same_position(position, to, wing[1]);
         star->moves[place[i]] = 0;
         mesh->triangle[corner >> 2][corner & 3] = (uint16_t)to;
         strl__mesh_push_corner(mesh, corner, to);
     }
+    return sound;
 }
 
 /* The place of the triangle that follows (vertex, x, y) round the vertex: the last with y for its x. STRL__NONE without
@@ -169,7 +191,10 @@ static inline void strl__mean_add(struct strl__mean *mean, const int32_t positio
 
 static inline void strl__mean_get(const struct strl__mean *mean, const int32_t parent[3], uint32_t predicted[3])
 {
-    int64_t scale = 65536u / (mean->count + 1);
+    /* 65536 / (count + 1): most have a few */
+    static const uint16_t few[16] = {0,    32768, 21845, 16384, 13107, 10922, 9362, 8192,
+                                     7281, 6553,  5957,  5461,  5041,  4681,  4369, 4096};
+    int64_t scale = mean->count - 1 < 15 ? few[mean->count] : 65536u / (mean->count + 1);
     for (unsigned k = 0; k < 3; k++) {
         int32_t difference = (int32_t)(mean->sum[k] - mean->count * (uint32_t)parent[k]);
         predicted[k] = (uint32_t)parent[k] + (uint32_t)((difference * scale + 32768) >> 16);

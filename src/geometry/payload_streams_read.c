@@ -64,9 +64,10 @@ static unsigned read_table(struct reader *reader, slot_table slots)
         } else if (!frequency) {
             return 0;
         }
-        for (uint32_t i = 0, slot = s | (frequency - 1) << 8; i < frequency; i += SLOT_RUN, slot += SLOT_RUN << 20)
-            for (unsigned k = 0; k < SLOT_RUN; k++)
-                slots[start + i + k] = slot + (k << 20);
+        uint32_t *run = slots + start, slot = s | (frequency - 1) << 8;
+        for (uint32_t *end = run + frequency; run < end; run += SLOT_RUN, slot += SLOT_RUN << 20)
+            for (size_t k = 0; k < SLOT_RUN; k++)
+                run[k] = slot + (uint32_t)(k << 20);
         start += frequency;
     }
     return alphabet;
@@ -103,9 +104,9 @@ static inline uint32_t next_symbol(const uint32_t *slots, const uint8_t **words,
     word = __builtin_bswap16(word);
 #endif
     x = ((slot >> 8 & 0xfff) + 1) * (x >> STRL__PROBABILITY_BITS) + (slot >> 20);
-    uint32_t refilled = x << 16 | word, low = x < STRL__RANS_LOW;
+    uint32_t low = x < STRL__RANS_LOW; /* no branch: it cannot be foreseen */
     *words += 2 * low;
-    *state = low ? refilled : x;
+    *state = x << (16 * low) | (word & (0u - low));
     return slot & 0xff;
 }
 
