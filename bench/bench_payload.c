@@ -43,7 +43,7 @@ static strl_status time_encode(const strl_pm *pm, strl_arena *scratch, strl_writ
     for (int round = -WARM_UP; round < ROUNDS && !status; round++) {
         payload->size = 0;
         double start = now_s();
-        status = strl_payload_encode(pm, NULL, scratch, payload, err);
+        status = strl_payload_encode(pm, NULL, scratch, payload, NULL, err);
         if (round >= 0)
             seconds[round] = now_s() - start;
     }

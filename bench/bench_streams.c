@@ -97,7 +97,7 @@ static strl_status sum_streams(struct model *model, double bits[STRL__STREAM_COU
     for (uint32_t id = 0; id < model->count && !status; id++) {
         struct strl__streams_out streams;
         double more[STRL__STREAM_COUNT];
-        status = strl__payload_collect(&model->nodes[id].mesh, reference_of(model, &model->nodes[id]), &scratch, &streams, err);
+        status = strl__payload_collect(&model->nodes[id].mesh, reference_of(model, &model->nodes[id]), &scratch, &streams, NULL, err);
         strl__streams_bits(&streams, more);
         for (unsigned i = 0; i < STRL__STREAM_COUNT; i++)
             bits[i] += more[i];

@@ -14,7 +14,7 @@ static void encode_again(const strl_pm *pm, strl_arena *arena)
     strl_error err = {0};
     strl_writer writer = {0};
     strl_pm again;
-    if (strl_payload_encode(pm, NULL, arena, &writer, &err) ||
+    if (strl_payload_encode(pm, NULL, arena, &writer, NULL, &err) ||
         strl_payload_decode(writer.data, writer.size, NULL, arena, &again, &err) || again.vertex_count != pm->vertex_count ||
         again.triangle_count != pm->triangle_count ||
         memcmp(again.vertex_end, pm->vertex_end, (pm->step_count + 1) * sizeof *pm->vertex_end) ||

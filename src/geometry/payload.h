@@ -28,10 +28,18 @@ typedef struct strl_payload_reference {
 /* offset stays 0. */
 strl_payload_reference strl_payload_reference_of(const strl_pm *pm);
 
+/* How a decoder will have a mesh that was encoded: its vertex i is `vertex[i]` of the encoder's mesh, its triangle t is
+ * triangle[t] / 4 with corner triangle[t] % 4 in front. The caller's arrays. */
+typedef struct strl_payload_order {
+    uint16_t *vertex;   /* [vertices] */
+    uint32_t *triangle; /* [triangles] */
+} strl_payload_order;
+
 /* Appends the payload of pm to writer. pm must satisfy the invariants of progressive.h, which is checked; scratch is
- * rewound on return. On failure writer keeps its size. reference: NULL = the payload is self-contained. */
+ * rewound on return. On failure writer keeps its size. reference: NULL = the payload is self-contained. order: filled
+ * in, or NULL. */
 strl_status strl_payload_encode(const strl_pm *pm, const strl_payload_reference *reference, strl_arena *scratch,
-                                strl_writer *writer, strl_error *err);
+                                strl_writer *writer, const strl_payload_order *order, strl_error *err);
 
 /* Sizes announced by a payload's head, checked against the limits of progressive.h and against `size`. */
 typedef struct strl_payload_sizes {

@@ -94,8 +94,16 @@ strl_payload_reference strl_payload_reference_of(const strl_pm *pm)
                                     .triangle = (const uint16_t(*)[3])pm->triangle};
 }
 
+static void get_order(const struct strl__encoder *e, const strl_payload_order *order)
+{
+    for (uint32_t v = 0; v < e->pm->vertex_count; v++)
+        order->vertex[e->number[v]] = (uint16_t)v;
+    for (uint32_t t = 0; t < e->pm->triangle_count; t++)
+        order->triangle[e->triangle_of[t]] = 4 * t + (3 - e->rotation[t]) % 3;
+}
+
 strl_status strl__payload_collect(const strl_pm *pm, const strl_payload_reference *reference, strl_arena *scratch,
-                                  struct strl__streams_out *streams, strl_error *err)
+                                  struct strl__streams_out *streams, const strl_payload_order *order, strl_error *err)
 {
     struct strl__encoder e = {.pm = pm, .reference = reference, .scratch = scratch, .err = err};
     strl_arena_mark mark = strl_arena_get_mark(scratch);
@@ -110,17 +118,19 @@ strl_status strl__payload_collect(const strl_pm *pm, const strl_payload_referenc
         status = strl__encode_steps(&e);
     if (!status)
         status = strl__encode_attributes(&e);
+    if (!status && order)
+        get_order(&e, order);
     *streams = e.out;
     strl_arena_rewind(scratch, mark);
     return status;
 }
 
 strl_status strl_payload_encode(const strl_pm *pm, const strl_payload_reference *reference, strl_arena *scratch,
-                                strl_writer *writer, strl_error *err)
+                                strl_writer *writer, const strl_payload_order *order, strl_error *err)
 {
     struct strl__streams_out streams;
     size_t start = writer->size;
-    strl_status status = strl__payload_collect(pm, reference, scratch, &streams, err);
+    strl_status status = strl__payload_collect(pm, reference, scratch, &streams, order, err);
     if (!status) {
         write_head(pm, reference != NULL, writer);
         status = strl__streams_write(&streams, start, (uint64_t)pm->vertex_count + pm->triangle_count + pm->palette_count,

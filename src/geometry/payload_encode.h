@@ -37,7 +37,7 @@ unsigned strl__normal_bits(const strl_pm *pm);
 
 /* All that a payload says, for strl__streams_write; *streams is the caller's to deinit, on failure too. */
 strl_status strl__payload_collect(const strl_pm *pm, const strl_payload_reference *reference, strl_arena *scratch,
-                                  struct strl__streams_out *streams, strl_error *err);
+                                  struct strl__streams_out *streams, const strl_payload_order *order, strl_error *err);
 
 /* Writes vertex's position, which the mesh holds already, as a residual. */
 static inline void strl__push_position(struct strl__encoder *encoder, unsigned id, const uint32_t predicted[3],

@@ -194,7 +194,7 @@ static inline strl_status fixture_add_node(strl_container_writer *writer, const 
     if (block) {
         strl_arena_rewind(&arena, (strl_arena_mark){arena.head, 0});
         fixture_mesh(node, id, &arena, &mesh);
-        status = strl_payload_encode(&mesh, NULL, &arena, &payload, err);
+        status = strl_payload_encode(&mesh, NULL, &arena, &payload, NULL, err);
     } else if (err) {
         *err = (strl_error){STRL_ERR_MEMORY, "no memory for the fixture"};
     }

@@ -92,7 +92,7 @@ static void encode(const strl_pm *pm, strl_writer *writer)
     strl_arena scratch;
     strl_error err = {0};
     strl_arena_init(&scratch, 0);
-    if (strl_payload_encode(pm, NULL, &scratch, writer, &err))
+    if (strl_payload_encode(pm, NULL, &scratch, writer, NULL, &err))
         fail_msg("%s", err.message);
     strl_arena_deinit(&scratch);
 }
@@ -493,7 +493,7 @@ static void without_memory_both_directions_fail_cleanly(void **state)
             strl_pm decoded;
             strl_arena_init(&scratch, 0);
             strl__alloc_fail_after(n);
-            status = direction ? strl_payload_encode(&pm, NULL, &scratch, &writer, &err)
+            status = direction ? strl_payload_encode(&pm, NULL, &scratch, &writer, NULL, &err)
                                : strl_payload_decode(sound.data, sound.size, NULL, &scratch, &decoded, &err);
             strl__alloc_fail_after(0);
             assert_true(status == STRL_OK || status == STRL_ERR_MEMORY);
@@ -545,7 +545,7 @@ static void the_checker_finds_what_is_broken(void **state)
     pm.normal[0][0] = 5000;
     strl_arena scratch;
     strl_arena_init(&scratch, 0);
-    assert_int_not_equal(strl_payload_encode(&pm, NULL, &scratch, &writer, &err), STRL_OK);
+    assert_int_not_equal(strl_payload_encode(&pm, NULL, &scratch, &writer, NULL, &err), STRL_OK);
     assert_int_equal(writer.size, 0);
     strl_arena_deinit(&scratch);
     strl__free(writer.data);

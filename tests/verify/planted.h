@@ -104,7 +104,7 @@ static inline void model__copy_node(strl_container *from, strl_container_writer 
     record.base_vertex_count = mesh.vertex_end[0];
     record.base_triangle_count = mesh.triangle_end[0];
     record.shared_vertices = record.shared_vertices < mesh.vertex_end[0] ? record.shared_vertices : mesh.vertex_end[0];
-    model__check(strl_payload_encode(&mesh, NULL, &arena, &payload, &err), &err);
+    model__check(strl_payload_encode(&mesh, NULL, &arena, &payload, NULL, &err), &err);
     model__check(strl_container_writer_add_node(to, &record, payload.data, (uint32_t)payload.size, &err), &err);
     strl__free(payload.data);
     strl_arena_deinit(&arena);

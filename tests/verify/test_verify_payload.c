@@ -103,7 +103,7 @@ static void visit(void *context, uint32_t id, strl_node *record, strl_pm *mesh, 
     (void)record;
     if (id % 2)
         paint(mesh, arena, id);
-    assert_int_equal(strl_payload_encode(mesh, NULL, arena, &payload, NULL), STRL_OK);
+    assert_int_equal(strl_payload_encode(mesh, NULL, arena, &payload, NULL, NULL), STRL_OK);
     uint32_t before = tally->accepted;
     compare_decoders(payload.data, payload.size, tally);
     assert_int_equal(tally->accepted, before + 1);

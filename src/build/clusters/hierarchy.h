@@ -23,7 +23,7 @@ typedef struct strl_node_state {
     strl_node record;       /* ids, group and page fields are filled in when the container is written */
     uint64_t payload_at;    /* in the payload spill of its level */
     uint32_t payload_bytes;
-    uint64_t mesh_at;       /* base mesh, in the mesh spill of its level; when it is written, its finest state */
+    uint64_t mesh_at;       /* base mesh, in the mesh spill of its level; when it is written, the order of its mesh */
     uint32_t mesh_bytes;
     bool needs_payload;     /* positions of the base mesh are in the payload alone */
     uint32_t point_count;   /* of the base mesh */
@@ -36,7 +36,7 @@ typedef struct strl_level {
     strl_node_state *nodes; /* [count] */
     uint32_t group_count;
     strl_spill *payloads;
-    strl_spill *meshes;     /* base meshes, deleted when the next level is done; while writing, finest states */
+    strl_spill *meshes;     /* base meshes, deleted when the next level is done; while writing, orders of meshes */
 } strl_level;
 
 /* How many points two nodes of the next level share: counted while a level is made. */

@@ -146,7 +146,7 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
     if (!status && hierarchy->context->desc->compact)
         coarsen_normals(&pm);
     if (!status)
-        status = strl_payload_encode(&pm, NULL, arena, &made->payload, err);
+        status = strl_payload_encode(&pm, NULL, arena, &made->payload, NULL, err);
     if (!status)
         status = strl_mesh_after(&node->mesh, &simplified, point_map, arena, &base.mesh, err);
     /* where hardly any triangles share points, positions are most of a base mesh: they are not spilled twice */

@@ -11,7 +11,7 @@
 typedef struct written_node {
     strl_node record;
     strl_writer payload;
-    strl_writer finest; /* for its children; empty at leaves */
+    strl_writer order; /* for its children; empty at leaves */
 } written_node;
 
 typedef struct write_stage {
@@ -24,38 +24,57 @@ typedef struct write_stage {
     uint64_t done, total;
 } write_stage;
 
-/* ---- finest states on their way to the next level, in the machine's own byte order */
+/* ---- orders on their way to the next level, in the machine's own byte order: what a reader will have is the mesh of the
+ * self-contained payload in another order */
 
-typedef struct finest_head {
-    uint32_t vertex_count, triangle_count;
-} finest_head;
-
-static void keep_finest(const strl_pm *pm, strl_writer *out)
+static bool order_create(strl_payload_order *order, const strl_pm *pm, strl_arena *arena)
 {
-    const finest_head head = {pm->vertex_count, pm->triangle_count};
-    strl_writer_bytes(out, &head, sizeof head);
-    strl_writer_bytes(out, pm->position, pm->vertex_count * sizeof *pm->position);
-    strl_writer_bytes(out, pm->normal, pm->vertex_count * sizeof *pm->normal);
-    strl_writer_bytes(out, pm->triangle, pm->triangle_count * sizeof *pm->triangle);
+    order->vertex = strl_arena_alloc(arena, pm->vertex_count, sizeof *order->vertex);
+    order->triangle = strl_arena_alloc(arena, pm->triangle_count, sizeof *order->triangle);
+    return order->vertex && order->triangle;
 }
 
-static strl_status load_finest(const strl_level *level, uint32_t node, strl_arena *arena, strl_payload_reference *reference,
-                               strl_error *err)
+/* Vertices of steps keep their places. */
+static void keep_order(const strl_pm *pm, const strl_payload_order *order, strl_writer *out)
 {
-    const strl_node_state *state = &level->nodes[node];
-    uint8_t *bytes = strl_arena_alloc(arena, state->mesh_bytes, 1);
-    if (!bytes)
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u bytes", state->mesh_bytes);
-    strl_status status = strl_spill_read(level->meshes, state->mesh_at, bytes, state->mesh_bytes, err);
-    if (status)
-        return status;
-    finest_head head;
-    memcpy(&head, bytes, sizeof head);
-    strl_pm pm = {.vertex_count = head.vertex_count, .triangle_count = head.triangle_count};
-    pm.position = (int32_t(*)[3])(void *)(bytes + sizeof head);
-    pm.normal = (uint16_t(*)[2])(void *)(pm.position + head.vertex_count);
-    pm.triangle = (uint16_t(*)[3])(void *)(pm.normal + head.vertex_count);
-    *reference = strl_payload_reference_of(&pm);
+    strl_writer_bytes(out, order->vertex, pm->vertex_end[0] * sizeof *order->vertex);
+    strl_writer_bytes(out, order->triangle, pm->triangle_count * sizeof *order->triangle);
+}
+
+static strl_status load_order(const strl_level *level, const strl_node_state *state, const strl_pm *pm, strl_arena *arena,
+                              strl_payload_order *order, strl_error *err)
+{
+    uint32_t base = pm->vertex_end[0];
+    if (!order_create(order, pm, arena))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", pm->triangle_count);
+    for (uint32_t v = base; v < pm->vertex_count; v++)
+        order->vertex[v] = (uint16_t)v;
+    strl_status status = strl_spill_read(level->meshes, state->mesh_at, order->vertex, base * sizeof *order->vertex, err);
+    if (!status)
+        status = strl_spill_read(level->meshes, state->mesh_at + base * sizeof *order->vertex, order->triangle,
+                                 pm->triangle_count * sizeof *order->triangle, err);
+    return status;
+}
+
+/* The finest state of pm as it will be after decoding. */
+static strl_status put_in_order(const strl_pm *pm, const strl_payload_order *order, strl_arena *arena, strl_pm *finest,
+                                strl_error *err)
+{
+    *finest = (strl_pm){.vertex_count = pm->vertex_count, .triangle_count = pm->triangle_count};
+    finest->position = strl_arena_alloc(arena, pm->vertex_count, sizeof *finest->position);
+    finest->normal = strl_arena_alloc(arena, pm->vertex_count, sizeof *finest->normal);
+    finest->triangle = strl_arena_alloc(arena, pm->triangle_count, sizeof *finest->triangle);
+    uint16_t *number = strl_arena_alloc(arena, pm->vertex_count, sizeof *number);
+    if (!finest->position || !finest->normal || !finest->triangle || !number)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", pm->triangle_count);
+    for (uint32_t v = 0; v < pm->vertex_count; v++) {
+        memcpy(finest->position[v], pm->position[order->vertex[v]], sizeof *finest->position);
+        memcpy(finest->normal[v], pm->normal[order->vertex[v]], sizeof *finest->normal);
+        number[order->vertex[v]] = (uint16_t)v;
+    }
+    for (uint32_t t = 0; t < pm->triangle_count; t++)
+        for (uint32_t k = 0; k < 3; k++)
+            finest->triangle[t][k] = number[pm->triangle[order->triangle[t] / 4][(order->triangle[t] % 4 + k) % 3]];
     return STRL_OK;
 }
 
@@ -82,24 +101,39 @@ static strl_status read_alone(const strl_level *level, const strl_node_state *st
     return status ? status : strl_payload_decode(payload, state->payload_bytes, NULL, arena, pm, err);
 }
 
+static strl_status load_parent(const write_stage *stage, uint32_t index, const strl_node *record, strl_arena *arena,
+                               strl_payload_reference *reference, strl_error *err)
+{
+    const strl_node_state *state = &stage->above->nodes[index];
+    strl_pm alone, finest;
+    strl_payload_order order;
+    strl_status status = read_alone(stage->above, state, arena, &alone, err);
+    if (!status)
+        status = load_order(stage->above, state, &alone, arena, &order, err);
+    if (!status)
+        status = put_in_order(&alone, &order, arena, &finest, err);
+    if (status)
+        return status;
+    *reference = strl_payload_reference_of(&finest);
+    strl_page_place(reference, state->record.anchor, record);
+    return STRL_OK;
+}
+
 static strl_status encode_node(const write_stage *stage, uint32_t index, written_node *node, strl_arena *arena, strl_error *err)
 {
-    strl_pm alone, final;
+    strl_pm pm;
     strl_payload_reference parent, *reference = stage->above ? &parent : NULL;
-    strl_status status = read_alone(stage->level, &stage->level->nodes[index], arena, &alone, err);
+    strl_payload_order order;
+    strl_status status = read_alone(stage->level, &stage->level->nodes[index], arena, &pm, err);
     if (!status && reference)
-        status = load_finest(stage->above, index / 2, arena, reference, err);
-    if (!status && reference)
-        strl_page_place(reference, stage->above->nodes[index / 2].record.anchor, &node->record);
+        status = load_parent(stage, index / 2, &node->record, arena, reference, err);
+    if (!status && !order_create(&order, &pm, arena))
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", pm.triangle_count);
     if (!status)
-        status = strl_payload_encode(&alone, reference, arena, &node->payload, err);
-    if (status || stage->index == 0)
-        return status;
-    /* The children's payloads are told in the order in which a reader will have its vertices and triangles. */
-    status = strl_payload_decode(node->payload.data, node->payload.size, reference, arena, &final, err);
-    if (!status)
-        keep_finest(&final, &node->finest);
-    return status || !node->finest.failed ? status : strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
+        status = strl_payload_encode(&pm, reference, arena, &node->payload, &order, err);
+    if (!status && stage->index)
+        keep_order(&pm, &order, &node->order);
+    return status || !node->order.failed ? status : strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
 }
 
 static strl_status work(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
@@ -108,7 +142,7 @@ static strl_status work(void *context, uint64_t index, unsigned slot, unsigned w
     written_node *node = &stage->slots[slot];
     strl_arena *arena = &stage->arenas[worker];
     strl_arena_mark mark = strl_arena_get_mark(arena);
-    node->payload.size = node->finest.size = 0;
+    node->payload.size = node->order.size = 0;
     node->record = stage->level->nodes[index].record;
     place_in_tree(stage, (uint32_t)index, &node->record);
     strl_status status = encode_node(stage, (uint32_t)index, node, arena, err);
@@ -122,13 +156,13 @@ static strl_status finish(void *context, uint64_t index, unsigned slot, unsigned
     const written_node *node = &stage->slots[slot];
     strl_node_state *state = &stage->level->nodes[index];
     (void)worker;
-    strl_spill_drop(stage->level->payloads, state->payload_at, state->payload_bytes);
-    state->mesh_bytes = (uint32_t)node->finest.size;
     if (stage->index)
         state->mesh_at = strl_spill_bytes(stage->level->meshes);
+    else
+        strl_spill_drop(stage->level->payloads, state->payload_at, state->payload_bytes);
     strl_status status = strl_container_writer_add_node(stage->writer, &node->record, node->payload.data, node->payload.size, err);
     if (!status && stage->index)
-        status = strl_spill_append(stage->level->meshes, node->finest.data, node->finest.size, err);
+        status = strl_spill_append(stage->level->meshes, node->order.data, node->order.size, err);
     if (!status && (++stage->done & 63) == 0)
         status = strl__build_report(stage->hierarchy->context, stage->done, stage->total, err);
     return status;
@@ -136,21 +170,27 @@ static strl_status finish(void *context, uint64_t index, unsigned slot, unsigned
 
 /* ---- levels */
 
+static strl_status close_above(write_stage *stage, strl_error *err)
+{
+    strl_status status = strl_spill_close_and_delete(stage->above->meshes, err);
+    stage->above->meshes = NULL;
+    if (!status)
+        status = strl_spill_close_and_delete(stage->above->payloads, err);
+    stage->above->payloads = NULL;
+    return status;
+}
+
 static strl_status write_level(write_stage *stage, strl_error *err)
 {
     strl_build_context *context = stage->hierarchy->context;
     char name[32];
-    snprintf(name, sizeof name, "finest-%02u", stage->index);
+    snprintf(name, sizeof name, "order-%02u", stage->index);
     strl_status status = stage->index ? strl_spill_open(context->spills, name, 0, &stage->level->meshes, err) : STRL_OK;
     if (!status)
         status = strl_pool_ordered(context->pool, stage->level->count, 0, work, finish, stage, NULL, err);
     if (!status && stage->index)
         status = strl_spill_flush(stage->level->meshes, err);
-    if (!status && stage->above) {
-        status = strl_spill_close_and_delete(stage->above->meshes, err);
-        stage->above->meshes = NULL;
-    }
-    return status;
+    return status || !stage->above ? status : close_above(stage, err);
 }
 
 static strl_status write_levels(write_stage *stage, strl_error *err)
@@ -184,7 +224,7 @@ strl_status strl_write_nodes(const strl_hierarchy *hierarchy, strl_container_wri
         strl_arena_deinit(&stage.arenas[i]);
     for (unsigned i = 0; stage.slots && i < window; i++) {
         strl__free(stage.slots[i].payload.data);
-        strl__free(stage.slots[i].finest.data);
+        strl__free(stage.slots[i].order.data);
     }
     strl__free(stage.arenas);
     strl__free(stage.slots);

@@ -174,7 +174,7 @@ static strl_status choose_step(const strl_build_context *context, const model_su
     if (ingest->short_edge > 0)
         wanted = fmin(wanted, ingest->short_edge / 16);
     if (context->desc->compact && ingest->short_edge > 0)
-        wanted = fmax(wanted, fmin(edge_at(survey, 0.5) / COMPACT_STEPS, ingest->short_edge / 2));
+        wanted = fmax(wanted, fmin(edge_at(survey, 0.5) / COMPACT_STEPS, ingest->short_edge));
     ingest->step = fmax(power_of_two_below(wanted), ingest->finest_step);
     ingest->is_coarse = !context->desc->compact && ingest->short_edge > 0 && ingest->step * 16 > ingest->short_edge;
     return STRL_OK;
