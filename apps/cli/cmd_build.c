@@ -39,7 +39,7 @@ static int print_json(const strl_build_result *r)
 {
     uint64_t dropped = r->dropped_nonfinite + r->dropped_degenerate;
     json_t *object = json_pack(
-        "{s:I, s:I, s:{s:I, s:I, s:I, s:I, s:I}, s:{s:I, s:I}, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:f, s:I, s:I}",
+        "{s:I, s:I, s:{s:I, s:I, s:I, s:I, s:I}, s:{s:I, s:I}, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:f, s:f, s:f, s:I, s:I}",
         "triangles_in", (json_int_t)r->triangles_in, "triangles_leaf", (json_int_t)r->triangles_leaf, "dropped",
         "triangles", (json_int_t)dropped, "nonfinite", (json_int_t)r->dropped_nonfinite, "degenerate",
         (json_int_t)r->dropped_degenerate, "lines", (json_int_t)r->dropped_lines, "points",
@@ -47,7 +47,7 @@ static int print_json(const strl_build_result *r)
         "coarse_lattices", (json_int_t)r->coarse_lattices, "vertices", (json_int_t)r->vertices, "parts", (json_int_t)r->parts, "materials",
         (json_int_t)r->materials, "placements", (json_int_t)r->placements, "nodes", (json_int_t)r->nodes, "groups",
         (json_int_t)r->groups, "levels", (json_int_t)r->levels, "root_triangles", (json_int_t)r->root_triangles,
-        "bytes_out", (json_int_t)r->bytes_out, "seconds", r->seconds, "cpu_seconds", r->cpu_seconds, "peak_rss_bytes",
+        "bytes_out", (json_int_t)r->bytes_out, "step", r->step, "quantisation_error", r->quantisation_error, "seconds", r->seconds, "cpu_seconds", r->cpu_seconds, "peak_rss_bytes",
         (json_int_t)r->peak_rss_bytes, "scratch_bytes", (json_int_t)r->scratch_bytes);
     if (!object)
         return strl_cli_fail(&(strl_error){STRL_ERR_MEMORY, "no memory to print the result"});
@@ -77,6 +77,7 @@ static void print_text(const strl_build_result *r, const char *output)
                r->missing_libraries == 1 ? "y" : "ies");
     if (r->coarse_lattices)
         printf("the lattice is coarser than a sixteenth of the short edges\n");
+    printf("lattice step %.9g: no point moves by more than %.3g\n", r->step, r->quantisation_error);
     printf("%.1f s, %s triangles a second (%s a second of processor), peak memory %.0f MB, scratch %.0f MB\n",
            r->seconds, rate, processor_rate, (double)r->peak_rss_bytes / 1e6, (double)r->scratch_bytes / 1e6);
 }

@@ -48,6 +48,7 @@ typedef struct strl_build_result {
     uint64_t vertices, nodes, groups, bytes_out, scratch_bytes;
     uint32_t parts, materials, levels, root_triangles, inputs;
     uint64_t placements;
+    double step, quantisation_error; /* of the lattice; how far it moves a point at most; model units */
     double seconds, cpu_seconds;
     uint64_t peak_rss_bytes;
 } strl_build_result;

@@ -143,6 +143,8 @@ static void fill_result(const strl_hierarchy *hierarchy, strl_build_result *resu
     result->parts = (uint32_t)hierarchy->ingest->parts.count;
     result->materials = (uint32_t)hierarchy->ingest->materials.count;
     result->placements = 1;
+    result->step = hierarchy->ingest->step;
+    result->quantisation_error = (double)hierarchy->ingest->leaf_error * hierarchy->ingest->step;
 }
 
 strl_status strl__clusters_run(strl_build_context *context, strl_error *err)
