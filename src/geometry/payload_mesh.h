@@ -142,7 +142,7 @@ static inline bool strl__star_move(struct strl__star *star, struct strl__mesh *m
         uint32_t kept = 0, most = star->count > STRL__STAR_SMALL ? star->count : STRL__STAR_SMALL;
         for (uint32_t i = most; i-- > 0;) { /* without a branch on what moves: it cannot be foreseen */
             chunk->corner[kept] = star->corner[i];
-            kept += !star->moves[i] & (i < star->count);
+            kept += (uint32_t)!star->moves[i] & (uint32_t)(i < star->count);
         }
         chunk->count = kept;
     } else {
@@ -156,7 +156,8 @@ static inline bool strl__star_move(struct strl__star *star, struct strl__mesh *m
     for (uint32_t i = 0; i < moved; i++) {
         uint32_t corner = star->corner[place[i]];
         const uint16_t *wing = star->wing[place[i]];
-        sound &= !strl__same_position(position, to, wing[0]) & !strl__same_position(position, to, wing[1]);
+        sound &= !strl__same_position(position, to, wing[0]);
+        sound &= !strl__same_position(position, to, wing[1]);
         star->moves[place[i]] = 0;
         mesh->triangle[corner >> 2][corner & 3] = (uint16_t)to;
         strl__mesh_push_corner(mesh, corner, to);
