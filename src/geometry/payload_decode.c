@@ -102,7 +102,7 @@ static strl_status decode_parts(struct strl__decoder *d, strl_cursor *cursor)
     if (!status && !strl__streams_done(&d->in))
         status = strl__fail(d->err, STRL_ERR_FORMAT, "node payload has numbers left over or too few");
     for (uint32_t t = 0; !status && t < sizes->triangle_count; t++)
-        memcpy(d->pm->triangle[t], d->mesh.triangle[t], sizeof *d->pm->triangle);
+        strl__mesh_get_triangle(&d->mesh, t, d->pm->triangle[t]);
     return status;
 }
 

@@ -80,7 +80,7 @@ static bool decode_arc(struct splitter *s, const struct wedge *w, unsigned kind)
     if (w->is_first)
         set_first_position(s, w, &mean);
     uint16_t a = star->wing[start][0], b = star->wing[place][1];
-    sound &= !kind || !strl__is_at(v, origin);
+    sound &= !strl__is_at(v, position[a]) && (!kind || !strl__is_at(v, origin));
     sound &= strl__star_move(star, mesh, w->parent, w->vertex, s->arc, count + 1);
     if (sound && kind & STRL__KIND_START)
         sound = add_triangle(s, w->vertex, w->parent, a);
@@ -134,6 +134,9 @@ static bool decode_general(struct splitter *s, const struct wedge *w)
         return false;
     if (w->is_first)
         set_first_position(s, w, &mean);
+    for (uint32_t i = 0; i < moved; i++)
+        if (strl__same_position(position, w->vertex, star->wing[s->arc[i]][0]))
+            return false;
     if (!strl__star_move(star, &s->d->mesh, w->parent, w->vertex, s->arc, moved))
         return false;
     uint32_t triangles = strl__pull(&s->d->in, STRL__STREAM_GENERAL);

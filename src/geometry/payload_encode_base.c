@@ -207,7 +207,8 @@ static void encode_operation(struct walker *w)
             return;
         strl__encode_triangle(e, edge / 3, edge % 3, (uint32_t[3]){b, a, c});
     }
-    const uint16_t *added = e->mesh.triangle[e->mesh.triangle_count - 1];
+    uint16_t added[3];
+    strl__mesh_get_triangle(&e->mesh, e->mesh.triangle_count - 1, added);
     for (unsigned k = 0; k < 3; k++)
         strl__front_count(&w->front, added[k]);
 }

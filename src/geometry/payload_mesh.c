@@ -61,7 +61,8 @@ uint64_t (*strl__normal_sums(const struct strl__mesh *mesh, strl_arena *scratch)
     const int32_t(*position)[3] = (const int32_t(*)[3])mesh->position;
     uint64_t(*sum)[4] = strl_arena_alloc_zero(scratch, mesh->vertex_count, sizeof *sum);
     for (uint32_t t = 0; sum && t < mesh->triangle_count; t++) {
-        const uint16_t *corner = mesh->triangle[t];
+        uint16_t corner[3];
+        strl__mesh_get_triangle(mesh, t, corner);
         const int32_t *p = position[corner[0]], *q = position[corner[1]], *r = position[corner[2]];
         uint64_t a[3], b[3], n[4] = {0};
         for (unsigned k = 0; k < 3; k++) {

@@ -24,7 +24,7 @@ struct strl__chunk {
 
 struct strl__mesh {
     int32_t (*position)[3];
-    uint16_t (*triangle)[4];   /* [triangles], three corners */
+    uint64_t *triangle;        /* [triangles], the corners a, b, c in 16 bits each, a lowest, and a again */
     struct strl__chunk *chunk; /* vertex v's is number v; behind those of all vertices lie the older ones */
     uint32_t chunk_count, free_chunk; /* older chunks come from a list of free ones, or from the end */
     uint16_t *twin;                        /* [vertices], rings of vertices known to share a position */
@@ -57,12 +57,24 @@ static inline void strl__mesh_push_corner(struct strl__mesh *mesh, uint32_t corn
     chunk->corner[chunk->count++] = corner;
 }
 
+static inline void strl__mesh_get_triangle(const struct strl__mesh *mesh, uint32_t t, uint16_t vertex[3])
+{
+    for (unsigned k = 0; k < 3; k++)
+        vertex[k] = (uint16_t)(mesh->triangle[t] >> 16 * k);
+}
+
+/* A corner is another vertex from now on. */
+static inline void strl__mesh_set_corner(struct strl__mesh *mesh, uint32_t corner, uint32_t vertex)
+{
+    static const uint64_t places[4] = {0x0001000000000001, 0x0000000000010000, 0x0000000100000000, 0};
+    uint64_t place = places[corner & 3], *triangle = &mesh->triangle[corner >> 2];
+    *triangle = (*triangle & ~(place * 0xffff)) | place * vertex;
+}
+
 static inline void strl__mesh_add_triangle(struct strl__mesh *mesh, uint32_t a, uint32_t b, uint32_t c)
 {
     uint32_t t = mesh->triangle_count++;
-    mesh->triangle[t][0] = (uint16_t)a;
-    mesh->triangle[t][1] = (uint16_t)b;
-    mesh->triangle[t][2] = (uint16_t)c;
+    mesh->triangle[t] = a | (uint64_t)b << 16 | (uint64_t)c << 32 | (uint64_t)a << 48;
     strl__mesh_push_corner(mesh, 4 * t, a);
     strl__mesh_push_corner(mesh, 4 * t + 1, b);
     strl__mesh_push_corner(mesh, 4 * t + 2, c);
@@ -100,14 +112,13 @@ struct strl__star {
 bool strl__star_init(struct strl__star *star, uint32_t vertices, uint32_t triangles, strl_arena *scratch);
 
 /* Sets a place; returns its x. */
-static inline uint16_t strl__star_set(struct strl__star *star, const struct strl__mesh *mesh, uint32_t place, uint32_t corner)
+static inline uint16_t strl__star_set(const struct strl__star *star, const uint64_t *triangle, uint32_t place, uint32_t corner)
 {
-    const uint16_t *triangle = mesh->triangle[corner >> 2];
-    uint16_t x = triangle[strl__next3(corner & 3)];
+    uint64_t wings = triangle[corner >> 2] >> (16 * strl__next3(corner & 3));
     star->corner[place] = corner;
-    star->wing[place][0] = x;
-    star->wing[place][1] = triangle[strl__last3(corner & 3)];
-    return x;
+    star->wing[place][0] = (uint16_t)wings;
+    star->wing[place][1] = (uint16_t)(wings >> 16);
+    return (uint16_t)wings;
 }
 
 /* Most stars are small: their loops run a fixed number of times, because the number of corners cannot be foreseen. What
@@ -115,12 +126,14 @@ static inline uint16_t strl__star_set(struct strl__star *star, const struct strl
 static inline void strl__star_build(struct strl__star *star, const struct strl__mesh *mesh, uint32_t vertex)
 {
     const struct strl__chunk *chunk = &mesh->chunk[vertex];
-    uint32_t count = chunk->count, *begins = star->begins;
+    const struct strl__star own = *star; /* its pointers stay in registers */
+    const uint64_t *triangle = mesh->triangle;
+    uint32_t count = chunk->count;
     if (chunk->older == STRL__NONE && count <= STRL__STAR_SMALL) {
         for (uint32_t place = 0; place < STRL__STAR_SMALL; place++) {
             uint32_t is_there = 0u - (place < count);
-            uint16_t x = strl__star_set(star, mesh, place, chunk->corner[(count - 1 - place) & is_there]);
-            begins[star->spare ^ ((star->spare ^ x) & is_there)] = place;
+            uint16_t x = strl__star_set(&own, triangle, place, chunk->corner[(count - 1 - place) & is_there]);
+            own.begins[own.spare ^ ((own.spare ^ x) & is_there)] = place;
         }
         star->count = count;
         return;
@@ -128,38 +141,51 @@ static inline void strl__star_build(struct strl__star *star, const struct strl__
     count = 0;
     for (uint32_t c = vertex; c != STRL__NONE; c = mesh->chunk[c].older)
         for (uint32_t i = mesh->chunk[c].count; i-- > 0; count++)
-            begins[strl__star_set(star, mesh, count, mesh->chunk[c].corner[i])] = count;
+            own.begins[strl__star_set(&own, triangle, count, mesh->chunk[c].corner[i])] = count;
     star->count = count;
 }
 
+/* Takes the corners at places for which star->moves is set out of the list of the star's vertex. */
+static inline void strl__star_keep(const struct strl__star *star, struct strl__mesh *mesh, uint32_t vertex)
+{
+    struct strl__chunk *chunk = &mesh->chunk[vertex];
+    const uint32_t *corner = star->corner;
+    const uint8_t *moves = star->moves;
+    uint32_t kept = 0, count = star->count;
+    if (chunk->older != STRL__NONE) {
+        strl__mesh_clear(mesh, vertex);
+        for (uint32_t i = count; i-- > 0;)
+            if (!moves[i])
+                strl__mesh_push_corner(mesh, corner[i], vertex);
+        return;
+    }
+    /* Without a branch on what moves: it cannot be foreseen. */
+    for (uint32_t i = count; i > STRL__STAR_SMALL; i--) {
+        chunk->corner[kept] = corner[i - 1];
+        kept += moves[i - 1] ^ 1u;
+    }
+    for (uint32_t i = STRL__STAR_SMALL; i-- > 0;) {
+        chunk->corner[kept] = corner[i];
+        kept += (moves[i] ^ 1u) & (i < count);
+    }
+    chunk->count = kept;
+}
+
 /* The corners at `moved` places, for which star->moves is set, go from the star's vertex to another one; the last of them
- * comes to its front. Clears star->moves. False where a wing of such a place is at the other vertex's position. */
+ * comes to its front. Clears star->moves. False where the y of such a place is at the other vertex's position. */
 static inline bool strl__star_move(struct strl__star *star, struct strl__mesh *mesh, uint32_t from, uint32_t to,
                                    const uint32_t *place, uint32_t moved)
 {
-    struct strl__chunk *chunk = &mesh->chunk[from];
-    if (chunk->older == STRL__NONE) {
-        uint32_t kept = 0, most = star->count > STRL__STAR_SMALL ? star->count : STRL__STAR_SMALL;
-        for (uint32_t i = most; i-- > 0;) { /* without a branch on what moves: it cannot be foreseen */
-            chunk->corner[kept] = star->corner[i];
-            kept += (uint32_t)!star->moves[i] & (uint32_t)(i < star->count);
-        }
-        chunk->count = kept;
-    } else {
-        strl__mesh_clear(mesh, from);
-        for (uint32_t i = star->count; i-- > 0;)
-            if (!star->moves[i])
-                strl__mesh_push_corner(mesh, star->corner[i], from);
-    }
     const int32_t(*position)[3] = (const int32_t(*)[3])mesh->position;
+    const int32_t *there = position[to];
+    uint8_t *moves = star->moves;
     bool sound = true;
+    strl__star_keep(star, mesh, from);
     for (uint32_t i = 0; i < moved; i++) {
-        uint32_t corner = star->corner[place[i]];
-        const uint16_t *wing = star->wing[place[i]];
-        sound &= !strl__same_position(position, to, wing[0]);
-        sound &= !strl__same_position(position, to, wing[1]);
-        star->moves[place[i]] = 0;
-        mesh->triangle[corner >> 2][corner & 3] = (uint16_t)to;
+        uint32_t at = place[i], corner = star->corner[at];
+        sound &= !strl__is_at(there, position[star->wing[at][1]]);
+        moves[at] = 0;
+        strl__mesh_set_corner(mesh, corner, to);
         strl__mesh_push_corner(mesh, corner, to);
     }
     return sound;
