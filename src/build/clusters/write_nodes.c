@@ -1,5 +1,8 @@
 /* The last stage: nodes into the container, breadth first. Until here every payload is self-contained, because children are made
- * before their parents; now each is told by its parent's finest state, which holds most of its base mesh. */
+ * before their parents; now each is told by its parent's finest state, which holds most of its base mesh.
+ *
+ * No checkpoint is made meanwhile: the one of the finished levels stays in place, and with it the payloads that are used up
+ * here. A build that is resumed begins this stage anew. */
 #include <stdio.h>
 #include <string.h>
 
@@ -163,9 +166,7 @@ static strl_status finish(void *context, uint64_t index, unsigned slot, unsigned
     strl_status status = strl_container_writer_add_node(stage->writer, &node->record, node->payload.data, node->payload.size, err);
     if (!status && stage->index)
         status = strl_spill_append(stage->level->meshes, node->order.data, node->order.size, err);
-    if (!status && (++stage->done & 63) == 0)
-        status = strl__build_report(stage->hierarchy->context, stage->done, stage->total, err);
-    return status;
+    return status ? status : strl__build_report(stage->hierarchy->context, ++stage->done, stage->total, err);
 }
 
 /* ---- levels */
