@@ -17,11 +17,19 @@ typedef struct written_node {
     strl_writer order; /* for its children; empty at leaves */
 } written_node;
 
+#define SIBLINGS 2u
+
+/* A parent is decoded once for all that it tells. */
+typedef struct written_siblings {
+    written_node node[SIBLINGS];
+    uint32_t first, count; /* in their level */
+} written_siblings;
+
 typedef struct write_stage {
     const strl_hierarchy *hierarchy;
     strl_container_writer *writer;
     strl_arena *arenas;         /* [workers] */
-    written_node *slots;        /* [window] */
+    written_siblings *slots;    /* [window] */
     strl_level *level, *above;  /* above: NULL at the root */
     uint32_t index, group_base; /* of the level; its first group */
     uint64_t done, total;
@@ -87,9 +95,9 @@ static strl_status put_in_order(const strl_pm *pm, const strl_payload_order *ord
 static void place_in_tree(const write_stage *stage, uint32_t index, strl_node *record)
 {
     uint32_t depth = stage->hierarchy->partition->depth - stage->index, id = (1u << depth) - 1 + index;
-    record->parent = record->decode_parent = depth ? (id - 1) / 2 : STRL_NONE;
-    record->first_child = stage->index ? 2 * id + 1 : STRL_NONE;
-    record->child_count = stage->index ? 2 : 0;
+    record->parent = record->decode_parent = depth ? (id - 1) / SIBLINGS : STRL_NONE;
+    record->first_child = stage->index ? SIBLINGS * id + 1 : STRL_NONE;
+    record->child_count = stage->index ? SIBLINGS : 0;
     record->level = stage->index;
     record->group = stage->group_base + stage->level->nodes[index].group;
 }
@@ -104,8 +112,9 @@ static strl_status read_alone(const strl_level *level, const strl_node_state *st
     return status ? status : strl_payload_decode(payload, state->payload_bytes, NULL, arena, pm, err);
 }
 
-static strl_status load_parent(const write_stage *stage, uint32_t index, const strl_node *record, strl_arena *arena,
-                               strl_payload_reference *reference, strl_error *err)
+/* Not placed yet. */
+static strl_status load_parent(const write_stage *stage, uint32_t index, strl_arena *arena, strl_payload_reference *reference,
+                               strl_error *err)
 {
     const strl_node_state *state = &stage->above->nodes[index];
     strl_pm alone, finest;
@@ -115,50 +124,54 @@ static strl_status load_parent(const write_stage *stage, uint32_t index, const s
         status = load_order(stage->above, state, &alone, arena, &order, err);
     if (!status)
         status = put_in_order(&alone, &order, arena, &finest, err);
-    if (status)
-        return status;
-    *reference = strl_payload_reference_of(&finest);
-    strl_page_place(reference, state->record.anchor, record);
-    return STRL_OK;
+    if (!status)
+        *reference = strl_payload_reference_of(&finest);
+    return status;
 }
 
-static strl_status encode_node(const write_stage *stage, uint32_t index, written_node *node, strl_arena *arena, strl_error *err)
+static strl_status encode_node(const write_stage *stage, uint32_t index, strl_payload_reference *parent, written_node *node,
+                               strl_arena *arena, strl_error *err)
 {
     strl_pm pm;
-    strl_payload_reference parent, *reference = stage->above ? &parent : NULL;
     strl_payload_order order;
+    node->payload.size = node->order.size = 0;
+    node->record = stage->level->nodes[index].record;
+    place_in_tree(stage, index, &node->record);
+    if (parent)
+        strl_page_place(parent, stage->above->nodes[index / SIBLINGS].record.anchor, &node->record);
     strl_status status = read_alone(stage->level, &stage->level->nodes[index], arena, &pm, err);
-    if (!status && reference)
-        status = load_parent(stage, index / 2, &node->record, arena, reference, err);
     if (!status && !order_create(&order, &pm, arena))
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", pm.triangle_count);
     if (!status)
-        status = strl_payload_encode(&pm, reference, arena, &node->payload, &order, err);
+        status = strl_payload_encode(&pm, parent, arena, &node->payload, &order, err);
     if (!status && stage->index)
         keep_order(&pm, &order, &node->order);
     return status || !node->order.failed ? status : strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
 }
 
+/* index: of the parent in its level. */
 static strl_status work(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
 {
     write_stage *stage = context;
-    written_node *node = &stage->slots[slot];
+    written_siblings *siblings = &stage->slots[slot];
     strl_arena *arena = &stage->arenas[worker];
     strl_arena_mark mark = strl_arena_get_mark(arena);
-    node->payload.size = node->order.size = 0;
-    node->record = stage->level->nodes[index].record;
-    place_in_tree(stage, (uint32_t)index, &node->record);
-    strl_status status = encode_node(stage, (uint32_t)index, node, arena, err);
+    strl_payload_reference parent;
+    strl_status status = stage->above ? load_parent(stage, (uint32_t)index, arena, &parent, err) : STRL_OK;
+    siblings->first = (uint32_t)index * SIBLINGS;
+    siblings->count = stage->above ? SIBLINGS : 1;
+    for (uint32_t i = 0; i < siblings->count && !status; i++) {
+        strl_arena_mark own = strl_arena_get_mark(arena);
+        status = encode_node(stage, siblings->first + i, stage->above ? &parent : NULL, &siblings->node[i], arena, err);
+        strl_arena_rewind(arena, own);
+    }
     strl_arena_rewind(arena, mark);
     return status;
 }
 
-static strl_status finish(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
+static strl_status finish_node(write_stage *stage, uint32_t index, const written_node *node, strl_error *err)
 {
-    write_stage *stage = context;
-    const written_node *node = &stage->slots[slot];
     strl_node_state *state = &stage->level->nodes[index];
-    (void)worker;
     if (stage->index)
         state->mesh_at = strl_spill_bytes(stage->level->meshes);
     else
@@ -167,6 +180,18 @@ static strl_status finish(void *context, uint64_t index, unsigned slot, unsigned
     if (!status && stage->index)
         status = strl_spill_append(stage->level->meshes, node->order.data, node->order.size, err);
     return status ? status : strl__build_report(stage->hierarchy->context, ++stage->done, stage->total, err);
+}
+
+static strl_status finish(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
+{
+    write_stage *stage = context;
+    const written_siblings *siblings = &stage->slots[slot];
+    strl_status status = STRL_OK;
+    (void)index;
+    (void)worker;
+    for (uint32_t i = 0; i < siblings->count && !status; i++)
+        status = finish_node(stage, siblings->first + i, &siblings->node[i], err);
+    return status;
 }
 
 /* ---- levels */
@@ -188,7 +213,7 @@ static strl_status write_level(write_stage *stage, strl_error *err)
     snprintf(name, sizeof name, "order-%02u", stage->index);
     strl_status status = stage->index ? strl_spill_open(context->spills, name, 0, &stage->level->meshes, err) : STRL_OK;
     if (!status)
-        status = strl_pool_ordered(context->pool, stage->level->count, 0, work, finish, stage, NULL, err);
+        status = strl_pool_ordered(context->pool, stage->above ? stage->above->count : 1, 0, work, finish, stage, NULL, err);
     if (!status && stage->index)
         status = strl_spill_flush(stage->level->meshes, err);
     return status || !stage->above ? status : close_above(stage, err);
@@ -223,9 +248,9 @@ strl_status strl_write_nodes(const strl_hierarchy *hierarchy, strl_container_wri
                                          : strl__fail(err, STRL_ERR_MEMORY, "no memory to write nodes");
     for (unsigned i = 0; stage.arenas && i < workers; i++)
         strl_arena_deinit(&stage.arenas[i]);
-    for (unsigned i = 0; stage.slots && i < window; i++) {
-        strl__free(stage.slots[i].payload.data);
-        strl__free(stage.slots[i].order.data);
+    for (unsigned i = 0; stage.slots && i < window * SIBLINGS; i++) {
+        strl__free(stage.slots[i / SIBLINGS].node[i % SIBLINGS].payload.data);
+        strl__free(stage.slots[i / SIBLINGS].node[i % SIBLINGS].order.data);
     }
     strl__free(stage.arenas);
     strl__free(stage.slots);
