@@ -133,6 +133,18 @@ static inline uint32_t strl__pull(struct strl__streams_in *streams, unsigned id)
     return 0;
 }
 
+/* The next `count` values of a stream, all of them or NULL. */
+static inline const uint32_t *strl__pull_all(struct strl__streams_in *streams, unsigned id, uint32_t count)
+{
+    struct strl__stream_in *stream = &streams->stream[id];
+    if (count > stream->count - stream->at) {
+        streams->failed = true;
+        return NULL;
+    }
+    stream->at += count;
+    return stream->values + (stream->at - count);
+}
+
 /* True when every value was pulled and none was missing. */
 bool strl__streams_done(const struct strl__streams_in *streams);
 
