@@ -43,7 +43,7 @@ static strl_status time_encode(const strl_pm *pm, strl_arena *scratch, strl_writ
     for (int round = -WARM_UP; round < ROUNDS && !status; round++) {
         payload->size = 0;
         double start = now_s();
-        status = strl_payload_encode(pm, scratch, payload, err);
+        status = strl_payload_encode(pm, NULL, scratch, payload, NULL, err);
         if (round >= 0)
             seconds[round] = now_s() - start;
     }
@@ -60,7 +60,7 @@ static strl_status time_decode(const strl_writer *payload, strl_arena *arena, st
     for (int round = -WARM_UP; round < ROUNDS && !status; round++) {
         strl_pm pm;
         double start = now_s();
-        status = strl_payload_decode(payload->data, payload->size, arena, &pm, err);
+        status = strl_payload_decode(payload->data, payload->size, NULL, arena, &pm, err);
         if (round >= 0)
             seconds[round] = now_s() - start;
         strl_arena_rewind(arena, mark);

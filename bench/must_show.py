@@ -14,6 +14,7 @@ models. Parts:
     backends      gl45 against gl3 and OpenGL ES on an orbit                           (dragon_scans, isosurface_1m)
     rate          five interleaved pairs of builds on one core and on two                         (isosurface_10m)
     bytes         the same container for --jobs 1, 2, 3 and 8                                     (isosurface_1m)
+    sizes         bytes per triangle, as built by default and with --compact; verify of both      (models of several kinds)
     dependencies  with and without: locked vertices per level, triangles drawn at one pixel       (isosurface_10m)
     walk          select_ms and frame_ms of all models on one smooth path                         (isosurface_1m, _10m)
     roots         builds every PLY, STL and OBJ file of DIR: the root's size                      (all files)
@@ -239,6 +240,26 @@ def part_bytes(bench, model):
     bench.log.add("bytes", model, {}, digests=digests, holds=len(set(digests.values())) == 1)
 
 
+def size_of(bench, model, *options):
+    """One build, and what verify says of it against the input."""
+    container = bench.scratch / f"{model}_sizes.stroll"
+    report = bench.program("build", bench.input_of(model), "-o", container, "--memory", "1G", "--json", *options).json()
+    outcome = bench.program("verify", container, "--against", bench.input_of(model), "--memory", "1G", "--json", allowed=(0, 1))
+    verified = outcome.json()
+    finest = verified["uniform_cuts"][0]
+    container.unlink()
+    return {"bytes_per_triangle": report["bytes_out"] / max(1, report["triangles_in"]), "dropped": report["dropped"],
+            "step": report["step"], "quantisation_error": report["quantisation_error"], "holds": outcome.status == 0,
+            "cracked_cuts": verified["cracked_cuts"], "cuts": verified["cuts"],
+            "measured": max(finest["measured_from_input"], finest["measured_to_input"])}
+
+
+def part_sizes(bench, model):
+    if bench.kept("sizes", model, {}):
+        return
+    bench.log.add("sizes", model, {}, default=size_of(bench, model), compact=size_of(bench, model, "--compact"))
+
+
 def level_facts(bench, container):
     facts = bench.program("info", container, "--json").json()["trees"][0]
     names = ("level", "nodes", "groups", "base_vertices", "shared_vertices", "locked_share", "boundary_steps",
@@ -315,6 +336,7 @@ def part_roots(bench, _):
 PARTS = {"build": (part_build, MODELS), "images": (part_images, MODELS), "psnr": (part_psnr, MODELS),
          "verify": (part_verify, MODELS), "backends": (part_backends, ("dragon_scans", "isosurface_1m")),
          "rate": (part_rate, ("isosurface_10m",)), "bytes": (part_bytes, ("isosurface_1m",)),
+         "sizes": (part_sizes, ("isosurface_1m", "isosurface_10m", "dragon_scans", "terrain_n49e011", "iso_cthead", "boxes_1m")),
          "dependencies": (part_dependencies, ("isosurface_10m",)),
          "walk": (part_walk, (("isosurface_1m", "isosurface_10m"),)), "roots": (part_roots, ("",)), **scale_parts.PARTS}
 

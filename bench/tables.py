@@ -77,6 +77,21 @@ def verify_rows(records):
                number(record["seconds"], 1))
 
 
+# Bytes a triangle at most: boxes, whose faces share little, may take half as much again.
+SIZE_LIMITS = {"default": 11, "compact": 4}
+BOXES_SHARE = 1.5
+
+
+def size_rows(records):
+    for record in records_of(records, "sizes"):
+        for name, options in (("default", ""), ("compact", " `--compact`")):
+            side, limit = record[name], SIZE_LIMITS[name] * (BOXES_SHARE if record["model"].startswith("boxes") else 1)
+            yield (record["model"] + options, number(side["bytes_per_triangle"]),
+                   f"{number(side['bytes_per_triangle'] <= limit)} ({limit:g})", number(side["dropped"]["degenerate"]),
+                   f"{side['step']:.3g}", f"{side['quantisation_error']:.3g}", f"{side['measured']:.3g}",
+                   number(side["holds"]), f"{side['cracked_cuts']} of {side['cuts']}")
+
+
 def backend_rows(records):
     for record in records_of(records, "backends"):
         for backend, other in record["others"].items():
@@ -252,6 +267,9 @@ TABLES = (
     ("psnr", "PSNR at one pixel, `--supersample 4`", ("model", "path", "frames", "median dB", "least dB", "30 dB"), psnr_rows),
     ("verify", "verify --against", ("model", "holds", "claimed over measured, median", "least", "cracked cuts", "open edges",
                                     "nodes by clustering", "peak memory", "seconds"), verify_rows),
+    ("sizes", "Bytes a triangle, all levels, positions and normals",
+     ("model", "bytes a triangle", "within (limit)", "without area on the lattice", "lattice step", "moves a point by at most",
+      "finest cut, measured", "verify holds", "cracked cuts"), size_rows),
     ("backends", "One picture from every renderer", ("model", "renderers", "frames of the same bytes", "coverage violations",
                                                      "depth within", "PSNR least dB"), backend_rows),
     ("rate", "Build rate, interleaved pairs", ("model", "figure", "pairs", "best", "median", "worst"), rate_rows),

@@ -6,7 +6,7 @@
 #include "base/memory.h"
 #include "bench.h"
 #include "build/build.h"
-#include "container/container.h"
+#include "container/treelet.h"
 #include "geometry/payload.h"
 #include "jobs/pool.h"
 #include "platform/thread.h"
@@ -15,7 +15,7 @@
 
 #define BUILD_MEMORY_BYTES (1ull << 30)
 #define READ_TRIANGLES 4096u
-#define MOST_PAYLOAD_BYTES ((size_t)32 << 20) /* enough to leave every cache, little enough for every machine */
+#define MOST_PAYLOAD_BYTES ((size_t)16 << 20) /* enough to leave every cache, little enough for every machine */
 
 static double seconds_since(uint64_t start_ns)
 {
@@ -207,19 +207,21 @@ strl_status strl_bench_build(strl_bench *bench, strl_error *err)
 typedef struct payload_set {
     uint8_t *bytes; /* owned */
     size_t size, capacity;
-    uint32_t *sizes; /* [count], owned */
-    size_t count, sizes_capacity;
+    strl_node *nodes; /* [count], owned */
+    size_t count, node_capacity;
+    strl_pm *meshes;  /* [count], by which the children are decoded; owned with what they point at */
+    strl_arena arena;
 } payload_set;
 
 static strl_status add_payload(payload_set *set, strl_container *container, const strl_node *node, strl_error *err)
 {
     if (!strl__grow(&set->bytes, &set->capacity, set->size + node->payload_bytes, 1) ||
-        !strl__grow(&set->sizes, &set->sizes_capacity, set->count + 1, sizeof *set->sizes))
+        !strl__grow(&set->nodes, &set->node_capacity, set->count + 1, sizeof *set->nodes))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu payloads", set->count + 1);
     strl_status status = strl_source_read(strl_container_source(container), node->page.offset + node->payload_offset,
                                           set->bytes + set->size, node->payload_bytes, err);
     set->size += node->payload_bytes;
-    set->sizes[set->count++] = node->payload_bytes;
+    set->nodes[set->count++] = *node;
     return status;
 }
 
@@ -238,6 +240,40 @@ static strl_status load_payloads(payload_set *set, const char *path, strl_error 
     return status;
 }
 
+/* A payload is told by its parent's mesh, whose id is lower. */
+static strl_status decode_payload(const payload_set *set, size_t index, const uint8_t *payload, strl_arena *arena, strl_pm *mesh,
+                                  strl_error *err)
+{
+    const strl_node *node = &set->nodes[index];
+    strl_payload_reference reference, *given = NULL;
+    if (node->decode_parent != STRL_NONE) {
+        reference = strl_payload_reference_of(&set->meshes[node->decode_parent]);
+        strl_page_place(&reference, set->nodes[node->decode_parent].anchor, node);
+        given = &reference;
+    }
+    return strl_payload_decode(payload, node->payload_bytes, given, arena, mesh, err);
+}
+
+static strl_status keep_meshes(payload_set *set, strl_error *err)
+{
+    const uint8_t *payload = set->bytes;
+    set->meshes = strl__alloc_zero(set->count, sizeof *set->meshes);
+    strl_status status = set->meshes ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu meshes", set->count);
+    for (size_t i = 0; status == STRL_OK && i < set->count; i++) {
+        status = decode_payload(set, i, payload, &set->arena, &set->meshes[i], err);
+        payload += set->nodes[i].payload_bytes;
+    }
+    return status;
+}
+
+static void payload_set_deinit(payload_set *set)
+{
+    strl_arena_deinit(&set->arena);
+    strl__free(set->meshes);
+    strl__free(set->nodes);
+    strl__free(set->bytes);
+}
+
 static strl_status decode_payloads(const payload_set *set, double *rate, strl_error *err)
 {
     strl_arena arena;
@@ -249,9 +285,9 @@ static strl_status decode_payloads(const payload_set *set, double *rate, strl_er
     uint64_t start = strl_clock_ns();
     for (size_t p = 0; status == STRL_OK && p < set->count; p++) {
         strl_pm mesh;
-        status = strl_payload_decode(payload, set->sizes[p], &arena, &mesh, err);
+        status = decode_payload(set, p, payload, &arena, &mesh, err);
         triangles += status == STRL_OK ? mesh.triangle_count : 0;
-        payload += set->sizes[p];
+        payload += set->nodes[p].payload_bytes;
         strl_arena_rewind(&arena, mark);
     }
     *rate = millions_per_second(triangles, seconds_since(start));
@@ -270,6 +306,8 @@ strl_status strl_bench_decode(strl_bench *bench, strl_error *err)
     if (status == STRL_OK)
         status = load_payloads(&set, bench->container, err);
     if (status == STRL_OK)
+        status = keep_meshes(&set, err);
+    if (status == STRL_OK)
         status = decode_payloads(&set, &warm_up, err);
     for (unsigned run = 0; status == STRL_OK && run < bench->runs; run++) {
         status = strl_bench_check(bench, "decode", run, err);
@@ -279,7 +317,6 @@ strl_status strl_bench_decode(strl_bench *bench, strl_error *err)
     if (status == STRL_OK)
         snprintf(figure->note, sizeof figure->note, "payloads of %zu nodes, %.2f MB, one thread", set.count,
                  (double)set.size * 1e-6);
-    strl__free(set.sizes);
-    strl__free(set.bytes);
+    payload_set_deinit(&set);
     return status;
 }

@@ -45,7 +45,7 @@ static int print_json(const strl_build_result *r)
 {
     uint64_t dropped = r->dropped_nonfinite + r->dropped_degenerate;
     json_t *object = json_pack(
-        "{s:I, s:I, s:{s:I, s:I, s:I, s:I, s:I}, s:{s:I, s:I}, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:f, s:I, s:I, s:b}",
+        "{s:I, s:I, s:{s:I, s:I, s:I, s:I, s:I}, s:{s:I, s:I}, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:f, s:f, s:f, s:I, s:I, s:b}",
         "triangles_in", (json_int_t)r->triangles_in, "triangles_leaf", (json_int_t)r->triangles_leaf, "dropped",
         "triangles", (json_int_t)dropped, "nonfinite", (json_int_t)r->dropped_nonfinite, "degenerate",
         (json_int_t)r->dropped_degenerate, "lines", (json_int_t)r->dropped_lines, "points",
@@ -53,8 +53,9 @@ static int print_json(const strl_build_result *r)
         "coarse_lattices", (json_int_t)r->coarse_lattices, "vertices", (json_int_t)r->vertices, "parts", (json_int_t)r->parts, "materials",
         (json_int_t)r->materials, "placements", (json_int_t)r->placements, "nodes", (json_int_t)r->nodes, "groups",
         (json_int_t)r->groups, "levels", (json_int_t)r->levels, "root_triangles", (json_int_t)r->root_triangles,
-        "bytes_out", (json_int_t)r->bytes_out, "seconds", r->seconds, "cpu_seconds", r->cpu_seconds, "peak_rss_bytes",
-        (json_int_t)r->peak_rss_bytes, "scratch_bytes", (json_int_t)r->scratch_bytes, "resumed", r->resumed);
+        "bytes_out", (json_int_t)r->bytes_out, "step", r->step, "quantisation_error", r->quantisation_error, "seconds",
+        r->seconds, "cpu_seconds", r->cpu_seconds, "peak_rss_bytes", (json_int_t)r->peak_rss_bytes, "scratch_bytes",
+        (json_int_t)r->scratch_bytes, "resumed", r->resumed);
     if (!object)
         return strl_cli_fail(&(strl_error){STRL_ERR_MEMORY, "no memory to print the result"});
     json_dumpf(object, stdout, JSON_COMPACT);
@@ -93,6 +94,7 @@ static void print_text(const strl_build_result *r, const char *output)
                r->missing_libraries == 1 ? "y" : "ies");
     if (r->coarse_lattices)
         printf("the lattice is coarser than a sixteenth of the short edges\n");
+    printf("lattice step %.9g: no point moves by more than %.3g\n", r->step, r->quantisation_error);
     print_time(r);
 }
 
@@ -129,6 +131,8 @@ static int run(strl_cli_args *args)
         {.name = "grid", .kind = STRL_CLI_REAL, .value = &desc.grid, .argument = "STEP",
          .help = "largest lattice step, model units; one below a 2^30th of the extent is refused (chosen from the model)",
          .least = 1e-300, .most = 1e300},
+        {.name = "compact", .kind = STRL_CLI_FLAG, .value = &desc.compact,
+         .help = "for the network: a lattice step of at most a 32nd of the median edge unless --grid is given, normals of 2 x 8 bits"},
         {.name = "up", .kind = STRL_CLI_ENUM, .value = &desc.up_axis, .argument = "auto|x|y|z",
          .help = "which axis points up; stored, never applied (auto: y for OBJ, z for PLY and STL)"},
         {.name = "unit", .kind = STRL_CLI_ENUM, .value = &unit, .given = &unit_given, .argument = STRL_CLI_UNITS,

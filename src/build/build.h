@@ -41,6 +41,7 @@ typedef struct strl_build_desc {
     unsigned jobs;          /* threads that work; 0 = one per processor */
     double grid;            /* lattice step wanted, model units; 0 = chosen; rounded down to a power of two; refused where it
                                is less than about a 2^30th of the extent */
+    bool compact;           /* for the network: a coarser lattice where grid is 0, normals of 2 x 8 bits */
     int up_axis;            /* 1 x, 2 y, 3 z; 0 = the inputs' own */
     const char *unit;       /* NULL = unknown */
     /* A build that is stopped leaves its scratch folder, with the stages that are finished, for a later one that resumes.
@@ -67,6 +68,7 @@ typedef struct strl_build_result {
     uint64_t vertices, nodes, groups, bytes_out, scratch_bytes;
     uint32_t parts, materials, levels, root_triangles, inputs;
     uint64_t placements;
+    double step, quantisation_error; /* of the lattice; how far it moves a point at most; model units */
     double seconds, cpu_seconds;
     uint64_t peak_rss_bytes;
     bool resumed;      /* an earlier build's stages were used; seconds and cpu_seconds are of this run alone */

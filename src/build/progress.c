@@ -18,23 +18,23 @@ typedef struct stage_share {
 } stage_share;
 
 /* Measured on isosurfaces, in order, shuffled and as STL. They sum to 1. */
-static const stage_share stages[] = {{"survey", 1, 0.015},
-                                     {"read", 2, 0.05},
-                                     {"sort", 3, 0.06},
-                                     {"connect", 4, 0.08},
+static const stage_share stages[] = {{"survey", 1, 0.013},
+                                     {"read", 2, 0.043},
+                                     {"sort", 3, 0.052},
+                                     {"connect", 4, 0.07},
                                      {"partition", 5, 0.005},
-                                     {"level 0", 6, 0.41},
-                                     {"level 1", 6, 0.175},
-                                     {"level 2", 6, 0.11},
-                                     {"level 3", 6, 0.045},
-                                     {"level 4", 6, 0.02},
-                                     {"level 5", 6, 0.01},
-                                     {"level 6", 6, 0.005},
+                                     {"level 0", 6, 0.355},
+                                     {"level 1", 6, 0.152},
+                                     {"level 2", 6, 0.095},
+                                     {"level 3", 6, 0.039},
+                                     {"level 4", 6, 0.018},
+                                     {"level 5", 6, 0.009},
+                                     {"level 6", 6, 0.004},
                                      {"level 7", 6, 0.003},
                                      {"level 8", 6, 0.002},
                                      {"level 9", 6, 0.002},
                                      {"higher levels", 6, 0.003},
-                                     {"write", STRL_STAGE_COUNT, 0.005}};
+                                     {"write", STRL_STAGE_COUNT, 0.135}};
 
 double strl__estimate_seconds(uint64_t triangles, unsigned workers)
 {

@@ -17,6 +17,7 @@ strl_status strl__request_write(const strl_build_desc *desc, strl_writer *writer
 {
     write_text(writer, STRL_VERSION);
     strl_writer_f64(writer, desc->grid);
+    strl_writer_u8(writer, desc->compact);
     strl_writer_u8(writer, (uint8_t)desc->up_axis);
     write_text(writer, desc->unit ? desc->unit : "");
     strl_writer_u8(writer, desc->no_dependencies);
@@ -66,6 +67,7 @@ static strl_status compare_options(const strl_build_desc *desc, strl_cursor *sav
 {
     static const char *const axes[] = {"auto", "x", "y", "z"};
     double grid = strl_cursor_f64(saved);
+    bool compact = strl_cursor_u8(saved);
     unsigned up = strl_cursor_u8(saved), up_now = (unsigned)desc->up_axis;
     saved_text unit = read_text(saved);
     const char *unit_now = desc->unit ? desc->unit : "";
@@ -73,6 +75,9 @@ static strl_status compare_options(const strl_build_desc *desc, strl_cursor *sav
     if (!(grid == desc->grid))
         return strl__fail(err, STRL_ERR_ARGUMENT, "--grid is %g, in the build to be resumed it was %g (0 = chosen)",
                           desc->grid, grid);
+    if (compact != desc->compact)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "--compact is %s, in the build to be resumed it was not",
+                          desc->compact ? "given" : "left out");
     if (up != up_now)
         return strl__fail(err, STRL_ERR_ARGUMENT, "--up is %s, in the build to be resumed it was %s", axes[up_now & 3],
                           axes[up & 3]);

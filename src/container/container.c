@@ -113,7 +113,7 @@ void strl_container_close(strl_container *container)
     strl__page_table_deinit(&container->parts);
     strl__page_table_deinit(&container->materials);
     strl__free(container->trees);
-    strl__free(container->page);
+    strl__opened_forget_meshes(container);
     strl__free(container->name);
     strl_source_close(container->source);
     strl__free(container);

@@ -183,10 +183,10 @@ static strl_status check_counts(const strl_node *node, uint32_t id, const strl_t
     }
     if (node->group_size == 0)
         return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": the group's size is 0, expected at least 1", id);
-    if (node->decode_parent != STRL_NONE && node->decode_parent >= id)
+    if (node->decode_parent != STRL_NONE && node->decode_parent != node->parent)
         return strl__fail(err, STRL_ERR_FORMAT,
-                          "node %" PRIu32 ": decode parent is %" PRIu32 ", expected none or a lower id", id,
-                          node->decode_parent);
+                          "node %" PRIu32 ": decode parent is %" PRIu32 ", expected none or the parent, %" PRIu32, id,
+                          node->decode_parent, node->parent);
     return STRL_OK;
 }
 

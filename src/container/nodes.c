@@ -1,4 +1,4 @@
-/* Node records and meshes for tools that may wait: a few treelets and one page are kept. A treelet is found through the one
+/* Node records for tools that may wait: a few treelets are kept. A treelet is found through the one
  * that names it; a tool that asks for a node whose treelet no treelet read so far has named pays for a scan from the root. */
 #include <inttypes.h>
 
@@ -127,60 +127,5 @@ strl_status strl_container_node(strl_container *container, uint32_t tree, uint32
     strl_status status = get_treelet(container, tree, node / STRL_TREELET_NODES, &treelet, err);
     if (status == STRL_OK)
         *record = treelet->nodes[node % STRL_TREELET_NODES];
-    return strl__opened_fail(container, status, err);
-}
-
-static bool same_page(const strl_page_ref *a, const strl_page_ref *b)
-{
-    return a->offset == b->offset && a->bytes == b->bytes && a->checksum == b->checksum;
-}
-
-static strl_status load_page(strl_container *container, const strl_page_ref *page, strl_error *err)
-{
-    if (same_page(&container->page_ref, page) && page->bytes)
-        return STRL_OK;
-    container->page_ref.bytes = 0;
-    const strl_treelet_ref ref = {.offset = page->offset, .bytes = page->bytes};
-    strl_status status = strl__ref_check(&ref, container->source->bytes, "page", err);
-    if (status == STRL_OK && page->bytes > STRL__MAX_PAGE_BYTES)
-        status = strl__fail(err, STRL_ERR_ARGUMENT, "page of %" PRIu32 " bytes, expected at most %u", page->bytes,
-                            STRL__MAX_PAGE_BYTES);
-    if (status == STRL_OK && !strl__grow(&container->page, &container->page_capacity, page->bytes, 1))
-        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a page of %" PRIu32 " bytes", page->bytes);
-    if (status == STRL_OK)
-        status = strl_source_read(container->source, page->offset, container->page, page->bytes, err);
-    if (status == STRL_OK)
-        status = strl_page_check(page, container->page, page->bytes, err);
-    if (status == STRL_OK)
-        container->page_ref = *page;
-    return status;
-}
-
-static strl_status check_palette(const strl_container *container, const strl_node *record, const strl_pm *mesh,
-                                 strl_error *err)
-{
-    const strl_container_info *info = &container->header.info;
-    for (uint32_t i = 0; i < mesh->palette_count; i++)
-        if (mesh->palette[i].part >= info->part_count || mesh->palette[i].material >= info->material_count)
-            return strl__fail(err, STRL_ERR_FORMAT,
-                              "page at byte %" PRIu64 ", payload at its byte %" PRIu32 ": palette entry %" PRIu32
-                              " names part %" PRIu32 " and material %" PRIu32 ", expected less than %" PRIu32
-                              " and %" PRIu32,
-                              record->page.offset, record->payload_offset, i, mesh->palette[i].part,
-                              mesh->palette[i].material, info->part_count, info->material_count);
-    return STRL_OK;
-}
-
-strl_status strl_container_mesh(strl_container *container, uint32_t tree, const strl_node *record, strl_arena *arena,
-                                strl_pm *mesh, strl_error *err)
-{
-    *mesh = (strl_pm){0};
-    if (!strl_container_tree(container, tree))
-        return strl__fail(err, STRL_ERR_ARGUMENT, "there is no tree %" PRIu32, tree);
-    strl_status status = load_page(container, &record->page, err);
-    if (status == STRL_OK)
-        status = strl_page_mesh(record, container->page, record->page.bytes, arena, mesh, err);
-    if (status == STRL_OK)
-        status = check_palette(container, record, mesh, err);
     return strl__opened_fail(container, status, err);
 }

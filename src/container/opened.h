@@ -20,6 +20,15 @@ typedef struct strl__cached_treelet {
     strl_treelet *treelet; /* owned */
 } strl__cached_treelet;
 
+/* A mesh by which others are decoded. */
+typedef struct strl__kept_mesh {
+    bool is_whole;
+    uint32_t tree, node;
+    strl_node record;
+    strl_arena arena;
+    strl_pm mesh;
+} strl__kept_mesh;
+
 struct strl_container {
     strl_source *source; /* owned */
     char *name;          /* owned; NULL where it was not opened by a path */
@@ -31,10 +40,12 @@ struct strl_container {
     uint8_t *page; /* the last page read, owned */
     size_t page_capacity;
     strl_page_ref page_ref; /* bytes 0 = none */
+    strl__kept_mesh kept[STRL_DECODE_CHAIN]; /* by their depth in a chain */
 };
 
 /* Puts the file's name before the sentence, unless it is there. Returns status. */
 strl_status strl__opened_fail(const strl_container *container, strl_status status, strl_error *err);
 void strl__opened_forget_nodes(strl_container *container);
+void strl__opened_forget_meshes(strl_container *container);
 
 #endif

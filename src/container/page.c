@@ -72,29 +72,31 @@ static strl_status check_mesh(const strl_node *record, const strl_pm *mesh, strl
     return status;
 }
 
-static strl_status decode(const strl_node *record, const uint8_t *page, size_t size, strl_arena *arena, strl_pm *mesh,
-                          strl_error *err)
+void strl_page_place(strl_payload_reference *reference, const int64_t anchor[3], const strl_node *record)
 {
-    if (record->decode_parent != STRL_NONE)
-        return strl__fail(err, STRL_ERR_UNSUPPORTED,
-                          "it needs the decoded node %" PRIu32 ", which this version does not support",
-                          record->decode_parent);
+    for (int axis = 0; axis < 3; axis++) /* modulo 2^32: what is further off than that is not the same place */
+        reference->offset[axis] = (int32_t)(uint32_t)((uint64_t)anchor[axis] - (uint64_t)record->anchor[axis]);
+}
+
+static strl_status decode(const strl_node *record, const uint8_t *page, size_t size,
+                          const strl_payload_reference *reference, strl_arena *arena, strl_pm *mesh, strl_error *err)
+{
     if (record->payload_offset > size || record->payload_bytes > size - record->payload_offset)
         return strl__fail(err, STRL_ERR_FORMAT, "its %" PRIu32 " bytes pass the end of a page of %zu bytes",
                           record->payload_bytes, size);
     const uint8_t *payload = page + record->payload_offset;
     strl_status status = check_sizes(record, payload, err);
     if (status == STRL_OK)
-        status = strl_payload_decode(payload, record->payload_bytes, arena, mesh, err);
+        status = strl_payload_decode(payload, record->payload_bytes, reference, arena, mesh, err);
     return status == STRL_OK ? check_mesh(record, mesh, err) : status;
 }
 
-strl_status strl_page_mesh(const strl_node *record, const void *page, size_t size, strl_arena *arena, strl_pm *mesh,
-                           strl_error *err)
+strl_status strl_page_mesh(const strl_node *record, const void *page, size_t size, const strl_payload_reference *reference,
+                           strl_arena *arena, strl_pm *mesh, strl_error *err)
 {
     *mesh = (strl_pm){0};
     strl_arena_mark mark = strl_arena_get_mark(arena);
-    strl_status status = decode(record, page, size, arena, mesh, err);
+    strl_status status = decode(record, page, size, reference, arena, mesh, err);
     if (status == STRL_OK)
         return STRL_OK;
     strl_arena_rewind(arena, mark);

@@ -4,6 +4,7 @@
 #define STRL_CONTAINER_TREELET_H
 
 #include "container/container.h"
+#include "geometry/payload.h"
 
 /* Where a treelet lies. A treelet names the treelets that hold the children of its nodes; the header names the first. */
 typedef struct strl_treelet_ref {
@@ -31,9 +32,14 @@ void strl_treelet_deinit(strl_treelet *treelet);
 
 /* Checks a page's bytes against its reference. */
 strl_status strl_page_check(const strl_page_ref *ref, const void *data, size_t size, strl_error *err);
-/* Decodes one node's mesh from its page (already checked) and checks it against the record (counts, box, errors). */
-strl_status strl_page_mesh(const strl_node *record, const void *page, size_t size, strl_arena *arena, strl_pm *mesh,
-                           strl_error *err);
+/* Decodes one node's mesh from its page (already checked) and checks it against the record (counts, box, errors).
+ * reference: the finest state of the record's decode_parent, placed; NULL where it has none. */
+strl_status strl_page_mesh(const strl_node *record, const void *page, size_t size, const strl_payload_reference *reference,
+                           strl_arena *arena, strl_pm *mesh, strl_error *err);
+/* Sets the offset of a reference whose positions are relative to `anchor`, for a node's payload. */
+void strl_page_place(strl_payload_reference *reference, const int64_t anchor[3], const strl_node *record);
+/* Nodes in a chain of decode parents, at most, from the one that is self-contained on. */
+#define STRL_DECODE_CHAIN 32u
 /* Bytes that the decoded mesh of a node takes in a walk: per vertex 20 for itself and 10 for its parent and the corners that it
  * moves, per triangle 6 for its corners, 6 for indices and 12 for lists of corners, 16 per state. A pure function of the record's
  * counts (docs/format.md has it), used for budgets before anything is fetched. */

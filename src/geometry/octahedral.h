@@ -21,6 +21,13 @@ static inline void strl_oct_encode(const float normal[3], uint16_t out[2])
     out[1] = (uint16_t)lrintf((y * 0.5f + 0.5f) * STRL_OCT_MAX);
 }
 
+/* The nearest coordinate that a payload can hold in 8 bits. */
+static inline uint16_t strl_oct_coarsen(uint16_t coordinate)
+{
+    uint32_t coarse = (coordinate * 255u + STRL_OCT_MAX / 2) / STRL_OCT_MAX;
+    return (uint16_t)((coarse * STRL_OCT_MAX + 127) / 255);
+}
+
 static inline void strl_oct_decode(const uint16_t in[2], float normal[3])
 {
     float x = (float)in[0] * (2.f / STRL_OCT_MAX) - 1, y = (float)in[1] * (2.f / STRL_OCT_MAX) - 1;

@@ -6,12 +6,17 @@
 
 #include "base/fail.h"
 
-enum { FLAG_COLOUR = 1, FLAG_PALETTE_INDEX = 2 };
+enum { FLAG_COLOUR = 1, FLAG_PALETTE_INDEX = 2, FLAG_COPIES = 4 };
 
-static strl_status read_head(strl_cursor *cursor, strl_payload_sizes *sizes, uint8_t *flags, strl_error *err)
+struct head {
+    uint8_t flags, normal_bits;
+};
+
+static strl_status read_head(strl_cursor *cursor, strl_payload_sizes *sizes, struct head *head, strl_error *err)
 {
     uint8_t version = strl_cursor_u8(cursor);
-    *flags = strl_cursor_u8(cursor);
+    head->flags = strl_cursor_u8(cursor);
+    head->normal_bits = strl_cursor_u8(cursor);
     sizes->vertex_count = strl_cursor_u16(cursor);
     sizes->base_vertex_count = strl_cursor_u16(cursor);
     sizes->step_count = strl_cursor_u16(cursor);
@@ -20,9 +25,11 @@ static strl_status read_head(strl_cursor *cursor, strl_payload_sizes *sizes, uin
     sizes->base_triangle_count = strl_cursor_u32(cursor);
     if (cursor->failed)
         return strl__fail(err, STRL_ERR_FORMAT, "node payload of %zu bytes is too short for its head", cursor->size);
-    if (version != 1 || *flags > (FLAG_COLOUR | FLAG_PALETTE_INDEX))
-        return strl__fail(err, STRL_ERR_FORMAT, "node payload has version %u and flags %u, expected 1 and at most 3",
-                          version, *flags);
+    if (version != 1 || head->flags > (FLAG_COLOUR | FLAG_PALETTE_INDEX | FLAG_COPIES))
+        return strl__fail(err, STRL_ERR_FORMAT, "node payload has version %u and flags %u, expected 1 and at most 7",
+                          version, head->flags);
+    if (head->normal_bits != 8 && head->normal_bits != 10)
+        return strl__fail(err, STRL_ERR_FORMAT, "node payload has normals of 2 x %u bits, expected 8 or 10", head->normal_bits);
     if (sizes->triangle_count > STRL_PM_MAX_TRIANGLES || sizes->base_triangle_count > sizes->triangle_count ||
         sizes->base_vertex_count > sizes->vertex_count || sizes->palette_count < 1 ||
         sizes->step_count > sizes->vertex_count - sizes->base_vertex_count)
@@ -43,8 +50,8 @@ static strl_status read_head(strl_cursor *cursor, strl_payload_sizes *sizes, uin
 strl_status strl_payload_peek(const void *data, size_t size, strl_payload_sizes *sizes, strl_error *err)
 {
     strl_cursor cursor = strl_cursor_make(data, size);
-    uint8_t flags;
-    return read_head(&cursor, sizes, &flags, err);
+    struct head head;
+    return read_head(&cursor, sizes, &head, err);
 }
 
 static strl_status allocate(const strl_payload_sizes *sizes, uint8_t flags, strl_arena *arena, strl_pm *pm,
@@ -82,10 +89,12 @@ static strl_status decode_parts(struct strl__decoder *d, strl_cursor *cursor)
     strl_status status = strl__streams_read(cursor, cursor->size, items, d->scratch, &d->in, d->err);
     if (status)
         return status;
-    d->from = strl_arena_alloc(d->scratch, sizes->base_vertex_count, sizeof *d->from);
+    d->from = strl_arena_alloc(d->scratch, (size_t)sizes->base_vertex_count + 3, sizeof *d->from);
     if (!d->from || !strl__mesh_init(&d->mesh, sizes->vertex_count, sizes->triangle_count, d->pm->position, d->scratch))
         return strl__fail(d->err, STRL_ERR_MEMORY, "no memory to decode a node payload");
-    status = strl__decode_base(d);
+    status = strl__decode_copies(d);
+    if (!status)
+        status = strl__decode_base(d);
     if (!status)
         status = strl__decode_steps(d);
     if (!status)
@@ -101,7 +110,7 @@ static strl_status decode_parts(struct strl__decoder *d, strl_cursor *cursor)
  * decoding. Where more is needed, the arena grows as usual. It keeps to what the caller's arena may still take. */
 static void reserve(const struct strl__decoder *d, size_t size, const strl_arena *arena, strl_arena *scratch)
 {
-    size_t limit = 0, wanted = 2 * size + (size_t)d->sizes.vertex_count * 128 + (size_t)d->sizes.triangle_count * 64 +
+    size_t limit = 0, wanted = 2 * size + (size_t)d->sizes.vertex_count * 160 + (size_t)d->sizes.triangle_count * 64 +
                                (size_t)d->sizes.base_triangle_count * 60 + 32768;
     if (arena->limit_bytes)
         limit = arena->limit_bytes > arena->total_bytes ? arena->limit_bytes - arena->total_bytes : 1;
@@ -111,19 +120,24 @@ static void reserve(const struct strl__decoder *d, size_t size, const strl_arena
     strl_arena_rewind(scratch, empty);
 }
 
-strl_status strl_payload_decode(const void *data, size_t size, strl_arena *arena, strl_pm *pm, strl_error *err)
+strl_status strl_payload_decode(const void *data, size_t size, const strl_payload_reference *reference, strl_arena *arena,
+                                strl_pm *pm, strl_error *err)
 {
     strl_cursor cursor = strl_cursor_make(data, size);
     strl_pm mesh = {0};
     strl_arena scratch;
-    struct strl__decoder decoder = {.pm = &mesh, .scratch = &scratch, .err = err};
-    uint8_t flags;
+    struct strl__decoder decoder = {.pm = &mesh, .reference = reference, .scratch = &scratch, .err = err};
+    struct head head;
     *pm = mesh;
-    strl_status status = read_head(&cursor, &decoder.sizes, &flags, err);
+    strl_status status = read_head(&cursor, &decoder.sizes, &head, err);
     if (status)
         return status;
+    decoder.normal_most = (1u << head.normal_bits) - 1;
+    if (!(head.flags & FLAG_COPIES) != !reference)
+        return strl__fail(err, STRL_ERR_FORMAT, "node payload %s another node's mesh, which was %s",
+                          reference ? "does not use" : "needs", reference ? "given" : "not given");
     strl_arena_mark before = strl_arena_get_mark(arena);
-    status = allocate(&decoder.sizes, flags, arena, &mesh, err);
+    status = allocate(&decoder.sizes, head.flags, arena, &mesh, err);
     reserve(&decoder, size, arena, &scratch);
     if (!status)
         status = decode_parts(&decoder, &cursor);

@@ -8,15 +8,20 @@
 
 struct strl__decoder {
     strl_payload_sizes sizes;
+    uint32_t normal_most; /* the largest coordinate of a normal, as the payload holds it */
     struct strl__streams_in in;
     struct strl__mesh mesh;
     strl_pm *pm;
-    uint16_t *from; /* [base vertices], the vertex that predicts colour and palette index */
+    const strl_payload_reference *reference; /* or NULL */
+    uint32_t copied;       /* vertices copied from it: the first numbers */
+    uint16_t *copied_from; /* [base vertices + 3], vertices of the reference; copied of them hold */
+    uint16_t *from; /* [base vertices + 3], the vertex that predicts colour and palette index */
     strl_arena *scratch;
     strl_error *err;
 };
 
-/* Base vertices and triangles. */
+/* What the base mesh has of the reference, then its other vertices and triangles. */
+strl_status strl__decode_copies(struct strl__decoder *decoder);
 strl_status strl__decode_base(struct strl__decoder *decoder);
 /* All steps: vertices, parents, triangles. */
 strl_status strl__decode_steps(struct strl__decoder *decoder);

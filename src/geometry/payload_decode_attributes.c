@@ -3,18 +3,37 @@
 #include "geometry/payload_decode.h"
 
 #include "base/fail.h"
+#include "geometry/payload_reference.h"
 
-static bool decode_normals(struct strl__decoder *d)
+/* Inlined with `most` a constant, by which it divides. */
+static inline __attribute__((always_inline)) void set_normal(uint16_t normal[2], const uint32_t predicted[2], uint32_t a,
+                                                             uint32_t b, uint32_t most)
+{
+    normal[0] = (uint16_t)strl__normal_widen((predicted[0] + strl__unzigzag(a)) & most, most);
+    normal[1] = (uint16_t)strl__normal_widen((predicted[1] + strl__unzigzag(b)) & most, most);
+}
+
+static inline __attribute__((always_inline)) bool decode_normals(struct strl__decoder *d, uint32_t most)
 {
     uint64_t(*sum)[4] = strl__normal_sums(&d->mesh, d->scratch);
-    for (uint32_t v = 0; sum && v < d->sizes.vertex_count; v++) {
-        uint32_t predicted[2];
-        strl__normal_predict(sum[v], predicted);
+    uint32_t copied = d->copied, own = d->sizes.vertex_count - copied, predicted[2];
+    const uint32_t *copy_a = strl__pull_all(&d->in, STRL__STREAM_COPY_NORMAL, copied);
+    const uint32_t *copy_b = strl__pull_all(&d->in, STRL__STREAM_COPY_NORMAL + 1, copied);
+    const uint32_t *own_a = strl__pull_all(&d->in, STRL__STREAM_NORMAL, own);
+    const uint32_t *own_b = strl__pull_all(&d->in, STRL__STREAM_NORMAL + 1, own);
+    if (d->in.failed || !sum)
+        return sum;
+    for (uint32_t v = 0; v < copied; v++) {
+        const uint16_t *from = strl__reference_normal(d->reference, d->copied_from[v]);
         for (unsigned k = 0; k < 2; k++)
-            d->pm->normal[v][k] =
-                (uint16_t)((predicted[k] + strl__unzigzag(strl__pull(&d->in, STRL__STREAM_NORMAL + k))) & 1023u);
+            predicted[k] = strl__normal_narrow(from[k], most);
+        set_normal(d->pm->normal[v], predicted, copy_a[v], copy_b[v], most);
     }
-    return sum;
+    for (uint32_t i = 0; i < own; i++) {
+        strl__normal_predict(sum[copied + i], most, predicted);
+        set_normal(d->pm->normal[copied + i], predicted, own_a[i], own_b[i], most);
+    }
+    return true;
 }
 
 /* The vertex that predicts v's colour and palette index; v itself where there is none. */
@@ -71,8 +90,9 @@ static bool decode_errors(struct strl__decoder *d, unsigned id, float *error)
         uint32_t run = strl__pull(&d->in, id);
         if (run > last - state)
             return false;
+        float value = strl__error_of_code(code);
         for (uint32_t end = state + run; state <= end; state++)
-            error[state] = strl__error_of_code(code);
+            error[state] = value;
         if (state > last)
             return true;
         uint32_t fall = strl__pull(&d->in, id);
@@ -84,7 +104,7 @@ static bool decode_errors(struct strl__decoder *d, unsigned id, float *error)
 
 strl_status strl__decode_attributes(struct strl__decoder *d)
 {
-    if (!decode_normals(d))
+    if (!(d->normal_most == 255 ? decode_normals(d, 255) : decode_normals(d, 1023)))
         return strl__fail(d->err, STRL_ERR_MEMORY, "no memory to decode a node payload");
     if (d->pm->colour)
         decode_colours(d);

@@ -81,12 +81,7 @@ static bool decode_arc(struct splitter *s, const struct wedge *w, unsigned kind)
         set_first_position(s, w, &mean);
     uint16_t a = star->wing[start][0], b = star->wing[place][1];
     sound &= !strl__is_at(v, position[a]) && (!kind || !strl__is_at(v, origin));
-    for (uint32_t i = 0; i <= count; i++) {
-        place = s->arc[i];
-        star->moves[place] = 0;
-        sound &= !strl__is_at(v, position[star->wing[place][1]]);
-        strl__mesh_move_corner(mesh, star->corner[place], w->vertex);
-    }
+    sound &= strl__star_move(star, mesh, w->parent, w->vertex, s->arc, count + 1);
     if (sound && kind & STRL__KIND_START)
         sound = add_triangle(s, w->vertex, w->parent, a);
     if (sound && kind & STRL__KIND_END)
@@ -121,6 +116,7 @@ static bool decode_runs(struct splitter *s, struct strl__mean *mean, uint32_t *m
             if (!moves)
                 continue;
             s->arc[(*moved)++] = done;
+            star->moves[done] = 1;
             strl__mean_add(mean, position[star->wing[done][0]]);
             strl__mean_add(mean, position[star->wing[done][1]]);
         }
@@ -138,12 +134,11 @@ static bool decode_general(struct splitter *s, const struct wedge *w)
         return false;
     if (w->is_first)
         set_first_position(s, w, &mean);
-    for (uint32_t i = 0; i < moved; i++) {
-        const uint16_t *wing = star->wing[s->arc[i]];
-        if (strl__same_position(position, w->vertex, wing[0]) || strl__same_position(position, w->vertex, wing[1]))
+    for (uint32_t i = 0; i < moved; i++)
+        if (strl__same_position(position, w->vertex, star->wing[s->arc[i]][0]))
             return false;
-        strl__mesh_move_corner(&s->d->mesh, star->corner[s->arc[i]], w->vertex);
-    }
+    if (!strl__star_move(star, &s->d->mesh, w->parent, w->vertex, s->arc, moved))
+        return false;
     uint32_t triangles = strl__pull(&s->d->in, STRL__STREAM_GENERAL);
     for (uint32_t i = 0; i < triangles; i++) {
         uint32_t x, y;
@@ -195,20 +190,16 @@ static bool decode_step(struct splitter *s)
 }
 
 /* Brings the list of a step to come into the cache: its parent is known but where steps between add more than one
- * vertex. The hops are a fixed number, because a loop that ends with the list would be mispredicted. */
+ * vertex. */
 static inline void prefetch(const struct strl__decoder *d, uint32_t step)
 {
-    enum { AHEAD = 2, HOPS = 7 };
+    enum { AHEAD = 4 };
     const struct strl__stream_in *parents = &d->in.stream[STRL__STREAM_PARENT];
     if (step - 1 + AHEAD >= parents->count)
         return;
     uint32_t parent = d->mesh.vertex_count - 1 + AHEAD - parents->values[step - 1 + AHEAD];
-    if (parent >= d->mesh.vertex_count)
-        return;
-    uint32_t corner = d->mesh.corner[d->mesh.heads + parent].next;
-    for (unsigned i = 0; i < HOPS; i++)
-        corner = d->mesh.corner[corner].next;
-    __asm__ volatile("" : : "r"(corner)); /* or the compiler sees that nothing comes of it */
+    if (parent < d->mesh.vertex_count)
+        __builtin_prefetch(&d->mesh.chunk[parent]);
 }
 
 strl_status strl__decode_steps(struct strl__decoder *d)

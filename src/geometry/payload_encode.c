@@ -70,10 +70,11 @@ static bool init(struct strl__encoder *e)
     return true;
 }
 
-static void write_head(const strl_pm *pm, strl_writer *writer)
+static void write_head(const strl_pm *pm, bool copies, strl_writer *writer)
 {
     strl_writer_u8(writer, 1);
-    strl_writer_u8(writer, (uint8_t)((pm->colour ? 1 : 0) | (pm->palette_index ? 2 : 0)));
+    strl_writer_u8(writer, (uint8_t)((pm->colour ? 1 : 0) | (pm->palette_index ? 2 : 0) | (copies ? 4 : 0)));
+    strl_writer_u8(writer, (uint8_t)strl__normal_bits(pm));
     strl_writer_u16(writer, (uint16_t)pm->vertex_count);
     strl_writer_u16(writer, (uint16_t)pm->vertex_end[0]);
     strl_writer_u16(writer, (uint16_t)pm->step_count);
@@ -82,29 +83,61 @@ static void write_head(const strl_pm *pm, strl_writer *writer)
     strl_writer_u32(writer, pm->triangle_end[0]);
 }
 
-strl_status strl_payload_encode(const strl_pm *pm, strl_arena *scratch, strl_writer *writer, strl_error *err)
+strl_payload_reference strl_payload_reference_of(const strl_pm *pm)
 {
-    strl_status status = strl_pm_check(pm, err);
-    if (status)
-        return status;
-    struct strl__encoder e = {.pm = pm, .scratch = scratch, .err = err};
+    return (strl_payload_reference){.vertex_count = pm->vertex_count,
+                                    .triangle_count = pm->triangle_count,
+                                    .position = pm->position,
+                                    .normal = pm->normal,
+                                    .position_stride = sizeof *pm->position,
+                                    .normal_stride = sizeof *pm->normal,
+                                    .triangle = (const uint16_t(*)[3])pm->triangle};
+}
+
+static void get_order(const struct strl__encoder *e, const strl_payload_order *order)
+{
+    for (uint32_t v = 0; v < e->pm->vertex_count; v++)
+        order->vertex[e->number[v]] = (uint16_t)v;
+    for (uint32_t t = 0; t < e->pm->triangle_count; t++)
+        order->triangle[e->triangle_of[t]] = 4 * t + (3 - e->rotation[t]) % 3;
+}
+
+strl_status strl__payload_collect(const strl_pm *pm, const strl_payload_reference *reference, strl_arena *scratch,
+                                  struct strl__streams_out *streams, const strl_payload_order *order, strl_error *err)
+{
+    struct strl__encoder e = {.pm = pm, .reference = reference, .scratch = scratch, .err = err};
     strl_arena_mark mark = strl_arena_get_mark(scratch);
-    size_t start = writer->size;
-    write_head(pm, writer);
-    if (!init(&e))
+    strl_status status = strl_pm_check(pm, err);
+    if (!status && !init(&e))
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory to encode a node payload");
+    if (!status)
+        status = strl__encode_copies(&e);
     if (!status)
         status = strl__encode_base(&e);
     if (!status)
         status = strl__encode_steps(&e);
     if (!status)
         status = strl__encode_attributes(&e);
-    if (!status)
-        status = strl__streams_write(&e.out, start, (uint64_t)pm->vertex_count + pm->triangle_count + pm->palette_count,
+    if (!status && order)
+        get_order(&e, order);
+    *streams = e.out;
+    strl_arena_rewind(scratch, mark);
+    return status;
+}
+
+strl_status strl_payload_encode(const strl_pm *pm, const strl_payload_reference *reference, strl_arena *scratch,
+                                strl_writer *writer, const strl_payload_order *order, strl_error *err)
+{
+    struct strl__streams_out streams;
+    size_t start = writer->size;
+    strl_status status = strl__payload_collect(pm, reference, scratch, &streams, order, err);
+    if (!status) {
+        write_head(pm, reference != NULL, writer);
+        status = strl__streams_write(&streams, start, (uint64_t)pm->vertex_count + pm->triangle_count + pm->palette_count,
                                      writer, err);
+    }
     if (status && writer->size > start)
         writer->size = start;
-    strl__streams_deinit(&e.out);
-    strl_arena_rewind(scratch, mark);
+    strl__streams_deinit(&streams);
     return status;
 }

@@ -9,6 +9,9 @@
 
 struct strl__encoder {
     const strl_pm *pm;
+    const strl_payload_reference *reference; /* or NULL */
+    uint32_t copied;         /* vertices copied from it: the first numbers */
+    uint16_t *copied_from;   /* [copied], vertices of the reference */
     struct strl__streams_out out;
     struct strl__mesh mesh;  /* vertices and triangles as the decoder numbers them */
     uint16_t *number;        /* [pm vertices], the decoder's number of a vertex; steps' vertices keep theirs */
@@ -23,9 +26,18 @@ struct strl__encoder {
     strl_error *err;
 };
 
+/* What the base mesh has of the reference. */
+strl_status strl__encode_copies(struct strl__encoder *encoder);
 strl_status strl__encode_base(struct strl__encoder *encoder);
 strl_status strl__encode_steps(struct strl__encoder *encoder);
 strl_status strl__encode_attributes(struct strl__encoder *encoder);
+
+/* 8 where that is enough for all normals, else 10. */
+unsigned strl__normal_bits(const strl_pm *pm);
+
+/* All that a payload says, for strl__streams_write; *streams is the caller's to deinit, on failure too. */
+strl_status strl__payload_collect(const strl_pm *pm, const strl_payload_reference *reference, strl_arena *scratch,
+                                  struct strl__streams_out *streams, const strl_payload_order *order, strl_error *err);
 
 /* Writes vertex's position, which the mesh holds already, as a residual. */
 static inline void strl__push_position(struct strl__encoder *encoder, unsigned id, const uint32_t predicted[3],

@@ -3,6 +3,7 @@
 #include "geometry/payload_encode.h"
 
 #include "base/fail.h"
+#include "geometry/payload_reference.h"
 
 /* pm's vertex with the decoder's number v. */
 static uint32_t pm_vertex(const struct strl__encoder *e, uint32_t v)
@@ -16,16 +17,28 @@ static uint32_t predictor(const struct strl__encoder *e, uint32_t v)
     return v < e->pm->vertex_end[0] ? e->vertex[e->from[v]] : e->pm->parent[v];
 }
 
+unsigned strl__normal_bits(const strl_pm *pm)
+{
+    for (uint32_t v = 0; v < pm->vertex_count; v++)
+        for (unsigned k = 0; k < 2; k++)
+            if (strl__normal_widen(strl__normal_narrow(pm->normal[v][k], 255), 255) != pm->normal[v][k])
+                return 10;
+    return 8;
+}
+
 static bool encode_normals(struct strl__encoder *e)
 {
-    uint32_t count = e->pm->vertex_count;
+    uint32_t count = e->pm->vertex_count, most = (1u << strl__normal_bits(e->pm)) - 1, half = (most + 1) / 2;
     uint64_t(*sum)[4] = strl__normal_sums(&e->mesh, e->scratch);
     for (uint32_t v = 0; sum && v < count; v++) {
+        unsigned stream = v < e->copied ? STRL__STREAM_COPY_NORMAL : STRL__STREAM_NORMAL;
         uint32_t predicted[2];
-        strl__normal_predict(sum[v], predicted);
+        strl__normal_predict(sum[v], most, predicted);
         for (unsigned k = 0; k < 2; k++) {
-            uint32_t difference = (e->pm->normal[pm_vertex(e, v)][k] - predicted[k] + 512u) & 1023u;
-            strl__push(&e->out, STRL__STREAM_NORMAL + k, strl__zigzag(difference - 512u));
+            if (v < e->copied)
+                predicted[k] = strl__normal_narrow(strl__reference_normal(e->reference, e->copied_from[v])[k], most);
+            uint32_t narrow = strl__normal_narrow(e->pm->normal[pm_vertex(e, v)][k], most);
+            strl__push(&e->out, stream + k, strl__zigzag(((narrow - predicted[k] + half) & most) - half));
         }
     }
     return sum;

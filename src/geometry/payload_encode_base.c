@@ -31,6 +31,19 @@ static uint32_t edge_slot(const struct walker *w, uint32_t from, uint32_t to)
     return (uint32_t)(((uint64_t)from << 16 | to) * 0x9e3779b97f4a7c15u >> 40) & w->edge_mask;
 }
 
+/* The slot of the written vertex at the position of pm's vertex, or the empty slot for it. */
+static uint32_t *find_place(struct walker *w, uint32_t vertex)
+{
+    const int32_t *p = w->e->pm->position[vertex];
+    uint64_t key = strl__mix64((uint64_t)(uint32_t)p[0] | (uint64_t)(uint32_t)p[1] << 32) ^ (uint32_t)p[2];
+    uint32_t slot = (uint32_t)strl__mix64(key) & w->place_mask;
+    for (;; slot = (slot + 1) & w->place_mask) {
+        uint32_t there = w->place_bucket[slot];
+        if (there == STRL__NONE || !memcmp(w->e->mesh.position[there], p, sizeof *w->e->pm->position))
+            return &w->place_bucket[slot];
+    }
+}
+
 static bool walker_init(struct walker *w)
 {
     const strl_pm *pm = w->e->pm;
@@ -52,6 +65,10 @@ static bool walker_init(struct walker *w)
         w->edge_next[edge] = *bucket;
         *bucket = edge;
     }
+    for (uint32_t v = 0; v < w->e->copied; v++) {
+        uint32_t *place = find_place(w, w->e->vertex[v]);
+        *place = *place == STRL__NONE ? v : *place;
+    }
     return true;
 }
 
@@ -72,19 +89,6 @@ static uint32_t find_edge(struct walker *w, uint32_t from, uint32_t to)
         link = &w->edge_next[edge];
     }
     return STRL__NONE;
-}
-
-/* The slot of the written vertex at the position of pm's vertex, or the empty slot for it. */
-static uint32_t *find_place(struct walker *w, uint32_t vertex)
-{
-    const int32_t *p = w->e->pm->position[vertex];
-    uint64_t key = strl__mix64((uint64_t)(uint32_t)p[0] | (uint64_t)(uint32_t)p[1] << 32) ^ (uint32_t)p[2];
-    uint32_t slot = (uint32_t)strl__mix64(key) & w->place_mask;
-    for (;; slot = (slot + 1) & w->place_mask) {
-        uint32_t there = w->place_bucket[slot];
-        if (there == STRL__NONE || !memcmp(w->e->mesh.position[there], p, sizeof *w->e->pm->position))
-            return &w->place_bucket[slot];
-    }
 }
 
 /* Gives pm's vertex the next number. Returns its twin's number, or STRL__NONE where it is alone at its position so far.

@@ -199,8 +199,7 @@ static void encode_wedge(struct recorder *r, uint32_t step)
         encode_general(r);
     else
         encode_arc(r);
-    for (uint32_t i = 0; i < r->moved; i++)
-        strl__mesh_move_corner(&e->mesh, r->star.corner[r->arc[i]], r->vertex);
+    strl__star_move(&r->star, &e->mesh, r->parent, r->vertex, r->arc, r->moved);
     for (uint32_t i = 0; i < r->added_count; i++) {
         uint32_t corner[3] = {r->vertex, added_corner(r, r->added[i], 1), added_corner(r, r->added[i], 2)};
         strl__encode_triangle(e, r->added[i] / 3, r->added[i] % 3, corner);

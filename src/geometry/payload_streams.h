@@ -32,10 +32,13 @@ enum {
     STRL__STREAM_PALETTE_INDEX = STRL__STREAM_NORMAL + 2,
     STRL__STREAM_COLOUR,
     STRL__STREAM_PALETTE = STRL__STREAM_COLOUR + 4,
-    STRL__STREAM_COUNT = STRL__STREAM_PALETTE + 3
+    STRL__STREAM_SELECT = STRL__STREAM_PALETTE + 3, /* one a context */
+    STRL__STREAM_COPY_NORMAL = STRL__STREAM_SELECT + 4, /* STRL__SELECT_CONTEXTS */
+    STRL__STREAM_COUNT = STRL__STREAM_COPY_NORMAL + 2
 };
 
 #define STRL__OPERATION_CONTEXTS 6u
+#define STRL__SELECT_CONTEXTS 4u
 #define STRL__SYMBOLS 72u
 #define STRL__PROBABILITY_BITS 11
 #define STRL__PROBABILITY_ONE (1u << STRL__PROBABILITY_BITS)
@@ -102,6 +105,8 @@ static inline void strl__push(struct strl__streams_out *streams, unsigned id, ui
  * format asks; item_count = vertices + triangles + palette entries. */
 strl_status strl__streams_write(const struct strl__streams_out *streams, size_t start, uint64_t item_count,
                                 strl_writer *writer, strl_error *err);
+/* What each stream costs, its count and its table included. */
+void strl__streams_bits(const struct strl__streams_out *streams, double bits[STRL__STREAM_COUNT]);
 void strl__streams_deinit(struct strl__streams_out *streams);
 
 /* ---- reading ---- */
@@ -126,6 +131,18 @@ static inline uint32_t strl__pull(struct strl__streams_in *streams, unsigned id)
         return stream->values[stream->at++];
     streams->failed = true;
     return 0;
+}
+
+/* The next `count` values of a stream, all of them or NULL. */
+static inline const uint32_t *strl__pull_all(struct strl__streams_in *streams, unsigned id, uint32_t count)
+{
+    struct strl__stream_in *stream = &streams->stream[id];
+    if (count > stream->count - stream->at) {
+        streams->failed = true;
+        return NULL;
+    }
+    stream->at += count;
+    return stream->values + (stream->at - count);
 }
 
 /* True when every value was pulled and none was missing. */

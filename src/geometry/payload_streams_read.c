@@ -21,7 +21,7 @@ struct reader {
     uint32_t state[STRL__RANS_STATES];
 };
 
-/* symbol | frequency - 1 << 8 | slot - start << 20; filled in runs of SLOT_RUN, which may pass the end. */
+/* symbol | frequency << 8 | slot - start << 20; filled in runs of SLOT_RUN, which may pass the end. */
 enum { SLOT_RUN = 8 };
 typedef uint32_t slot_table[STRL__PROBABILITY_ONE + SLOT_RUN];
 
@@ -64,9 +64,10 @@ static unsigned read_table(struct reader *reader, slot_table slots)
         } else if (!frequency) {
             return 0;
         }
-        for (uint32_t i = 0, slot = s | (frequency - 1) << 8; i < frequency; i += SLOT_RUN, slot += SLOT_RUN << 20)
-            for (unsigned k = 0; k < SLOT_RUN; k++)
-                slots[start + i + k] = slot + (k << 20);
+        uint32_t *run = slots + start, slot = s | frequency << 8;
+        for (uint32_t *end = run + frequency; run < end; run += SLOT_RUN, slot += SLOT_RUN << 20)
+            for (size_t k = 0; k < SLOT_RUN; k++)
+                run[k] = slot + (uint32_t)(k << 20);
         start += frequency;
     }
     return alphabet;
@@ -102,10 +103,10 @@ static inline uint32_t next_symbol(const uint32_t *slots, const uint8_t **words,
 #if __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__
     word = __builtin_bswap16(word);
 #endif
-    x = ((slot >> 8 & 0xfff) + 1) * (x >> STRL__PROBABILITY_BITS) + (slot >> 20);
-    uint32_t refilled = x << 16 | word, low = x < STRL__RANS_LOW;
+    x = (slot >> 8 & 0xfff) * (x >> STRL__PROBABILITY_BITS) + (slot >> 20);
+    uint32_t low = x < STRL__RANS_LOW; /* no branch: it cannot be foreseen */
     *words += 2 * low;
-    *state = low ? refilled : x;
+    *state = x << (16 * low) | (word & (0u - low));
     return slot & 0xff;
 }
 

@@ -91,9 +91,10 @@ static double table_bits(const struct table *table, const uint32_t *count)
     return bits;
 }
 
-static void choose_table(const struct strl__stream_out *stream, struct table *table)
+static void choose_table(const struct strl__stream_out *stream, uint32_t count[STRL__SYMBOLS], struct table *table)
 {
-    uint32_t count[STRL__SYMBOLS] = {0}, all = 0;
+    uint32_t all = 0;
+    memset(count, 0, STRL__SYMBOLS * sizeof *count);
     for (size_t i = 0; i < stream->count; i++) {
         count[strl__symbol_of(stream->values[i])]++;
         all |= stream->values[i];
@@ -107,6 +108,20 @@ static void choose_table(const struct strl__stream_out *stream, struct table *ta
     normalise(count, (uint32_t)stream->count, table);
     if (table_bits(table, count) < (double)table->mode * (double)stream->count)
         table->mode = STRL__MODE_TABLE;
+}
+
+void strl__streams_bits(const struct strl__streams_out *streams, double bits[STRL__STREAM_COUNT])
+{
+    for (unsigned id = 0; id < STRL__STREAM_COUNT; id++) {
+        const struct strl__stream_out *stream = &streams->stream[id];
+        struct table table;
+        uint32_t count[STRL__SYMBOLS];
+        choose_table(stream, count, &table);
+        bits[id] = 5;
+        if (stream->count)
+            bits[id] += bit_length((uint32_t)stream->count) + 5.;
+        bits[id] += table.mode == STRL__MODE_TABLE ? table_bits(&table, count) : (double)table.mode * (double)stream->count;
+    }
 }
 
 static void write_raw(const struct strl__stream_out *stream, const struct table *table, struct bit_writer *bits)
@@ -176,10 +191,11 @@ strl_status strl__streams_write(const struct strl__streams_out *streams, size_t 
                                 strl_writer *writer, strl_error *err)
 {
     struct table table[STRL__STREAM_COUNT];
+    uint32_t count[STRL__SYMBOLS];
     struct bit_writer bits = {0};
     struct rans_writer rans = {.state = {STRL__RANS_LOW, STRL__RANS_LOW, STRL__RANS_LOW, STRL__RANS_LOW}};
     for (unsigned id = 0; id < STRL__STREAM_COUNT; id++) {
-        choose_table(&streams->stream[id], &table[id]);
+        choose_table(&streams->stream[id], count, &table[id]);
         write_raw(&streams->stream[id], &table[id], &bits);
         item_count += streams->stream[id].count;
         rans.capacity += table[id].mode == STRL__MODE_TABLE ? 2 * streams->stream[id].count : 0;

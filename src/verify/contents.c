@@ -20,6 +20,9 @@ void strl__v_workers_destroy(const strl__model *model, strl__worker *workers)
 {
     for (unsigned i = 0; workers && i < strl_pool_workers(model->pool); i++) {
         strl__free(workers[i].bytes);
+        strl__free(workers[i].payload);
+        for (unsigned k = 0; k < STRL__V_CHAIN; k++)
+            strl_arena_deinit(&workers[i].chain[k].arena);
         strl_arena_deinit(&workers[i].arena);
         strl_arena_deinit(&workers[i].scratch);
     }
@@ -32,45 +35,6 @@ static strl_status read_bytes(strl__model *model, uint64_t offset, uint32_t byte
     if (!strl__grow(&worker->bytes, &worker->capacity, bytes, 1))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a page of %u bytes", bytes);
     return strl_file_read(model->file, offset, worker->bytes, bytes, err);
-}
-
-static void rewind_arena(strl_arena *arena)
-{
-    strl_arena_rewind(arena, (strl_arena_mark){0});
-}
-
-static strl_status counts_agree(const strl__vnode *node, const strl__vmesh *mesh, strl_error *err)
-{
-    if (mesh->vertex_count != node->vertex_count || mesh->triangle_count != node->triangle_count ||
-        mesh->step_count != node->step_count || mesh->vertex_end[0] != node->base_vertex_count ||
-        mesh->triangle_end[0] != node->base_triangle_count)
-        return strl__fail(err, STRL_ERR_FORMAT,
-                          "%u vertices, %u triangles, %u steps, base %u and %u; its record says %u, %u, %u, %u and %u",
-                          mesh->vertex_count, mesh->triangle_count, mesh->step_count, mesh->vertex_end[0],
-                          mesh->triangle_end[0], node->vertex_count, node->triangle_count, node->step_count,
-                          node->base_vertex_count, node->base_triangle_count);
-    return STRL_OK;
-}
-
-static strl_status decode(const strl__vnode *node, const uint8_t *bytes, bool with_looks, strl__worker *worker,
-                          strl__vmesh *mesh, strl_error *err)
-{
-    rewind_arena(&worker->arena);
-    rewind_arena(&worker->scratch);
-    strl_status status = strl__v_payload_decode(bytes, node->payload_bytes, &worker->arena, with_looks, mesh, err);
-    if (status == STRL_OK)
-        status = counts_agree(node, mesh, err);
-    return status == STRL_OK ? strl__v_mesh_check_ranges(mesh, err) : status;
-}
-
-strl_status strl__v_load_mesh(strl__model *model, const strl__vtree *tree, uint32_t node, strl__worker *worker,
-                              strl__vmesh *mesh, strl_error *err)
-{
-    const strl__vnode *n = &tree->nodes[node];
-    strl_status status = read_bytes(model, n->page.offset + n->payload_offset, n->payload_bytes, worker, err);
-    if (status == STRL_OK)
-        status = decode(n, worker->bytes, false, worker, mesh, err);
-    return status == STRL_OK ? STRL_OK : strl__fail_context(err, status, "tree %u node %u", tree->index, node);
 }
 
 typedef struct contents {
@@ -140,7 +104,7 @@ static strl_status check_node(contents *self, uint32_t id, const uint8_t *bytes,
 {
     strl__vmesh mesh;
     strl_error why = {0};
-    strl_status status = decode(&self->tree->nodes[id], bytes, true, worker, &mesh, &why);
+    strl_status status = strl__v_decode_node(self->model, self->tree, id, bytes, true, worker, &mesh, &why);
     if (status == STRL_OK)
         status = strl__v_mesh_check_states(&mesh, &worker->scratch, &why);
     strl__v_checked(self->model->checks, STRL_VERIFY_PAYLOADS, 1);

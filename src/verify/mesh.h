@@ -26,10 +26,16 @@ typedef struct strl__vmesh {
     uint32_t (*palette)[2];  /* [palette_count] part, material */
 } strl__vmesh;
 
+/* The mesh by which a payload is told, and its anchor less the payload's, modulo 2^32. */
+typedef struct strl__v_told {
+    const strl__vmesh *mesh;
+    uint32_t offset[3];
+} strl__v_told;
+
 /* docs/format-payload.md. STRL_ERR_FORMAT with a sentence where the bytes are not a payload; the arrays live in
- * arena. Without with_looks normals and colours are not decoded, and zero. */
-strl_status strl__v_payload_decode(const uint8_t *data, size_t size, strl_arena *arena, bool with_looks,
-                                   strl__vmesh *mesh, strl_error *err);
+ * arena. told: NULL = self-contained. Without with_looks normals and colours are not decoded, and zero. */
+strl_status strl__v_payload_decode(const uint8_t *data, size_t size, const strl__v_told *told, strl_arena *arena,
+                                   bool with_looks, strl__vmesh *mesh, strl_error *err);
 
 /* Every rule of a progressive mesh; STRL_ERR_FORMAT with a sentence. What indexing relies on, then what states
  * promise. */
@@ -92,15 +98,34 @@ void strl__v_mesh_hash_points(const strl__vmesh *mesh, const int64_t anchor[3], 
 strl__hash128 strl__v_mesh_hash(const strl__vmesh *mesh, uint32_t state, const uint16_t *map,
                                 const strl__hash128 *points);
 
+/* Nodes that tell one another, at most, from the self-contained one on. */
+#define STRL__V_CHAIN 32u
+
+/* A mesh by which others are told. */
+typedef struct strl__vchain {
+    bool is_whole, with_looks;
+    const strl__vtree *tree;
+    uint32_t node;
+    int64_t anchor[3];
+    strl_arena arena;
+    strl__vmesh mesh;
+} strl__vchain;
+
 /* Per worker: bytes of a payload page, and arenas for what is decoded from it. */
 typedef struct strl__worker {
-    uint8_t *bytes;
-    size_t capacity;
+    uint8_t *bytes, *payload;
+    size_t capacity, payload_capacity;
     strl_arena arena, scratch;
+    strl__vchain chain[STRL__V_CHAIN]; /* by depth */
 } strl__worker;
 
 strl__worker *strl__v_workers_create(const strl__model *model); /* NULL without memory */
 void strl__v_workers_destroy(const strl__model *model, strl__worker *workers);
+
+/* Decodes and checks a node's payload, `bytes`; the meshes that it is told by are read and decoded too. The mesh lives in
+ * worker->arena until the next call, which rewinds worker->scratch too. */
+strl_status strl__v_decode_node(strl__model *model, const strl__vtree *tree, uint32_t id, const uint8_t *bytes, bool with_looks,
+                                strl__worker *worker, strl__vmesh *mesh, strl_error *err);
 
 /* Reads and decodes one node's payload again, after the main pass has found it sound; what could not be indexed
  * fails. The mesh lives in worker->arena until the next call, which rewinds worker->scratch too. */

@@ -23,6 +23,7 @@ typedef struct strl__vnode {
     uint32_t parent, first_child, group, group_size;
     uint16_t level;
     uint8_t child_count, rung;
+    bool told_by_parent; /* its payload is decoded by the parent's mesh */
     int64_t anchor[3];
     int64_t box[2][3], group_box[2][3]; /* min, max */
     float geometric_min, geometric_max, appearance_min, appearance_max, group_geometric, group_appearance;

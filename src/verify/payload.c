@@ -6,7 +6,7 @@
 
 #include "base/fail.h"
 
-#define HEAD_BYTES 38u
+#define HEAD_BYTES 39u
 #define MOST_TRIANGLES 131072u
 
 bool strl__v_add_triangle(strl__v_payload *self, uint32_t a, uint32_t b, uint32_t c)
@@ -31,6 +31,7 @@ static strl_status read_head(strl__v_payload *self, strl_cursor *cursor)
 {
     uint32_t version = strl_cursor_u8(cursor);
     self->flags = strl_cursor_u8(cursor);
+    self->normal_bits = strl_cursor_u8(cursor);
     self->vertices = strl_cursor_u16(cursor);
     self->base_vertices = strl_cursor_u16(cursor);
     self->steps = strl_cursor_u16(cursor);
@@ -42,9 +43,14 @@ static strl_status read_head(strl__v_payload *self, strl_cursor *cursor)
         self->coder[i] = strl_cursor_u32(cursor);
     if (cursor->failed)
         return strl__fail(self->err, STRL_ERR_FORMAT, "the payload ends within its first %u bytes", HEAD_BYTES);
-    if (version != 1 || self->flags > 3)
+    if (version != 1 || self->flags > 7)
         return strl__fail(self->err, STRL_ERR_FORMAT, "payload of version %" PRIu32 " with flags %" PRIu32, version,
                           self->flags);
+    if (self->normal_bits != 8 && self->normal_bits != 10)
+        return strl__fail(self->err, STRL_ERR_FORMAT, "payload with normals of %" PRIu32 " bits", self->normal_bits);
+    if ((self->flags & 4) == 0 ? self->told_by != NULL : self->told_by == NULL)
+        return strl__fail(self->err, STRL_ERR_FORMAT, "payload with flags %" PRIu32 ", but its record says that it is %s",
+                          self->flags, self->told_by ? "told by its parent's" : "self-contained");
     if (self->base_vertices > self->vertices || self->steps > self->vertices - self->base_vertices ||
         self->entries == 0 || self->triangles > MOST_TRIANGLES || self->base_triangles > self->triangles)
         return strl__fail(self->err, STRL_ERR_FORMAT,
@@ -103,17 +109,23 @@ static strl_status check_ends(const strl__v_payload *self)
     return STRL_OK;
 }
 
-strl_status strl__v_payload_decode(const uint8_t *data, size_t size, strl_arena *arena, bool with_looks,
-                                   strl__vmesh *mesh, strl_error *err)
+strl_status strl__v_payload_decode(const uint8_t *data, size_t size, const strl__v_told *told, strl_arena *arena,
+                                   bool with_looks, strl__vmesh *mesh, strl_error *err)
 {
     strl__v_payload self = {.mesh = mesh, .arena = arena, .err = err};
     strl_cursor cursor = strl_cursor_make(data, size);
+    if (told) {
+        self.told_by = told->mesh;
+        memcpy(self.offset, told->offset, sizeof self.offset);
+    }
     strl_status status = read_head(&self, &cursor);
     /* The streams come first: they bound the counts by the payload's size before anything is reserved for them. */
     if (status == STRL_OK)
         status = strl__v_payload_streams(&self, &cursor, size);
     if (status == STRL_OK)
         status = reserve(&self);
+    if (status == STRL_OK)
+        status = strl__v_payload_copies(&self);
     if (status == STRL_OK)
         status = strl__v_payload_base(&self);
     if (status == STRL_OK)

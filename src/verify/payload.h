@@ -26,7 +26,9 @@ enum strl__v_stream_number {
     STRL__V_INDEX = 25,
     STRL__V_COLOUR,
     STRL__V_PALETTE = 30,
-    STRL__V_STREAMS = 33
+    STRL__V_SELECT = 33, /* one a context */
+    STRL__V_COPY_NORMAL = 37,
+    STRL__V_STREAMS = 39
 };
 
 typedef struct strl__v_stream {
@@ -38,8 +40,12 @@ typedef struct strl__v_payload {
     strl__vmesh *mesh;
     strl_arena *arena; /* for what stays and what does not */
     strl_error *err;
-    uint32_t flags, words, coder[4];
+    uint32_t flags, normal_bits, words, coder[4];
     uint32_t base_vertices, base_triangles, vertices, triangles, steps, entries; /* Vb, Tb, V, T, S, P */
+    const strl__vmesh *told_by; /* the parent's mesh; NULL: self-contained */
+    uint32_t offset[3];         /* to be added to its positions */
+    uint32_t copied;            /* vertices copied from it, the first ones */
+    uint16_t *copied_from;      /* [Vb] its vertices */
     strl__v_stream stream[STRL__V_STREAMS];
     bool starved; /* a value was asked for that is not there */
     /* The mesh while it grows. */
@@ -50,8 +56,9 @@ typedef struct strl__v_payload {
     uint16_t *from;  /* [Vb] */
 } strl__v_payload;
 
-/* All three fail with STRL_ERR_FORMAT and a sentence, or STRL_ERR_MEMORY. bytes: what follows the head. */
+/* All fail with STRL_ERR_FORMAT and a sentence, or STRL_ERR_MEMORY. bytes: what follows the head. */
 strl_status strl__v_payload_streams(strl__v_payload *self, strl_cursor *cursor, size_t payload_bytes);
+strl_status strl__v_payload_copies(strl__v_payload *self);
 strl_status strl__v_payload_base(strl__v_payload *self);
 strl_status strl__v_payload_steps(strl__v_payload *self);
 /* with_looks: normals and colours too; else their streams are only counted. */

@@ -28,13 +28,14 @@ static uint64_t magnitude(uint64_t value)
     return value >> 63 ? 0 - value : value;
 }
 
-static void predict_normal(const uint64_t sum[3], uint32_t predicted[2])
+/* most: the largest coordinate that the payload's normals have. */
+static void predict_normal(const uint64_t sum[3], int64_t most, uint32_t predicted[2])
 {
     uint64_t all = magnitude(sum[0]) | magnitude(sum[1]) | magnitude(sum[2]) | 1;
     unsigned width = 64 - (unsigned)__builtin_clzll(all), shift = width > 18 ? width - 18 : 0;
     int64_t x = (int64_t)(magnitude(sum[0]) >> shift), y = (int64_t)(magnitude(sum[1]) >> shift),
             z = (int64_t)(magnitude(sum[2]) >> shift), l = x + y + z;
-    predicted[0] = predicted[1] = 512;
+    predicted[0] = predicted[1] = (uint32_t)(most + 1) / 2;
     if (l == 0)
         return;
     if (sum[2] >> 63) {
@@ -44,22 +45,28 @@ static void predict_normal(const uint64_t sum[3], uint32_t predicted[2])
     }
     x = sum[0] >> 63 ? -x : x;
     y = sum[1] >> 63 ? -y : y;
-    predicted[0] = (uint32_t)(((x + l) * 1023 + l) / (2 * l));
-    predicted[1] = (uint32_t)(((y + l) * 1023 + l) / (2 * l));
+    predicted[0] = (uint32_t)(((x + l) * most + l) / (2 * l));
+    predicted[1] = (uint32_t)(((y + l) * most + l) / (2 * l));
 }
 
 static strl_status read_normals(strl__v_payload *self)
 {
     strl__vmesh *mesh = self->mesh;
+    uint32_t most = (1u << self->normal_bits) - 1;
     uint64_t(*sum)[3] = strl_arena_alloc_zero(self->arena, mesh->vertex_count, sizeof *sum);
     if (!sum)
         return strl__fail(self->err, STRL_ERR_MEMORY, "no memory for %u normals", mesh->vertex_count);
     add_normals(mesh, sum);
     for (uint32_t v = 0; v < mesh->vertex_count; v++) {
         uint32_t predicted[2];
-        predict_normal(sum[v], predicted);
-        for (unsigned i = 0; i < 2; i++)
-            mesh->normal[v][i] = (uint16_t)((predicted[i] + strl__v_residual(self, STRL__V_NORMAL + i)) % 1024);
+        unsigned stream = v < self->copied ? STRL__V_COPY_NORMAL : STRL__V_NORMAL;
+        predict_normal(sum[v], most, predicted);
+        for (unsigned i = 0; i < 2; i++) {
+            if (v < self->copied)
+                predicted[i] = (self->told_by->normal[self->copied_from[v]][i] * most + 511) / 1023;
+            uint32_t value = (predicted[i] + strl__v_residual(self, stream + i)) % (most + 1);
+            mesh->normal[v][i] = (uint16_t)((value * 1023 + most / 2) / most);
+        }
     }
     return STRL_OK;
 }
@@ -149,8 +156,10 @@ strl_status strl__v_payload_attributes(strl__v_payload *self, bool with_looks)
         status = read_normals(self);
         read_colours(self);
     } else {
-        for (unsigned i = 0; i < 2; i++)
-            skip_stream(self, STRL__V_NORMAL + i, self->vertices);
+        for (unsigned i = 0; i < 2; i++) {
+            skip_stream(self, STRL__V_COPY_NORMAL + i, self->copied);
+            skip_stream(self, STRL__V_NORMAL + i, self->vertices - self->copied);
+        }
         for (unsigned i = 0; i < 4 && self->mesh->colour; i++)
             skip_stream(self, STRL__V_COLOUR + i, self->vertices);
     }

@@ -50,7 +50,9 @@ static bool decode_record(strl_cursor *cursor, strl__vnode *node)
     node->level = strl_cursor_u16(cursor);
     node->group = strl_cursor_u32(cursor);
     node->group_size = strl_cursor_u32(cursor);
-    bool plain = strl_cursor_u32(cursor) == STRL__NO_NODE; /* decode_parent: version 1 has none */
+    uint32_t decode_parent = strl_cursor_u32(cursor);
+    node->told_by_parent = decode_parent != STRL__NO_NODE;
+    bool plain = !node->told_by_parent || decode_parent == node->parent;
     read_vector(cursor, node->anchor);
     read_vector(cursor, node->box[0]);
     read_vector(cursor, node->box[1]);

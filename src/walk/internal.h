@@ -46,6 +46,7 @@ typedef struct strl__mesh {
     uint16_t *vertex_end;                /* [step_count + 1] */
     uint16_t *parents;                   /* [vertex_count - base_vertices] */
     uint16_t *indices;                   /* [3 * triangle_count] */
+    uint16_t (*finest)[3];               /* [triangle_count], corners of the finest state; NULL at leaves */
 } strl__mesh;
 
 typedef struct strl__node {
@@ -53,6 +54,8 @@ typedef struct strl__node {
     struct strl__treelet *treelet;
     struct strl__node *older, *newer; /* residency list; resident nodes only */
     struct strl__request *request;    /* while pending */
+    struct strl__node *decoded_by;    /* while pending: the node whose mesh the payload is told by, or NULL */
+    uint32_t decoding;                /* pending nodes that are decoded by this one: it is not evicted */
     strl__mesh mesh;                  /* resident nodes only */
     uint64_t load;                    /* serial number of the mesh's load */
     strl__residency residency;
@@ -115,6 +118,8 @@ typedef struct strl__job {
     strl__page *page;
     strl_node record;
     strl__node *node; /* the walk's thread only */
+    bool is_waiting;  /* for the node by which it is decoded; the walk's thread only */
+    strl_payload_reference reference; /* that node's mesh, which stays as long as the job may run */
     strl__mesh mesh;  /* result; its block is owned */
     strl_status status;
     strl_error error;
@@ -280,8 +285,10 @@ struct strl_walk {
 };
 
 /* mesh.c: thread-safe. */
-strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size, strl__mesh *mesh,
-                              strl_error *err);
+strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size,
+                              const strl_payload_reference *reference, strl__mesh *mesh, strl_error *err);
+/* The finest state of a node's mesh, for the payload of another node. */
+strl_payload_reference strl__mesh_reference(const strl__node *from, const strl_node *record);
 void strl__mesh_deinit(strl__mesh *mesh);
 /* Moves to another state in time proportional to the corners that change; widens [*first, *end) to
  * hold them. */
@@ -303,6 +310,10 @@ strl_status strl__treelet_load(strl_walk *walk, strl__treelet *treelet, const vo
 void strl__treelet_evict_cold(strl_walk *walk, uint64_t before_frame);
 /* The node with this id; NULL where its records are not there. */
 strl__node *strl__node_find(strl_walk *walk, uint32_t tree, uint32_t id);
+/* The node by which the node is decoded may not go until it is let go. False where it is
+ * neither there nor on its way. */
+bool strl__node_hold(strl_walk *walk, strl__node *node);
+void strl__node_let_go(strl__node *node);
 void strl__node_reserve(strl_walk *walk, strl__node *node); /* absent -> pending; room must be there */
 void strl__node_release(strl_walk *walk, strl__node *node); /* pending -> absent */
 void strl__node_install(strl_walk *walk, strl__node *node, const strl__mesh *mesh); /* pending -> resident */

@@ -37,7 +37,7 @@ static strl_status allocate(const strl_node *record, const strl_pm *pm, strl__me
 {
     size_t vertices = pm->vertex_count, added = vertices - pm->vertex_end[0], states = (size_t)pm->step_count + 1;
     size_t corners = 3 * (size_t)pm->triangle_count;
-    size_t words = corners + 2 * added + 2 * states, halves = states + added + corners;
+    size_t words = corners + 2 * added + 2 * states, halves = states + added + corners + (record->child_count ? corners : 0);
     size_t bytes = vertices * sizeof(strl_vertex) + words * 4 + halves * 2;
     if (bytes > strl_node_decoded_bytes(record))
         return strl__fail(err, STRL_ERR_INTERNAL,
@@ -60,6 +60,7 @@ static strl_status allocate(const strl_node *record, const strl_pm *pm, strl__me
     mesh->vertex_end = (uint16_t *)(mesh->errors + states);
     mesh->parents = mesh->vertex_end + states;
     mesh->indices = mesh->parents + added;
+    mesh->finest = record->child_count ? (uint16_t(*)[3])(mesh->indices + corners) : NULL;
     return STRL_OK;
 }
 
@@ -128,13 +129,28 @@ static void copy_states(const strl_pm *pm, strl__mesh *mesh)
         mesh->parents[v - mesh->base_vertices] = pm->parent[v];
 }
 
-strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size, strl__mesh *mesh, strl_error *err)
+strl_payload_reference strl__mesh_reference(const strl__node *from, const strl_node *record)
+{
+    const strl__mesh *mesh = &from->mesh;
+    strl_payload_reference reference = {.vertex_count = mesh->vertex_count,
+                                        .triangle_count = mesh->triangle_count,
+                                        .position = mesh->vertices->position,
+                                        .normal = mesh->vertices->normal,
+                                        .position_stride = sizeof *mesh->vertices,
+                                        .normal_stride = sizeof *mesh->vertices,
+                                        .triangle = (const uint16_t(*)[3])mesh->finest};
+    strl_page_place(&reference, from->record->anchor, record);
+    return reference;
+}
+
+strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size,
+                              const strl_payload_reference *reference, strl__mesh *mesh, strl_error *err)
 {
     strl_arena arena;
     strl_pm pm;
     *mesh = (strl__mesh){0};
     strl_arena_init(&arena, SCRATCH_BYTES);
-    strl_status status = strl_page_mesh(record, page, size, &arena, &pm, err);
+    strl_status status = strl_page_mesh(record, page, size, reference, &arena, &pm, err);
     if (status == STRL_OK)
         status = allocate(record, &pm, mesh, err);
     if (status == STRL_OK)
@@ -142,6 +158,8 @@ strl_status strl__mesh_create(const strl_node *record, const void *page, size_t 
     if (status == STRL_OK) {
         copy_states(&pm, mesh);
         make_vertices(&pm, mesh->vertices);
+        if (mesh->finest)
+            memcpy(mesh->finest, pm.triangle, pm.triangle_count * sizeof *pm.triangle);
     } else {
         strl__mesh_deinit(mesh);
     }

@@ -37,30 +37,18 @@ static void run_job(void *context)
         destroy_job(job); /* abandoned: the walk has let go of it */
         return;
     }
-    job->status = strl__mesh_create(&job->record, job->page->data, job->page->size, &job->mesh, &job->error);
+    const strl_payload_reference *reference = job->record.decode_parent != STRL_NONE ? &job->reference : NULL;
+    job->status = strl__mesh_create(&job->record, job->page->data, job->page->size, reference, &job->mesh, &job->error);
     atomic_store_explicit(&job->phase, STRL__JOB_DONE, memory_order_release);
 }
 
-uint64_t strl__jobs_pump(strl_walk *walk, uint64_t budget_ns)
-{
-    uint64_t ran = 0, start = strl_clock_ns();
-    for (size_t i = 0; i < walk->job_count; i++) {
-        if (atomic_load_explicit(&walk->jobs[i]->phase, memory_order_relaxed) != STRL__JOB_QUEUED)
-            continue;
-        if (ran > 0 && strl_clock_ns() - start >= budget_ns)
-            break;
-        run_job(walk->jobs[i]);
-        ran++;
-    }
-    return ran;
-}
 
 void strl__jobs_abandon(strl_walk *walk)
 {
     for (size_t i = 0; i < walk->job_count; i++) {
         strl__job *job = walk->jobs[i];
         int phase = STRL__JOB_QUEUED;
-        if (walk->executor.submit && atomic_compare_exchange_strong(&job->phase, &phase, STRL__JOB_ABANDONED))
+        if (walk->executor.submit && !job->is_waiting && atomic_compare_exchange_strong(&job->phase, &phase, STRL__JOB_ABANDONED))
             continue; /* the executor still holds it and will release it */
         while (atomic_load_explicit(&job->phase, memory_order_acquire) == STRL__JOB_RUNNING)
             strl_sleep_ns(ABANDON_WAIT_NS);
@@ -98,11 +86,44 @@ static void node_failed(strl_walk *walk, strl__request *request, strl__node *nod
     drop_node(walk, request, node, false);
 }
 
+/* Hands the job over as soon as the node is there by which it is decoded. */
+static strl_status submit_job(strl_walk *walk, strl__job *job, strl_error *err)
+{
+    const strl__node *by = job->node->decoded_by;
+    job->is_waiting = by && by->residency != STRL__RESIDENT;
+    if (job->is_waiting)
+        return STRL_OK;
+    if (by)
+        job->reference = strl__mesh_reference(by, &job->record);
+    return walk->executor.submit ? walk->executor.submit(walk->executor.context, run_job, job, err) : STRL_OK;
+}
+
+/* False where the job has come to its end. */
+static bool advance_waiting(strl_walk *walk, strl__job *job)
+{
+    strl_error error = {0};
+    strl__request *request = job->node->request;
+    if (job->node->decoded_by->residency == STRL__ABSENT)
+        drop_node(walk, request, job->node, true); /* what it waits for has failed, and will be asked for again first */
+    else if (submit_job(walk, job, &error) != STRL_OK)
+        node_failed(walk, request, job->node, &error);
+    else
+        return true;
+    return false;
+}
+
 static void reap_jobs(strl_walk *walk)
 {
     size_t kept = 0;
     for (size_t i = 0; i < walk->job_count; i++) {
         strl__job *job = walk->jobs[i];
+        if (job->is_waiting) {
+            if (advance_waiting(walk, job))
+                walk->jobs[kept++] = job;
+            else
+                destroy_job(job);
+            continue;
+        }
         if (atomic_load_explicit(&job->phase, memory_order_acquire) != STRL__JOB_DONE) {
             walk->jobs[kept++] = job;
             continue;
@@ -120,6 +141,23 @@ static void reap_jobs(strl_walk *walk)
     walk->job_count = kept;
 }
 
+/* Installs what is decoded as it goes: other jobs may wait for it. */
+uint64_t strl__jobs_pump(strl_walk *walk, uint64_t budget_ns)
+{
+    uint64_t ran = 0, before, start = strl_clock_ns();
+    do {
+        before = ran;
+        for (size_t i = 0; i < walk->job_count && (ran == 0 || strl_clock_ns() - start < budget_ns); i++) {
+            if (walk->jobs[i]->is_waiting || atomic_load_explicit(&walk->jobs[i]->phase, memory_order_relaxed) != STRL__JOB_QUEUED)
+                continue;
+            run_job(walk->jobs[i]);
+            ran++;
+        }
+        reap_jobs(walk);
+    } while (ran > before && strl_clock_ns() - start < budget_ns);
+    return ran;
+}
+
 /* ---- answers */
 
 /* Takes over a reference of the page. */
@@ -134,12 +172,10 @@ static strl_status start_job(strl_walk *walk, strl__node *node, strl__page *page
     job->page = page;
     job->node = node;
     job->record = *node->record;
-    if (walk->executor.submit) {
-        strl_status status = walk->executor.submit(walk->executor.context, run_job, job, err);
-        if (status != STRL_OK) {
-            destroy_job(job);
-            return status;
-        }
+    strl_status status = submit_job(walk, job, err);
+    if (status != STRL_OK) {
+        destroy_job(job);
+        return status;
     }
     walk->jobs[walk->job_count++] = job;
     return STRL_OK;
@@ -292,8 +328,12 @@ static bool ask_for_node(strl_walk *walk, const strl__candidate *candidate, uint
     strl__request *request = unanswered_page(walk, node->record->page.offset);
     if (!request && walk->requests_pending >= in_flight)
         return true;
-    if (!strl__make_room(walk, strl_node_decoded_bytes(node->record), evict_before))
+    if (!strl__node_hold(walk, node))
+        return true;
+    if (!strl__make_room(walk, strl_node_decoded_bytes(node->record), evict_before)) {
+        strl__node_let_go(node);
         return false;
+    }
     if (!request) {
         request = take_slot(walk, in_flight);
         request->prefetch = prefetch;

@@ -26,6 +26,28 @@ static void link_newest(strl_walk *walk, strl__node *node)
     walk->newest = node;
 }
 
+bool strl__node_hold(strl_walk *walk, strl__node *node)
+{
+    if (node->record->decode_parent == STRL_NONE)
+        return true;
+    strl__node *by = strl__node_find(walk, node->treelet->tree, node->record->decode_parent);
+    if (!by || by->residency == STRL__ABSENT)
+        return false;
+    node->decoded_by = by;
+    by->decoding++;
+    by->treelet->pins++;
+    return true;
+}
+
+void strl__node_let_go(strl__node *node)
+{
+    if (!node->decoded_by)
+        return;
+    node->decoded_by->decoding--;
+    node->decoded_by->treelet->pins--;
+    node->decoded_by = NULL;
+}
+
 void strl__node_reserve(strl_walk *walk, strl__node *node)
 {
     node->residency = STRL__PENDING;
@@ -35,6 +57,7 @@ void strl__node_reserve(strl_walk *walk, strl__node *node)
 
 void strl__node_release(strl_walk *walk, strl__node *node)
 {
+    strl__node_let_go(node);
     node->residency = STRL__ABSENT;
     node->request = NULL;
     node->treelet->pins--;
@@ -43,6 +66,7 @@ void strl__node_release(strl_walk *walk, strl__node *node)
 
 void strl__node_install(strl_walk *walk, strl__node *node, const strl__mesh *mesh)
 {
+    strl__node_let_go(node);
     node->residency = STRL__RESIDENT;
     node->request = NULL;
     node->mesh = *mesh;
@@ -78,6 +102,11 @@ bool strl__make_room(strl_walk *walk, uint64_t bytes, uint64_t evict_before)
         strl__node *oldest = walk->oldest;
         if (!oldest || oldest->wanted_frame == walk->frame || oldest->touched_frame >= evict_before)
             break;
+        if (oldest->decoding) { /* as good as wanted */
+            oldest->wanted_frame = walk->frame;
+            strl__node_touch(walk, oldest);
+            continue;
+        }
         evict(walk, oldest);
     }
     if (walk->resident_bytes > walk->memory_bytes - bytes)

@@ -128,7 +128,7 @@ static strl_status load_root(strl_walk *walk, uint32_t tree, strl_error *err)
     if (status == STRL_OK)
         status = strl_page_check(page, data, page->bytes, err);
     if (status == STRL_OK)
-        status = strl__mesh_create(root->record, data, page->bytes, &mesh, err);
+        status = strl__mesh_create(root->record, data, page->bytes, NULL, &mesh, err);
     if (status == STRL_OK)
         strl__node_install(walk, root, &mesh);
     strl__free(data);

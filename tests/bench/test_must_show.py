@@ -19,7 +19,7 @@ import tables
 
 MODELS = ("isosurface_3k", "isosurface_6k")
 ONE_EACH = ("build", "images_orbit", "images_flythrough", "psnr_orbit", "psnr_flythrough", "verify", "backends",
-            "rate", "bytes", "dependencies", "walk", "scale", "shapes", "cap", "walk_cold")
+            "rate", "bytes", "sizes", "dependencies", "walk", "scale", "shapes", "cap", "walk_cold")
 
 
 def is_sanitized(program):

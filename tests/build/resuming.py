@@ -20,22 +20,22 @@ def read(path):
 
 
 class Reference:
-    """An input, and what a build of it gives that nothing stops."""
+    """An input, and what a build of it with these options gives that nothing stops."""
     made = {}
 
-    def __init__(self, triangles):
+    def __init__(self, triangles, options):
         self.folder = tempfile.TemporaryDirectory(prefix="stroll-reference-")
         self.source, out = (os.path.join(self.folder.name, name) for name in ("in.ply", "out.stroll"))
         must("scene", "isosurface", "--triangles", triangles, "-o", self.source, "--quiet")
-        done = must("build", self.source, "-o", out, "--json")
+        done = must("build", self.source, "-o", out, "--json", *options)
         self.result, self.seconds, self.bytes = json.loads(done.output), done.seconds, read(out)
         assert not self.result["resumed"]
 
     @classmethod
-    def of(cls, triangles):
-        if triangles not in cls.made:
-            cls.made[triangles] = cls(triangles)
-        return cls.made[triangles]
+    def of(cls, triangles, options):
+        if (triangles, options) not in cls.made:
+            cls.made[triangles, options] = cls(triangles, options)
+        return cls.made[triangles, options]
 
 
 class Build:
@@ -67,16 +67,16 @@ class Build:
 
 
 class Scene:
-    """A folder with the input of a reference."""
+    """A folder with the input of a reference, whose options all builds have."""
 
-    def __init__(self, folder, triangles):
-        self.reference, self.folder = Reference.of(triangles), folder
+    def __init__(self, folder, triangles, *options):
+        self.reference, self.folder, self.options = Reference.of(triangles, options), folder, options
         self.source, self.out = os.path.join(folder, "in.ply"), os.path.join(folder, "out.stroll")
         with open(self.source, "wb") as file:
             file.write(read(self.reference.source))
 
     def words(self, *more):
-        return (self.source, "-o", self.out, *more)
+        return (self.source, "-o", self.out, *self.options, *more)
 
     def resume(self, *more):
         """To its end, from stages that are finished."""
@@ -92,12 +92,12 @@ class Scene:
         assert sorted(os.listdir(self.folder)) == ["in.ply", "out.stroll"], os.listdir(self.folder)
         os.remove(self.out)
 
-    def stopped(self, number=signal.SIGKILL, folder=None, more=()):
-        """Leaves a build that was stopped after its first level; what it said."""
+    def stopped(self, number=signal.SIGKILL, folder=None, more=(), when="nodes-01.spill"):
+        """Leaves a build that was stopped when this file of its scratch was there, after the first level; what it said."""
         scratch = os.path.join(folder or self.folder, "out.stroll.tmp")
         for attempt in range(20):
             build = Build(*self.words(*more))
-            build.wait_for(os.path.join(scratch, "nodes-01.spill"))
+            build.wait_for(os.path.join(scratch, when))
             said = build.stop(number)
             if said is not None:
                 return said

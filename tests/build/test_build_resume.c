@@ -39,6 +39,7 @@
 
 static uint8_t *expected;
 static size_t expected_bytes;
+static bool compact;
 
 typedef struct stop {
     uint64_t calls, after; /* 0 = never */
@@ -60,6 +61,7 @@ static strl_status build(bool resume, unsigned jobs, stop *s, strl_build_result 
                             .output = built_path("out.stroll"),
                             .memory_bytes = STRL_BUILD_LEAST_MEMORY,
                             .jobs = jobs,
+                            .compact = compact,
                             .keep = true,
                             .keep_triangles = 1,
                             .resume = resume,
@@ -108,6 +110,7 @@ static int clean_up(void **state)
 {
     free(expected);
     expected = NULL;
+    compact = false;
     strl_path_remove_directory(built_path("out.stroll.tmp"), NULL);
     return built_teardown(state);
 }
@@ -197,6 +200,27 @@ static void cancelled_at_any_call_it_resumes(void **state)
     }
     assert_output();
     assert_true(kept > 0 && kept < tried);
+}
+
+/* Every node of a compact container, one after the other. */
+static void cancelled_at_any_node_that_is_written_it_resumes(void **state)
+{
+    (void)state;
+    compact = true;
+    make_input(TWO_LEVELS);
+    uint64_t nodes = 0;
+    for (;; nodes++) {
+        stop s = {.after = nodes + 1, .stage = "write"};
+        strl_build_result result;
+        strl_error err;
+        strl_status status = build(nodes > 0, 2, &s, &result, &err);
+        if (status == STRL_OK)
+            break;
+        assert_int_equal(status, STRL_ERR_CANCELLED);
+        assert_true(result.scratch_kept);
+    }
+    assert_true(nodes >= 3);
+    assert_output();
 }
 
 /* Fails the n-th call, then resumes until it gets through, for growing n. before: a folder with stages that each try goes on
@@ -379,6 +403,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test_setup_teardown(cancelled_at_any_call_it_resumes, built_setup, clean_up),
+        cmocka_unit_test_setup_teardown(cancelled_at_any_node_that_is_written_it_resumes, built_setup, clean_up),
         cmocka_unit_test_setup_teardown(a_disk_that_is_still_full_loses_nothing, built_setup, clean_up),
 #ifndef __SANITIZE_THREAD__
         cmocka_unit_test_setup_teardown(on_a_full_disk_it_keeps_what_is_finished, built_setup, clean_up),

@@ -37,6 +37,17 @@ def killed_at_random_moments_it_resumes(folder):
     assert kills == KILLS and resumed > 0, (kills, builds, resumed)
 
 
+def killed_while_it_writes_it_resumes(folder):
+    """The container holds other payloads than the finished levels do, and is written anew from them."""
+    for number, options in enumerate(((), ("--compact",))):
+        own = os.path.join(folder, str(number))
+        os.mkdir(own)
+        scene = Scene(own, SMALL, *options)
+        for when in ("order-04.spill", "order-01.spill", "nodes-00.spill"):
+            scene.stopped(when=when)
+            scene.resume("--jobs", str(1 + number))
+
+
 def interrupted_it_keeps_what_is_finished(folder):
     scene = Scene(folder, SMALL)
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -119,7 +130,8 @@ def another_request_is_refused(folder):
     scene.stopped()
     other = os.path.join(folder, "other.ply")
     os.link(scene.source, other)
-    for words, holds in ((scene.words("--grid", "0.5"), "--grid"), (scene.words("--up", "x"), "--up"),
+    for words, holds in ((scene.words("--grid", "0.5"), "--grid"), (scene.words("--compact"), "--compact is given"),
+                         (scene.words("--up", "x"), "--up"),
                          (scene.words("--unit", "mm"), "--unit is mm"),
                          (scene.words("--no-dependencies"), "--no-dependencies"),
                          (scene.words("--memory", "512M"), "--memory"),
@@ -192,7 +204,7 @@ def fill(path):
             pass
 
 
-run_tests(killed_at_random_moments_it_resumes, interrupted_it_keeps_what_is_finished, with_nothing_to_resume_it_begins,
-          of_a_small_model_nothing_is_kept, without_resume_it_begins_anew,
+run_tests(killed_at_random_moments_it_resumes, killed_while_it_writes_it_resumes,
+          interrupted_it_keeps_what_is_finished, with_nothing_to_resume_it_begins, of_a_small_model_nothing_is_kept, without_resume_it_begins_anew,
           what_was_not_saved_is_cut_off_or_removed, damage_is_found, another_request_is_refused,
           scratch_elsewhere_is_found_again_and_removed, on_a_full_disk_it_waits_for_room)

@@ -15,7 +15,7 @@
 #include <cmocka.h>
 
 #include "base/hash.h"
-#include "container/container.h"
+#include "container/treelet.h"
 #include "container/writer.h"
 #include "geometry/payload.h"
 #include "geometry/payload_streams.h"
@@ -140,6 +140,8 @@ static inline strl_node *fixture_records(uint32_t levels, uint32_t fan, uint32_t
             nodes[id].first_child = level ? used : STRL_NONE;
             for (uint32_t i = 0; i < nodes[id].child_count; i++)
                 nodes[used++].parent = id;
+            if (id && id % 2 == 0 && nodes[id].parent == 0)
+                nodes[id].decode_parent = 0;
         }
         first = end;
     }
@@ -181,9 +183,29 @@ static inline strl_tree fixture_tree(uint32_t node_count)
                        .leaf_geometric = 0.5f};
 }
 
-static inline strl_status fixture_add_node(strl_container_writer *writer, const strl_node *node, uint32_t id,
-                                           strl_error *err)
+/* The mesh of node 0 as a reader will have it, by which others are told. */
+static inline strl_status fixture_root(const strl_node *root, const strl_node *node, strl_arena *arena,
+                                       strl_payload_reference *reference, strl_error *err)
 {
+    strl_pm mesh, decoded;
+    strl_writer payload = {0};
+    fixture_mesh(root, 0, arena, &mesh);
+    strl_status status = strl_payload_encode(&mesh, NULL, arena, &payload, NULL, err);
+    if (status == STRL_OK)
+        status = strl_payload_decode(payload.data, payload.size, NULL, arena, &decoded, err);
+    if (status == STRL_OK) {
+        *reference = strl_payload_reference_of(&decoded);
+        strl_page_place(reference, root->anchor, node);
+    }
+    strl__free(payload.data);
+    return status;
+}
+
+/* root: node 0, by which others are told. */
+static inline strl_status fixture_add_node(strl_container_writer *writer, const strl_node *root, const strl_node *node,
+                                           uint32_t id, strl_error *err)
+{
+    strl_payload_reference reference, *told = node->decode_parent == STRL_NONE ? NULL : &reference;
     strl_arena arena;
     strl_arena_init(&arena, 0);
     strl_pm mesh;
@@ -194,7 +216,9 @@ static inline strl_status fixture_add_node(strl_container_writer *writer, const 
     if (block) {
         strl_arena_rewind(&arena, (strl_arena_mark){arena.head, 0});
         fixture_mesh(node, id, &arena, &mesh);
-        status = strl_payload_encode(&mesh, &arena, &payload, err);
+        status = told ? fixture_root(root, node, &arena, told, err) : STRL_OK;
+        if (status == STRL_OK)
+            status = strl_payload_encode(&mesh, told, &arena, &payload, NULL, err);
     } else if (err) {
         *err = (strl_error){STRL_ERR_MEMORY, "no memory for the fixture"};
     }
@@ -210,7 +234,7 @@ static inline strl_status fixture_add_all(const fixture *self, strl_container_wr
     const strl_tree tree = fixture_tree(self->node_count);
     strl_status status = strl_container_writer_begin_tree(writer, &tree, err);
     for (uint32_t id = 0; status == STRL_OK && id < self->node_count; id++)
-        status = fixture_add_node(writer, &self->nodes[id], id, err);
+        status = fixture_add_node(writer, &self->nodes[0], &self->nodes[id], id, err);
     if (status == STRL_OK)
         status = strl_container_writer_end_tree(writer, err);
     const strl_placement placement = {0, {1, 0, 0, 5, 0, 0, -1, 0, 0, 1, 0, 0}};

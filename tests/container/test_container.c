@@ -224,7 +224,7 @@ static void opening_reads_at_most_128_kib_even_with_512_trees(void **state)
     node.group = 0, node.group_size = 1;
     for (uint32_t i = 0; i < STRL__MAX_TREES; i++) {
         assert_ok(strl_container_writer_begin_tree(writer, &tree, &err), &err);
-        assert_ok(fixture_add_node(writer, &node, 0, &err), &err);
+        assert_ok(fixture_add_node(writer, &node, &node, 0, &err), &err);
         assert_ok(strl_container_writer_end_tree(writer, &err), &err);
     }
     for (uint32_t i = 0; i < FIXTURE_PARTS * 4000; i++)
@@ -277,7 +277,7 @@ static void a_file_gets_what_nobody_added(void **state)
     uint64_t bytes;
     assert_ok(strl_container_writer_create(&desc, &writer, &err), &err);
     assert_ok(strl_container_writer_begin_tree(writer, &tree, &err), &err);
-    assert_ok(fixture_add_node(writer, &self.nodes[0], 0, &err), &err);
+    assert_ok(fixture_add_node(writer, &self.nodes[0], &self.nodes[0], 0, &err), &err);
     assert_ok(strl_container_writer_end_tree(writer, &err), &err);
     assert_ok(strl_container_writer_finish(writer, &bytes, &err), &err);
     assert_int_equal(strl_container_writer_finish(writer, &bytes, &err), STRL_ERR_ARGUMENT);
@@ -441,7 +441,7 @@ static void long_and_broken_names_are_stored_as_utf8(void **state)
     memset(longest, 'x', 32000);
     assert_ok(strl_container_writer_create(&desc, &writer, &err), &err);
     assert_ok(strl_container_writer_begin_tree(writer, &tree, &err), &err);
-    assert_ok(fixture_add_node(writer, &self.nodes[0], 0, &err), &err);
+    assert_ok(fixture_add_node(writer, &self.nodes[0], &self.nodes[0], 0, &err), &err);
     assert_ok(strl_container_writer_end_tree(writer, &err), &err);
     for (int i = 0; i < 5000; i++)
         assert_ok(strl_container_writer_add_part(writer, longest, &err), &err);

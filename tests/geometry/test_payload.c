@@ -92,7 +92,7 @@ static void encode(const strl_pm *pm, strl_writer *writer)
     strl_arena scratch;
     strl_error err = {0};
     strl_arena_init(&scratch, 0);
-    if (strl_payload_encode(pm, &scratch, writer, &err))
+    if (strl_payload_encode(pm, NULL, &scratch, writer, NULL, &err))
         fail_msg("%s", err.message);
     strl_arena_deinit(&scratch);
 }
@@ -112,14 +112,14 @@ static size_t assert_round_trip(const strl_pm *pm)
     assert_int_equal(strl_payload_peek(writer.data, writer.size, &sizes, &err), STRL_OK);
     assert_int_equal(sizes.vertex_count, pm->vertex_count);
     assert_int_equal(sizes.base_triangle_count, pm->triangle_end[0]);
-    if (strl_payload_decode(writer.data, writer.size, &arena, &decoded, &err) || strl_pm_check(&decoded, &err))
+    if (strl_payload_decode(writer.data, writer.size, NULL, &arena, &decoded, &err) || strl_pm_check(&decoded, &err))
         fail_msg("%s", err.message);
     assert_same_states(pm, &decoded);
     /* What came back is a fixed point but for the order of base vertices, so its size can differ only a little. */
     strl_writer again = {0};
     encode(&decoded, &again);
     strl_pm twice;
-    assert_int_equal(strl_payload_decode(again.data, again.size, &arena, &twice, &err), STRL_OK);
+    assert_int_equal(strl_payload_decode(again.data, again.size, NULL, &arena, &twice, &err), STRL_OK);
     assert_same_states(&decoded, &twice);
     size_t size = writer.size;
     strl__free(again.data);
@@ -347,6 +347,120 @@ static void the_smallest_meshes_come_back(void **state)
     assert_round_trip(&pm); /* nothing at all */
 }
 
+static strl_status decode_and_check(const uint8_t *data, size_t size, const strl_payload_reference *reference)
+{
+    strl_arena arena;
+    strl_pm pm;
+    strl_error err = {0};
+    strl_arena_init(&arena, (size_t)256 << 20);
+    uint8_t *exact = malloc(size ? size : 1); /* so that a sanitizer sees a read past the end */
+    assert_non_null(exact);
+    memcpy(exact, data, size);
+    strl_status status = strl_payload_decode(exact, size, reference, &arena, &pm, &err);
+    if (!status && strl_pm_check(&pm, &err))
+        fail_msg("accepted, but: %s", err.message);
+    if (status)
+        assert_true(status == STRL_ERR_FORMAT && err.message[0]);
+    free(exact);
+    strl_arena_deinit(&arena);
+    return status;
+}
+
+/* A mesh that others are told by: its normals are its own or, where it has none, all the same. */
+static strl_payload_reference reference_to(const struct test_mesh *mesh, strl_arena *arena)
+{
+    uint16_t(*normal)[2] = strl_arena_alloc(arena, mesh->vertex_count, sizeof *normal);
+    assert_non_null(normal);
+    for (uint32_t v = 0; v < mesh->vertex_count; v++)
+        for (unsigned k = 0; k < 2; k++)
+            normal[v][k] = mesh->normal ? mesh->normal[v][k] : 512;
+    return (strl_payload_reference){.vertex_count = mesh->vertex_count,
+                                    .triangle_count = mesh->triangle_count,
+                                    .position = mesh->position,
+                                    .normal = normal,
+                                    .position_stride = sizeof *mesh->position,
+                                    .normal_stride = sizeof *normal,
+                                    .triangle = (const uint16_t(*)[3])mesh->triangle};
+}
+
+/* The base mesh of pm and, apart from it, one triangle more; without every seventh triangle; each third one rotated. */
+static strl_payload_reference reference_for(const strl_pm *pm, int32_t shift, strl_arena *arena)
+{
+    struct test_mesh mesh = {.vertex_count = pm->vertex_end[0] + 3};
+    mesh.position = strl_arena_alloc(arena, mesh.vertex_count, sizeof *mesh.position);
+    mesh.triangle = strl_arena_alloc(arena, (size_t)pm->triangle_end[0] + 1, sizeof *mesh.triangle);
+    mesh.normal = strl_arena_alloc_zero(arena, mesh.vertex_count, sizeof *mesh.normal);
+    assert_true(mesh.position && mesh.triangle && mesh.normal);
+    uint32_t last = pm->vertex_end[0];
+    memcpy(mesh.normal, pm->normal, last * sizeof *mesh.normal);
+    for (uint32_t v = 0; v < mesh.vertex_count; v++)
+        for (int32_t k = 0; k < 3; k++)
+            mesh.position[v][k] = (int32_t)((v < last ? (uint32_t)pm->position[v][k] : v * 7u + (uint32_t)k * v) - (uint32_t)shift);
+    mesh.triangle[mesh.triangle_count][0] = (uint16_t)last;
+    mesh.triangle[mesh.triangle_count][1] = (uint16_t)(last + 1);
+    mesh.triangle[mesh.triangle_count++][2] = (uint16_t)(last + 2);
+    for (uint32_t t = 0; t < pm->triangle_end[0]; t++) {
+        if (t % 7 == 3)
+            continue;
+        for (uint32_t k = 0; k < 3; k++)
+            mesh.triangle[mesh.triangle_count][k] = (uint16_t)resolve(pm, pm->triangle[t][(k + t % 3) % 3], 0);
+        mesh.triangle_count++;
+    }
+    strl_payload_reference reference = reference_to(&mesh, arena);
+    for (int k = 0; k < 3; k++)
+        reference.offset[k] = shift;
+    return reference;
+}
+
+static void assert_order(const strl_pm *pm, const strl_pm *decoded, const strl_payload_order *order)
+{
+    for (uint32_t v = 0; v < pm->vertex_count; v++)
+        assert_memory_equal(decoded->position[v], pm->position[order->vertex[v]], sizeof *pm->position);
+    for (uint32_t t = 0; t < pm->triangle_count; t++)
+        for (uint32_t k = 0; k < 3; k++)
+            assert_int_equal(order->vertex[decoded->triangle[t][k]],
+                             pm->triangle[order->triangle[t] / 4][(order->triangle[t] % 4 + k) % 3]);
+}
+
+static void what_another_mesh_has_is_copied_from_it(void **state)
+{
+    (void)state;
+    for (unsigned m = 0; m < MESHES; m++)
+        for (unsigned round = 0; round < 2; round++) {
+            strl_arena arena;
+            strl_pm pm, decoded;
+            strl_error err = {0};
+            strl_writer alone = {0}, told = {0};
+            strl_arena_init(&arena, 0);
+            struct test_mesh mesh = meshes[m].make(&arena);
+            struct test_pm_desc desc = {.seed = 5 * m + round, .keep = mesh.vertex_count / 2, .virtual_percent = round * 20};
+            test_pm_make(&mesh, &desc, &arena, &pm);
+            for (uint32_t v = 0; v < pm.vertex_count && round; v++) /* as few bits as they may have */
+                for (unsigned k = 0; k < 2; k++)
+                    pm.normal[v][k] = strl_oct_coarsen(pm.normal[v][k]);
+            strl_payload_reference reference = reference_for(&pm, round ? INT32_MIN + 5 : 12345, &arena);
+            strl_payload_order order = {strl_arena_alloc(&arena, pm.vertex_count, sizeof *order.vertex),
+                                        strl_arena_alloc(&arena, pm.triangle_count, sizeof *order.triangle)};
+            encode(&pm, &alone);
+            assert_int_equal(strl_payload_encode(&pm, &reference, &arena, &told, &order, &err), STRL_OK);
+            assert_true(m != 0 || told.size < alone.size * 3 / 4);
+            if (strl_payload_decode(told.data, told.size, &reference, &arena, &decoded, &err) || strl_pm_check(&decoded, &err))
+                fail_msg("%s: %s", meshes[m].name, err.message);
+            assert_same_states(&pm, &decoded);
+            assert_order(&pm, &decoded, &order);
+            assert_int_equal(decode_and_check(told.data, told.size, NULL), STRL_ERR_FORMAT);
+            assert_int_equal(decode_and_check(alone.data, alone.size, &reference), STRL_ERR_FORMAT);
+            for (size_t bit = m; bit < told.size * 8; bit += 61) {
+                told.data[bit / 8] ^= (uint8_t)(1u << bit % 8);
+                decode_and_check(told.data, told.size, &reference);
+                told.data[bit / 8] ^= (uint8_t)(1u << bit % 8);
+            }
+            strl__free(alone.data);
+            strl__free(told.data);
+            strl_arena_deinit(&arena);
+        }
+}
+
 /* All sixteen steps of an octave, both ends of the scale, and nothing between that falls below its claim. */
 static void errors_round_up_by_less_than_a_twentieth(void **state)
 {
@@ -380,25 +494,6 @@ static void every_value_has_its_symbol(void **state)
         }
 }
 
-static strl_status decode_and_check(const uint8_t *data, size_t size)
-{
-    strl_arena arena;
-    strl_pm pm;
-    strl_error err = {0};
-    strl_arena_init(&arena, (size_t)256 << 20);
-    uint8_t *exact = malloc(size ? size : 1); /* so that a sanitizer sees a read past the end */
-    assert_non_null(exact);
-    memcpy(exact, data, size);
-    strl_status status = strl_payload_decode(exact, size, &arena, &pm, &err);
-    if (!status && strl_pm_check(&pm, &err))
-        fail_msg("accepted, but: %s", err.message);
-    if (status)
-        assert_true(status == STRL_ERR_FORMAT && err.message[0]);
-    free(exact);
-    strl_arena_deinit(&arena);
-    return status;
-}
-
 static void make_payload(unsigned mesh_index, uint32_t keep, strl_writer *writer)
 {
     strl_arena arena;
@@ -418,12 +513,12 @@ static void a_payload_cut_short_or_too_long_is_refused(void **state)
         strl_writer writer = {0};
         make_payload(m, 40, &writer);
         for (size_t size = 0; size < writer.size; size++)
-            assert_int_equal(decode_and_check(writer.data, size), STRL_ERR_FORMAT);
+            assert_int_equal(decode_and_check(writer.data, size, NULL), STRL_ERR_FORMAT);
         size_t whole = writer.size;
-        assert_int_equal(decode_and_check(writer.data, whole), STRL_OK);
+        assert_int_equal(decode_and_check(writer.data, whole, NULL), STRL_OK);
         for (unsigned extra = 1; extra < 5; extra++) {
             strl_writer_u8(&writer, 0);
-            assert_int_equal(decode_and_check(writer.data, whole + extra), STRL_ERR_FORMAT);
+            assert_int_equal(decode_and_check(writer.data, whole + extra, NULL), STRL_ERR_FORMAT);
         }
         strl__free(writer.data);
     }
@@ -439,10 +534,10 @@ static void flipped_bits_are_refused_or_give_a_sound_mesh(void **state)
         make_payload(m, 60, &writer);
         for (size_t bit = 0; bit < writer.size * 8; bit += 1 + test_below(&random, 12)) {
             writer.data[bit / 8] ^= (uint8_t)(1u << bit % 8);
-            refused += decode_and_check(writer.data, writer.size) != STRL_OK;
+            refused += decode_and_check(writer.data, writer.size, NULL) != STRL_OK;
             writer.data[bit / 8] ^= (uint8_t)(1u << bit % 8);
         }
-        assert_int_equal(decode_and_check(writer.data, writer.size), STRL_OK);
+        assert_int_equal(decode_and_check(writer.data, writer.size, NULL), STRL_OK);
         strl__free(writer.data);
     }
     assert_true(refused > 100);
@@ -453,25 +548,33 @@ static void random_streams_are_refused_or_give_a_sound_mesh(void **state)
 {
     (void)state;
     uint64_t random = 12;
-    for (unsigned round = 0; round < 3000; round++) {
+    strl_arena arena;
+    strl_arena_init(&arena, 0);
+    struct test_mesh other = test_mesh_hills(4, 4, 100, 0.3, 3, &arena);
+    strl_payload_reference reference = reference_to(&other, &arena);
+    for (unsigned round = 0; round < 6000; round++) {
         struct strl__streams_out out = {0};
         strl_writer writer = {0};
         uint32_t vertices = 4 + test_below(&random, 30), base = 3 + test_below(&random, vertices - 3);
         uint32_t triangles = 1 + test_below(&random, 30), base_triangles = test_below(&random, triangles + 1);
-        const uint32_t words[5] = {1, vertices, base, vertices - base, 1};
-        for (unsigned i = 0; i < 5; i++)
+        const uint32_t bytes[3] = {1, round % 2 ? 4 : 0, round % 4 < 2 ? 10 : 8};
+        const uint32_t words[4] = {vertices, base, vertices - base, 1};
+        for (unsigned i = 0; i < 3; i++)
+            strl_writer_u8(&writer, (uint8_t)bytes[i]);
+        for (unsigned i = 0; i < 4; i++)
             strl_writer_u16(&writer, (uint16_t)words[i]);
         strl_writer_u32(&writer, triangles);
         strl_writer_u32(&writer, base_triangles);
         for (unsigned id = 0; id < STRL__STREAM_COUNT; id++)
             for (unsigned i = 0; i < 100; i++)
-                strl__push(&out, id, test_below(&random, 1 + test_below(&random, id < 6 ? 6 : 12)));
+                strl__push(&out, id, test_below(&random, 1 + test_below(&random, id < 6 ? 6 : id >= STRL__STREAM_SELECT ? 3 : 12)));
         strl_error err = {0};
         assert_int_equal(strl__streams_write(&out, 0, vertices + triangles + 1, &writer, &err), STRL_OK);
-        decode_and_check(writer.data, writer.size);
+        decode_and_check(writer.data, writer.size, round % 2 ? &reference : NULL);
         strl__streams_deinit(&out);
         strl__free(writer.data);
     }
+    strl_arena_deinit(&arena);
 }
 
 static void without_memory_both_directions_fail_cleanly(void **state)
@@ -493,8 +596,8 @@ static void without_memory_both_directions_fail_cleanly(void **state)
             strl_pm decoded;
             strl_arena_init(&scratch, 0);
             strl__alloc_fail_after(n);
-            status = direction ? strl_payload_encode(&pm, &scratch, &writer, &err)
-                               : strl_payload_decode(sound.data, sound.size, &scratch, &decoded, &err);
+            status = direction ? strl_payload_encode(&pm, NULL, &scratch, &writer, NULL, &err)
+                               : strl_payload_decode(sound.data, sound.size, NULL, &scratch, &decoded, &err);
             strl__alloc_fail_after(0);
             assert_true(status == STRL_OK || status == STRL_ERR_MEMORY);
             assert_true(n > 1 || status == STRL_ERR_MEMORY);
@@ -545,7 +648,7 @@ static void the_checker_finds_what_is_broken(void **state)
     pm.normal[0][0] = 5000;
     strl_arena scratch;
     strl_arena_init(&scratch, 0);
-    assert_int_not_equal(strl_payload_encode(&pm, &scratch, &writer, &err), STRL_OK);
+    assert_int_not_equal(strl_payload_encode(&pm, NULL, &scratch, &writer, NULL, &err), STRL_OK);
     assert_int_equal(writer.size, 0);
     strl_arena_deinit(&scratch);
     strl__free(writer.data);
@@ -558,6 +661,7 @@ int main(void)
         cmocka_unit_test(random_collapses_come_back_in_every_state),
         cmocka_unit_test(a_smooth_manifold_costs_few_bytes),
         cmocka_unit_test(the_smallest_meshes_come_back),
+        cmocka_unit_test(what_another_mesh_has_is_copied_from_it),
         cmocka_unit_test(errors_round_up_by_less_than_a_twentieth),
         cmocka_unit_test(every_value_has_its_symbol),
         cmocka_unit_test(a_payload_cut_short_or_too_long_is_refused),

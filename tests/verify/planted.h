@@ -97,13 +97,14 @@ static inline void model__copy_node(strl_container *from, strl_container_writer 
     model__check(strl_container_node(from, 0, id, &record, &err), &err);
     model__check(strl_container_mesh(from, 0, &record, &arena, &mesh, &err), &err);
     fault(context, id, &record, &mesh, &arena);
+    record.decode_parent = STRL_NONE;
     record.vertex_count = mesh.vertex_count;
     record.triangle_count = mesh.triangle_count;
     record.step_count = mesh.step_count;
     record.base_vertex_count = mesh.vertex_end[0];
     record.base_triangle_count = mesh.triangle_end[0];
     record.shared_vertices = record.shared_vertices < mesh.vertex_end[0] ? record.shared_vertices : mesh.vertex_end[0];
-    model__check(strl_payload_encode(&mesh, &arena, &payload, &err), &err);
+    model__check(strl_payload_encode(&mesh, NULL, &arena, &payload, NULL, &err), &err);
     model__check(strl_container_writer_add_node(to, &record, payload.data, (uint32_t)payload.size, &err), &err);
     strl__free(payload.data);
     strl_arena_deinit(&arena);

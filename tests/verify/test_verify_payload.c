@@ -2,6 +2,7 @@
  * refuse. */
 #include "verify/planted.h"
 
+#include "container/treelet.h"
 #include "verify/mesh.h"
 
 static model torus;
@@ -61,15 +62,23 @@ typedef struct decode_tally {
     uint32_t meshes, refused, accepted;
 } decode_tally;
 
-static void compare_decoders(const uint8_t *data, size_t size, decode_tally *tally)
+/* What a payload is told by; */
+typedef struct told_by {
+    strl_pm mesh;
+    strl_payload_reference reference;
+    strl__vmesh view;
+    strl__v_told told;
+} told_by;
+
+static void compare_decoders(const uint8_t *data, size_t size, const told_by *parent, decode_tally *tally)
 {
     strl_arena a, b;
     strl_pm mesh;
     strl__vmesh own;
     strl_arena_init(&a, 0);
     strl_arena_init(&b, 0);
-    strl_status one = strl_payload_decode(data, size, &a, &mesh, NULL);
-    strl_status other = strl__v_payload_decode(data, size, &b, true, &own, NULL);
+    strl_status one = strl_payload_decode(data, size, parent ? &parent->reference : NULL, &a, &mesh, NULL);
+    strl_status other = strl__v_payload_decode(data, size, parent ? &parent->told : NULL, &b, true, &own, NULL);
     if (other == STRL_OK)
         other = strl__v_mesh_check_ranges(&own, NULL);
     if (other == STRL_OK)
@@ -83,7 +92,7 @@ static void compare_decoders(const uint8_t *data, size_t size, decode_tally *tal
     strl_arena_deinit(&b);
 }
 
-static void damage(const strl_writer *payload, uint32_t seed, decode_tally *tally)
+static void damage(const strl_writer *payload, uint32_t seed, const told_by *parent, decode_tally *tally)
 {
     uint8_t *copy = strl__alloc(payload->size, 1);
     assert_non_null(copy);
@@ -91,31 +100,48 @@ static void damage(const strl_writer *payload, uint32_t seed, decode_tally *tall
         uint64_t r = strl__mix64(seed * 1000u + i + 1);
         memcpy(copy, payload->data, payload->size);
         copy[r % (i % 2 ? payload->size : 64)] ^= (uint8_t)(1u << (r >> 40) % 8);
-        compare_decoders(copy, i % 5 ? payload->size : r % payload->size, tally);
+        compare_decoders(copy, i % 5 ? payload->size : r % payload->size, parent, tally);
     }
     strl__free(copy);
 }
 
-static void visit(void *context, uint32_t id, strl_node *record, strl_pm *mesh, strl_arena *arena)
+static void visit(decode_tally *tally, uint32_t id, const told_by *parent, strl_pm *mesh, strl_arena *arena)
 {
-    decode_tally *tally = context;
     strl_writer payload = {0};
-    (void)record;
     if (id % 2)
         paint(mesh, arena, id);
-    assert_int_equal(strl_payload_encode(mesh, arena, &payload, NULL), STRL_OK);
+    assert_int_equal(strl_payload_encode(mesh, parent ? &parent->reference : NULL, arena, &payload, NULL, NULL), STRL_OK);
     uint32_t before = tally->accepted;
-    compare_decoders(payload.data, payload.size, tally);
+    compare_decoders(payload.data, payload.size, parent, tally);
     assert_int_equal(tally->accepted, before + 1);
-    damage(&payload, id, tally);
+    damage(&payload, id, parent, tally);
     tally->meshes++;
     strl__free(payload.data);
+}
+
+static void take_parent(strl_container *container, const strl_node *record, strl_arena *arena, told_by *parent)
+{
+    strl_node above;
+    assert_int_equal(strl_container_node(container, 0, record->decode_parent, &above, NULL), STRL_OK);
+    assert_int_equal(strl_container_mesh(container, 0, &above, arena, &parent->mesh, NULL), STRL_OK);
+    const strl_pm *mesh = &parent->mesh;
+    parent->reference = strl_payload_reference_of(mesh);
+    strl_page_place(&parent->reference, above.anchor, record);
+    parent->view = (strl__vmesh){.vertex_count = mesh->vertex_count,
+                                 .triangle_count = mesh->triangle_count,
+                                 .position = mesh->position,
+                                 .normal = mesh->normal,
+                                 .triangle = mesh->triangle};
+    parent->told.mesh = &parent->view;
+    for (unsigned k = 0; k < 3; k++)
+        parent->told.offset[k] = (uint32_t)parent->reference.offset[k];
 }
 
 static void test_the_text_alone_is_enough_to_decode(void **state)
 {
     (void)state;
     decode_tally tally = {0};
+    uint32_t told = 0;
     strl_container *container;
     assert_int_equal(strl_container_open_path(torus.good, &container, NULL), STRL_OK);
     for (uint32_t id = 0; id < strl_container_tree(container, 0)->node_count; id++) {
@@ -125,11 +151,16 @@ static void test_the_text_alone_is_enough_to_decode(void **state)
         strl_arena_init(&arena, 0);
         assert_int_equal(strl_container_node(container, 0, id, &record, NULL), STRL_OK);
         assert_int_equal(strl_container_mesh(container, 0, &record, &arena, &mesh, NULL), STRL_OK);
-        visit(&tally, id, &record, &mesh, &arena);
+        told_by parent, *given = record.decode_parent == STRL_NONE ? NULL : &parent;
+        told += given != NULL;
+        if (given)
+            take_parent(container, &record, &arena, given);
+        visit(&tally, id, given, &mesh, &arena);
+        visit(&tally, id, NULL, &mesh, &arena);
         strl_arena_deinit(&arena);
     }
     strl_container_close(container);
-    assert_true(tally.meshes > 10);
+    assert_true(tally.meshes > 20 && told > 10);
     assert_true(tally.refused > 20 * tally.meshes);
 }
 

@@ -263,7 +263,7 @@ static void make_node(builder *b, uint32_t level, uint32_t index)
         for (unsigned i = 0; i < 3; i++)
             p.mesh.position[v][i] -= (int32_t)record->anchor[i];
     if (strl_pm_record(&p.mesh, &done, &palette, 1, &b->arena, &pm, &err) != STRL_OK ||
-        strl_payload_encode(&pm, &b->arena, &payload, &err) != STRL_OK)
+        strl_payload_encode(&pm, NULL, &b->arena, &payload, NULL, &err) != STRL_OK)
         fail_msg("%s", err.message);
     b->nodes[id].payload = payload.data;
     b->nodes[id].payload_bytes = (uint32_t)payload.size;

@@ -5,7 +5,6 @@
 
 #include "base/fail.h"
 #include "build/clusters/hierarchy.h"
-#include "container/writer.h"
 #include "platform/file.h"
 #include "platform/thread.h"
 
@@ -84,48 +83,6 @@ static void hierarchy_deinit(strl_hierarchy *hierarchy)
     strl_adjacency_deinit(&hierarchy->next);
 }
 
-/* Node ids are breadth first: node i of the level at depth d has id 2^d - 1 + i. */
-static void place_in_tree(const strl_hierarchy *hierarchy, uint32_t level, uint32_t index, uint32_t group_base,
-                          strl_node *record)
-{
-    uint32_t depth = hierarchy->partition->depth - level, id = (1u << depth) - 1 + index;
-    record->parent = depth ? (id - 1) / 2 : STRL_NONE;
-    record->first_child = level ? 2 * id + 1 : STRL_NONE;
-    record->child_count = level ? 2 : 0;
-    record->level = level;
-    record->group = group_base + hierarchy->levels[level].nodes[index].group;
-}
-
-static strl_status write_nodes(const strl_hierarchy *hierarchy, strl_container_writer *writer, strl_error *err)
-{
-    uint32_t group_base = 0, depth = hierarchy->partition->depth;
-    uint64_t total = (2ull << depth) - 1, done = 0;
-    void *buffer = NULL;
-    size_t capacity = 0;
-    strl_status status = STRL_OK;
-    strl__build_stage(hierarchy->context, "write");
-    for (uint32_t d = 0; d <= depth && !status; d++) {
-        strl_level *level = &hierarchy->levels[depth - d];
-        for (uint32_t i = 0; i < level->count && !status; i++) {
-            const strl_node_state *state = &level->nodes[i];
-            strl_node record = state->record;
-            place_in_tree(hierarchy, depth - d, i, group_base, &record);
-            if (!strl__grow(&buffer, &capacity, state->payload_bytes, 1))
-                status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a payload of %u bytes", state->payload_bytes);
-            if (!status)
-                status = strl_spill_read(level->payloads, state->payload_at, buffer, state->payload_bytes, err);
-            if (!status)
-                status = strl_container_writer_add_node(writer, &record, buffer, state->payload_bytes, err);
-            if (!status && (++done & 63) == 0)
-                status = strl__build_report(hierarchy->context, done, total, err);
-        }
-        group_base += level->group_count;
-    }
-    hierarchy->context->result->groups = group_base;
-    strl__free(buffer);
-    return status;
-}
-
 static strl_status write_names(const strl_ingest *ingest, strl_container_writer *writer, strl_error *err)
 {
     strl_status status = STRL_OK;
@@ -170,7 +127,7 @@ static strl_status write_container(const strl_hierarchy *hierarchy, strl_error *
     if (!status)
         status = strl_container_writer_begin_tree(writer, &tree, err);
     if (!status)
-        status = write_nodes(hierarchy, writer, err);
+        status = strl_write_nodes(hierarchy, writer, err);
     if (!status)
         status = strl_container_writer_end_tree(writer, err);
     if (!status)
@@ -196,6 +153,8 @@ static void fill_result(const strl_hierarchy *hierarchy, strl_build_result *resu
     result->parts = (uint32_t)hierarchy->ingest->parts.count;
     result->materials = (uint32_t)hierarchy->ingest->materials.count;
     result->placements = 1;
+    result->step = hierarchy->ingest->step;
+    result->quantisation_error = (double)hierarchy->ingest->leaf_error * hierarchy->ingest->step;
 }
 
 static strl_status run_ingest(strl_hierarchy *hierarchy, strl_position *position, strl_spill **graph, strl_error *err)

@@ -11,7 +11,7 @@
 #include "base/memory.h"
 #include "build/clusters/node_mesh.h"
 #include "build/clusters/partition.h"
-#include "container/container.h"
+#include "container/writer.h"
 
 #define STRL_GROUP_MAX 8u
 /* Appearance: attribute deviation of a normal turned by one radian, and of black against white. */
@@ -23,7 +23,7 @@ typedef struct strl_node_state {
     strl_node record;       /* ids, group and page fields are filled in when the container is written */
     uint64_t payload_at;    /* in the payload spill of its level */
     uint32_t payload_bytes;
-    uint64_t mesh_at;       /* base mesh, in the mesh spill of its level */
+    uint64_t mesh_at;       /* base mesh, in the mesh spill of its level; when it is written, the order of its mesh */
     uint32_t mesh_bytes;
     bool needs_payload;     /* positions of the base mesh are in the payload alone */
     uint32_t point_count;   /* of the base mesh */
@@ -36,7 +36,7 @@ typedef struct strl_level {
     strl_node_state *nodes; /* [count] */
     uint32_t group_count;
     strl_spill *payloads;
-    strl_spill *meshes;     /* base meshes; deleted when the next level is done */
+    strl_spill *meshes;     /* base meshes, deleted when the next level is done; while writing, orders of meshes */
     strl_spill *states;     /* of the nodes as they were taken, for checkpoints; NULL where none are made */
 } strl_level;
 
@@ -120,6 +120,9 @@ strl_status strl_node_state_save(strl_level *level, uint32_t self, const strl_ma
  * many. */
 strl_status strl_node_states_restore(strl_level *level, uint32_t groups, strl_adjacency *next, uint32_t *count,
                                      strl_error *err);
+
+/* All nodes, breadth first, each payload told by its parent's. Uses up the payloads of the levels. */
+strl_status strl_write_nodes(const strl_hierarchy *hierarchy, strl_container_writer *writer, strl_error *err);
 
 /* Removes faces of which there are more than two identical ones, in pairs, from a group's merged mesh. *dropped: how many. False
  * without memory. */

@@ -4,6 +4,7 @@
 
 #include "base/fail.h"
 #include "build/clusters/hierarchy.h"
+#include "geometry/octahedral.h"
 #include "geometry/payload.h"
 #include "geometry/record.h"
 #include "geometry/simplify.h"
@@ -119,6 +120,14 @@ static bool count_neighbours(const strl_node_mesh *base, uint32_t self, strl_mad
     return true;
 }
 
+/* What is simplified further keeps its normals: only what is stored is rounded. */
+static void coarsen_normals(strl_pm *pm)
+{
+    for (uint32_t v = 0; v < pm->vertex_count; v++)
+        for (unsigned k = 0; k < 2; k++)
+            pm->normal[v][k] = strl_oct_coarsen(pm->normal[v][k]);
+}
+
 strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh *node, uint32_t self, uint32_t target,
                            strl_arena *arena, strl_made_node *made, strl_error *err)
 {
@@ -132,14 +141,16 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
                                    : strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
     if (!status)
         status = strl_pm_record(&node->mesh, &simplified, ingest->palette, (uint32_t)ingest->palette_count, arena, &pm, err);
+    if (!status && hierarchy->context->desc->compact)
+        coarsen_normals(&pm);
     if (!status)
-        status = strl_payload_encode(&pm, arena, &made->payload, err);
+        status = strl_payload_encode(&pm, NULL, arena, &made->payload, NULL, err);
     if (!status)
         status = strl_mesh_after(&node->mesh, &simplified, point_map, arena, &base.mesh, err);
     /* where hardly any triangles share points, positions are most of a base mesh: they are not spilled twice */
     made->state.needs_payload = !status && base.mesh.point_count / 3 > base.mesh.triangle_count / 4;
     if (made->state.needs_payload) /* it comes back in an order of its own */
-        status = strl_payload_decode(made->payload.data, made->payload.size, arena, &decoded, err);
+        status = strl_payload_decode(made->payload.data, made->payload.size, NULL, arena, &decoded, err);
     if (status)
         goto done;
     memcpy(base.anchor, node->anchor, sizeof base.anchor);

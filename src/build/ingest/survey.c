@@ -13,6 +13,8 @@
 #define EDGE_BINS (1u << (63 - EDGE_BIN_SHIFT))
 /* Lattice steps across the extent, at most: positions are 32-bit, and their differences must be too. */
 #define STEPS_EXPONENT 30
+/* Of a compact lattice: to the median edge, which half a diagonal then is at most a 37th of. */
+#define COMPACT_STEPS 32
 #define LEAST_EXTENT 1e-140 /* steps below 2^-512 are not of the container's format */
 #define MOST_COORDINATE 1e150 /* nor those above 2^512; and squares of lengths stay finite */
 
@@ -107,15 +109,15 @@ void strl__survey_deinit(model_survey *survey)
     *survey = (model_survey){0};
 }
 
-/* A length that 99 % of the edges reach: the lower end of the percentile's bin. */
-static double short_edge(const model_survey *survey)
+/* A length that this share of the edges does not reach: the lower end of the bin where it is passed. */
+static double edge_at(const model_survey *survey, double share)
 {
     uint64_t total = 0, seen = 0;
     for (uint32_t i = 0; i < EDGE_BINS; i++)
         total += survey->edge_histogram[i];
     for (uint32_t i = 0; i < EDGE_BINS; i++) {
         seen += survey->edge_histogram[i];
-        if (seen > total / 100) {
+        if ((double)seen > (double)total * share) {
             uint64_t bits = (uint64_t)i << EDGE_BIN_SHIFT;
             double value;
             memcpy(&value, &bits, sizeof value);
@@ -153,7 +155,8 @@ static strl_status check_extent(const strl_build_context *context, const model_s
 }
 
 /* A step that was asked for is kept or refused; the chosen one may have to be coarser than it should. */
-static strl_status choose_step(const strl_build_context *context, double extent, strl_ingest *ingest, strl_error *err)
+static strl_status choose_step(const strl_build_context *context, const model_survey *survey, double extent,
+                               strl_ingest *ingest, strl_error *err)
 {
     const double asked = context->desc->grid;
     ingest->finest_step = 2 * power_of_two_below(ldexp(extent, -STEPS_EXPONENT));
@@ -170,8 +173,10 @@ static strl_status choose_step(const strl_build_context *context, double extent,
     double wanted = ldexp(extent, -20);
     if (ingest->short_edge > 0)
         wanted = fmin(wanted, ingest->short_edge / 16);
+    if (context->desc->compact && ingest->short_edge > 0)
+        wanted = fmax(wanted, fmin(edge_at(survey, 0.5) / COMPACT_STEPS, ingest->short_edge));
     ingest->step = fmax(power_of_two_below(wanted), ingest->finest_step);
-    ingest->is_coarse = ingest->short_edge > 0 && ingest->step * 16 > ingest->short_edge;
+    ingest->is_coarse = !context->desc->compact && ingest->short_edge > 0 && ingest->step * 16 > ingest->short_edge;
     return STRL_OK;
 }
 
@@ -183,10 +188,10 @@ strl_status strl__survey_choose_lattice(const strl_build_context *context, const
         extent = fmax(extent, survey->max[k] - survey->min[k]);
         largest = fmax(largest, fmax(fabs(survey->min[k]), fabs(survey->max[k])));
     }
-    ingest->short_edge = short_edge(survey);
+    ingest->short_edge = edge_at(survey, 0.01);
     strl_status status = check_extent(context, survey, extent, largest, err);
     if (!status)
-        status = choose_step(context, extent, ingest, err);
+        status = choose_step(context, survey, extent, ingest, err);
     if (status)
         return status;
     for (int k = 0; k < 3; k++)
