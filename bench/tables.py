@@ -307,10 +307,11 @@ def markdown(records):
     return "\n".join(lines + closing_lines(records)).rstrip() + "\n"
 
 
-def write_docs(path, text):
+def write_docs(path, text, marks=(BEGIN, END)):
+    begin, end = marks
     document = path.read_text(encoding="utf-8")
-    if document.count(BEGIN) != 1 or document.count(END) != 1:
-        raise SystemExit(f"must_show: {path} lacks the lines {BEGIN} and {END}")
-    before, rest = document.split(BEGIN)
-    after = rest.split(END)[1]
-    path.write_text(f"{before}{BEGIN}\n\n{text}\n{END}{after}", encoding="utf-8")
+    if document.count(begin) != 1 or document.count(end) != 1:
+        raise SystemExit(f"{path} lacks the lines {begin} and {end}")
+    before, rest = document.split(begin)
+    after = rest.split(end)[1]
+    path.write_text(f"{before}{begin}\n\n{text}\n{end}{after}", encoding="utf-8")
