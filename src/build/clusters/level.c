@@ -5,8 +5,8 @@
 
 #include "base/fail.h"
 #include "build/clusters/hierarchy.h"
+#include "build/clusters/pm_spill.h"
 #include "build/saved.h"
-#include "geometry/payload.h"
 #include "geometry/record.h"
 #include "geometry/simplify.h"
 
@@ -64,7 +64,7 @@ static strl_status read_child(const strl_level *children, uint32_t index, strl_a
     if (!status && given)
         status = strl_spill_read(children->payloads, state->payload_at, payload, state->payload_bytes, err);
     if (!status && given)
-        status = strl_payload_decode(payload, state->payload_bytes, NULL, scratch, given, err);
+        status = strl_pm_spill_read(payload, state->payload_bytes, scratch, given, err);
     return status ? status : strl_node_mesh_read(mesh, state->mesh_bytes, given, arena, child, err);
 }
 

@@ -4,8 +4,8 @@
 
 #include "base/fail.h"
 #include "build/clusters/hierarchy.h"
+#include "build/clusters/pm_spill.h"
 #include "geometry/octahedral.h"
-#include "geometry/payload.h"
 #include "geometry/record.h"
 #include "geometry/simplify.h"
 
@@ -134,7 +134,7 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
     const strl_ingest *ingest = hierarchy->ingest;
     strl_arena_mark mark = strl_arena_get_mark(arena);
     strl_simplified simplified;
-    strl_pm pm, decoded;
+    strl_pm pm;
     strl_node_mesh base = {0};
     uint32_t *point_map = strl_arena_alloc(arena, node->mesh.point_count, sizeof *point_map);
     strl_status status = point_map ? simplify(hierarchy, &node->mesh, target, arena, &simplified, err)
@@ -144,13 +144,13 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
     if (!status && hierarchy->context->desc->compact)
         coarsen_normals(&pm);
     if (!status)
-        status = strl_payload_encode(&pm, NULL, arena, &made->payload, NULL, err);
+        strl_pm_spill_write(&pm, &made->payload);
+    if (!status && made->payload.failed)
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", pm.triangle_count);
     if (!status)
         status = strl_mesh_after(&node->mesh, &simplified, point_map, arena, &base.mesh, err);
     /* where hardly any triangles share points, positions are most of a base mesh: they are not spilled twice */
     made->state.needs_payload = !status && base.mesh.point_count / 3 > base.mesh.triangle_count / 4;
-    if (made->state.needs_payload) /* it comes back in an order of its own */
-        status = strl_payload_decode(made->payload.data, made->payload.size, NULL, arena, &decoded, err);
     if (status)
         goto done;
     memcpy(base.anchor, node->anchor, sizeof base.anchor);
@@ -160,7 +160,7 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
         goto done;
     }
-    status = strl_node_mesh_write(&base, made->state.needs_payload ? &decoded : NULL, arena, &made->mesh, err);
+    status = strl_node_mesh_write(&base, made->state.needs_payload ? &pm : NULL, arena, &made->mesh, err);
 done:
     strl_arena_rewind(arena, mark);
     return status;

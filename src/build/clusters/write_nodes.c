@@ -8,6 +8,7 @@
 
 #include "base/fail.h"
 #include "build/clusters/hierarchy.h"
+#include "build/clusters/pm_spill.h"
 #include "container/treelet.h"
 #include "geometry/payload.h"
 
@@ -109,7 +110,7 @@ static strl_status read_alone(const strl_level *level, const strl_node_state *st
     if (!payload)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a payload of %u bytes", state->payload_bytes);
     strl_status status = strl_spill_read(level->payloads, state->payload_at, payload, state->payload_bytes, err);
-    return status ? status : strl_payload_decode(payload, state->payload_bytes, NULL, arena, pm, err);
+    return status ? status : strl_pm_spill_read(payload, state->payload_bytes, arena, pm, err);
 }
 
 /* Not placed yet. */

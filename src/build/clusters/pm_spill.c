@@ -1,0 +1,333 @@
+/* A vertex of a step is told by its parent, a corner by the first vertex of its step; the rest as in node_mesh_spill.c. */
+#include "build/clusters/pm_spill.h"
+
+#include <string.h>
+
+#include "base/fail.h"
+#include "store/pack.h"
+
+#define HAS_COLOURS 1u
+#define HAS_PALETTE 2u
+
+typedef struct models {
+    strl_pack_points base;
+    strl_pack_model step_vertices, step_triangles, parent, position[3], normal[2][STRL_PACK_LENGTHS];
+    strl_pack_model colour_repeats, colour[4], palette_repeats, palette;
+    strl_pack_model base_corner[3], is_new[3], new_corner[3], old_corner[3];
+    strl_pack_model error_repeats[2], error[2];
+    strl_pack_model part, material;
+} models;
+
+static void models_init(models *m)
+{
+    memset(m, 0, sizeof *m);
+    strl_pack_points_init(&m->base);
+}
+
+/* What a vertex is told by: its parent, or the one before it. */
+static inline uint32_t guide_of(const strl_pm *pm, uint32_t vertex)
+{
+    return vertex < pm->vertex_end[0] ? (vertex ? vertex - 1 : 0) : pm->parent[vertex];
+}
+
+/* ---- writing */
+
+static void write_ends(const strl_pm *pm, models *m, strl_packer *packer)
+{
+    for (uint32_t s = 1; s <= pm->step_count; s++) {
+        strl_pack(packer, &m->step_vertices, pm->vertex_end[s] - pm->vertex_end[s - 1] - 1);
+        strl_pack(packer, &m->step_triangles, pm->triangle_end[s] - pm->triangle_end[s - 1]);
+    }
+}
+
+static void write_errors(const strl_pm *pm, models *m, strl_packer *packer)
+{
+    const float *errors[2] = {pm->geometric_error, pm->appearance_error};
+    for (unsigned k = 0; k < 2; k++) {
+        uint32_t last = 0, bits;
+        for (uint32_t s = 0; s <= pm->step_count; s++, last = bits) {
+            memcpy(&bits, &errors[k][s], sizeof bits);
+            strl_pack(packer, &m->error_repeats[k], bits != last);
+            if (bits != last)
+                strl_pack(packer, &m->error[k], strl_pack_zigzag(bits - last));
+        }
+    }
+}
+
+/* Vertices of a step are at one place. */
+static void write_positions(const strl_pm *pm, models *m, strl_packer *packer)
+{
+    for (uint32_t v = 0; v < pm->vertex_end[0]; v++) {
+        uint32_t position[3];
+        memcpy(position, pm->position[v], sizeof position);
+        strl_pack_point(packer, &m->base, position);
+    }
+    for (uint32_t s = 1; s <= pm->step_count; s++) {
+        uint32_t v = pm->vertex_end[s - 1];
+        for (unsigned k = 0; k < 3; k++)
+            strl_pack(packer, &m->position[k],
+                      strl_pack_zigzag((uint32_t)pm->position[v][k] - (uint32_t)pm->position[pm->parent[v]][k]));
+    }
+}
+
+static void write_parents(const strl_pm *pm, models *m, strl_packer *packer)
+{
+    for (uint32_t s = 1; s <= pm->step_count; s++)
+        for (uint32_t first = pm->vertex_end[s - 1], v = first; v < pm->vertex_end[s]; v++)
+            strl_pack(packer, &m->parent, first - 1 - pm->parent[v]);
+}
+
+static void write_attributes(const strl_pm *pm, models *m, strl_packer *packer)
+{
+    unsigned turn[2] = {0};
+    for (uint32_t v = 0; v < pm->vertex_count; v++) {
+        uint32_t guide = guide_of(pm, v);
+        for (unsigned k = 0; k < 2; k++) {
+            uint32_t step = strl_pack_zigzag((uint32_t)pm->normal[v][k] - (v ? pm->normal[guide][k] : 0u));
+            strl_pack(packer, &m->normal[k][turn[k]], step);
+            turn[k] = strl_pack_length(step);
+        }
+        if (pm->colour) {
+            uint32_t last = v ? pm->colour[guide] : 0;
+            strl_pack(packer, &m->colour_repeats, pm->colour[v] != last);
+            for (unsigned c = 0; c < 32 && pm->colour[v] != last; c += 8)
+                strl_pack(packer, &m->colour[c / 8], strl_pack_zigzag((pm->colour[v] >> c & 255) - (last >> c & 255)));
+        }
+        if (pm->palette_index) {
+            uint32_t last = v ? pm->palette_index[guide] : 0;
+            strl_pack(packer, &m->palette_repeats, pm->palette_index[v] != last);
+            if (pm->palette_index[v] != last)
+                strl_pack(packer, &m->palette, strl_pack_zigzag(pm->palette_index[v] - last));
+        }
+    }
+}
+
+static void write_triangles(const strl_pm *pm, models *m, strl_packer *packer)
+{
+    uint32_t next = 0;
+    for (uint32_t t = 0; t < pm->triangle_end[0]; t++)
+        for (unsigned c = 0; c < 3; c++) {
+            uint32_t vertex = pm->triangle[t][c];
+            strl_pack(packer, &m->base_corner[c], strl_pack_zigzag(next - vertex));
+            next = vertex >= next ? vertex + 1 : next;
+        }
+    for (uint32_t s = 1; s <= pm->step_count; s++)
+        for (uint32_t t = pm->triangle_end[s - 1], first = pm->vertex_end[s - 1]; t < pm->triangle_end[s]; t++)
+            for (unsigned c = 0; c < 3; c++) {
+                uint32_t vertex = pm->triangle[t][c];
+                strl_pack(packer, &m->is_new[c], vertex >= first);
+                strl_pack(packer, vertex >= first ? &m->new_corner[c] : &m->old_corner[c],
+                          vertex >= first ? vertex - first : first - 1 - vertex);
+            }
+}
+
+static void write_palette(const strl_pm *pm, models *m, strl_packer *packer)
+{
+    strl_palette_entry last = {0};
+    for (uint32_t i = 0; i < pm->palette_count; i++) {
+        const strl_palette_entry *entry = &pm->palette[i];
+        strl_pack(packer, &m->part, strl_pack_zigzag(entry->part - last.part));
+        strl_pack(packer, &m->material, strl_pack_zigzag(entry->material - last.material));
+        strl__pack_bits(packer, 32, entry->rgba);
+        last = *entry;
+    }
+}
+
+void strl_pm_spill_write(const strl_pm *pm, strl_writer *writer)
+{
+    models m;
+    strl_packer packer = {.out = writer};
+    models_init(&m);
+    strl_writer_u32(writer, pm->vertex_count);
+    strl_writer_u32(writer, pm->triangle_count);
+    strl_writer_u32(writer, pm->step_count);
+    strl_writer_u32(writer, pm->palette_count);
+    strl_writer_u32(writer, pm->vertex_end[0]);
+    strl_writer_u32(writer, pm->triangle_end[0]);
+    strl_writer_u32(writer, (pm->colour ? HAS_COLOURS : 0) | (pm->palette_index ? HAS_PALETTE : 0));
+    write_ends(pm, &m, &packer);
+    write_errors(pm, &m, &packer);
+    write_parents(pm, &m, &packer);
+    write_positions(pm, &m, &packer);
+    write_attributes(pm, &m, &packer);
+    write_triangles(pm, &m, &packer);
+    write_palette(pm, &m, &packer);
+    strl_pack_finish(&packer);
+}
+
+/* ---- reading: the same in the same order; everything that is used as an index is checked before */
+
+static bool read_ends(strl_pm *pm, models *m, strl_unpacker *unpacker)
+{
+    for (uint32_t s = 1; s <= pm->step_count; s++) {
+        uint32_t vertices = strl_unpack(unpacker, &m->step_vertices), triangles = strl_unpack(unpacker, &m->step_triangles);
+        if (vertices >= pm->vertex_count - pm->vertex_end[s - 1] || triangles > pm->triangle_count - pm->triangle_end[s - 1])
+            return false;
+        pm->vertex_end[s] = pm->vertex_end[s - 1] + vertices + 1;
+        pm->triangle_end[s] = pm->triangle_end[s - 1] + triangles;
+    }
+    return pm->vertex_end[pm->step_count] == pm->vertex_count && pm->triangle_end[pm->step_count] == pm->triangle_count;
+}
+
+static void read_errors(strl_pm *pm, models *m, strl_unpacker *unpacker)
+{
+    float *errors[2] = {pm->geometric_error, pm->appearance_error};
+    for (unsigned k = 0; k < 2; k++) {
+        uint32_t bits = 0;
+        for (uint32_t s = 0; s <= pm->step_count; s++) {
+            if (strl_unpack(unpacker, &m->error_repeats[k]))
+                bits += strl_unpack_zigzag(strl_unpack(unpacker, &m->error[k]));
+            memcpy(&errors[k][s], &bits, sizeof bits);
+        }
+    }
+}
+
+static bool read_parents(strl_pm *pm, models *m, strl_unpacker *unpacker)
+{
+    memset(pm->parent, 0, pm->vertex_end[0] * sizeof *pm->parent);
+    for (uint32_t s = 1; s <= pm->step_count; s++)
+        for (uint32_t first = pm->vertex_end[s - 1], v = first; v < pm->vertex_end[s]; v++) {
+            uint32_t back = strl_unpack(unpacker, &m->parent);
+            if (back >= first)
+                return false;
+            pm->parent[v] = (uint16_t)(first - 1 - back);
+        }
+    return true;
+}
+
+static void read_positions(strl_pm *pm, models *m, strl_unpacker *unpacker)
+{
+    for (uint32_t v = 0; v < pm->vertex_end[0]; v++) {
+        uint32_t position[3];
+        strl_unpack_point(unpacker, &m->base, position);
+        memcpy(pm->position[v], position, sizeof position);
+    }
+    for (uint32_t s = 1; s <= pm->step_count; s++) {
+        uint32_t first = pm->vertex_end[s - 1];
+        for (unsigned k = 0; k < 3; k++)
+            pm->position[first][k] = (int32_t)((uint32_t)pm->position[pm->parent[first]][k] +
+                                               strl_unpack_zigzag(strl_unpack(unpacker, &m->position[k])));
+        for (uint32_t v = first + 1; v < pm->vertex_end[s]; v++)
+            memcpy(pm->position[v], pm->position[first], sizeof *pm->position);
+    }
+}
+
+static void read_attributes(strl_pm *pm, models *m, strl_unpacker *unpacker)
+{
+    unsigned turn[2] = {0};
+    for (uint32_t v = 0; v < pm->vertex_count; v++) {
+        uint32_t guide = guide_of(pm, v);
+        for (unsigned k = 0; k < 2; k++) {
+            uint32_t step = strl_unpack(unpacker, &m->normal[k][turn[k]]);
+            pm->normal[v][k] = (uint16_t)((v ? pm->normal[guide][k] : 0u) + strl_unpack_zigzag(step));
+            turn[k] = strl_pack_length(step);
+        }
+        if (pm->colour) {
+            uint32_t last = v ? pm->colour[guide] : 0, colour = 0;
+            bool differs = strl_unpack(unpacker, &m->colour_repeats);
+            for (unsigned c = 0; c < 32 && differs; c += 8)
+                colour |= (((last >> c) + strl_unpack_zigzag(strl_unpack(unpacker, &m->colour[c / 8]))) & 255) << c;
+            pm->colour[v] = differs ? colour : last;
+        }
+        if (pm->palette_index) {
+            uint32_t index = v ? pm->palette_index[guide] : 0;
+            if (strl_unpack(unpacker, &m->palette_repeats))
+                index += strl_unpack_zigzag(strl_unpack(unpacker, &m->palette));
+            pm->palette_index[v] = (uint16_t)index;
+        }
+    }
+}
+
+static bool read_triangles(strl_pm *pm, models *m, strl_unpacker *unpacker)
+{
+    uint32_t next = 0;
+    for (uint32_t t = 0; t < pm->triangle_end[0]; t++)
+        for (unsigned c = 0; c < 3; c++) {
+            uint32_t vertex = next - strl_unpack_zigzag(strl_unpack(unpacker, &m->base_corner[c]));
+            if (vertex >= pm->vertex_count)
+                return false;
+            next = vertex >= next ? vertex + 1 : next;
+            pm->triangle[t][c] = (uint16_t)vertex;
+        }
+    for (uint32_t s = 1; s <= pm->step_count; s++)
+        for (uint32_t t = pm->triangle_end[s - 1], first = pm->vertex_end[s - 1]; t < pm->triangle_end[s]; t++)
+            for (unsigned c = 0; c < 3; c++) {
+                bool is_new = strl_unpack(unpacker, &m->is_new[c]);
+                uint32_t told = strl_unpack(unpacker, is_new ? &m->new_corner[c] : &m->old_corner[c]);
+                uint32_t vertex = is_new ? first + told : first - 1 - told;
+                if (vertex >= pm->vertex_count)
+                    return false;
+                pm->triangle[t][c] = (uint16_t)vertex;
+            }
+    return true;
+}
+
+static void read_palette(strl_pm *pm, models *m, strl_unpacker *unpacker)
+{
+    strl_palette_entry last = {0};
+    for (uint32_t i = 0; i < pm->palette_count; i++) {
+        last.part += strl_unpack_zigzag(strl_unpack(unpacker, &m->part));
+        last.material += strl_unpack_zigzag(strl_unpack(unpacker, &m->material));
+        last.rgba = strl__unpack_bits(unpacker, 32);
+        pm->palette[i] = last;
+    }
+}
+
+static bool create(strl_pm *pm, uint32_t flags, strl_arena *arena)
+{
+    size_t states = (size_t)pm->step_count + 1;
+    pm->position = strl_arena_alloc(arena, pm->vertex_count, sizeof *pm->position);
+    pm->normal = strl_arena_alloc(arena, pm->vertex_count, sizeof *pm->normal);
+    pm->colour = flags & HAS_COLOURS ? strl_arena_alloc(arena, pm->vertex_count, sizeof *pm->colour) : NULL;
+    pm->palette_index = flags & HAS_PALETTE ? strl_arena_alloc(arena, pm->vertex_count, sizeof *pm->palette_index) : NULL;
+    pm->parent = strl_arena_alloc(arena, pm->vertex_count, sizeof *pm->parent);
+    pm->triangle = strl_arena_alloc(arena, pm->triangle_count, sizeof *pm->triangle);
+    pm->vertex_end = strl_arena_alloc(arena, states, sizeof *pm->vertex_end);
+    pm->triangle_end = strl_arena_alloc(arena, states, sizeof *pm->triangle_end);
+    pm->geometric_error = strl_arena_alloc(arena, states, sizeof *pm->geometric_error);
+    pm->appearance_error = strl_arena_alloc(arena, states, sizeof *pm->appearance_error);
+    pm->palette = strl_arena_alloc(arena, pm->palette_count, sizeof *pm->palette);
+    return pm->position && pm->normal && (pm->colour || !(flags & HAS_COLOURS)) &&
+           (pm->palette_index || !(flags & HAS_PALETTE)) && pm->parent && pm->triangle && pm->vertex_end && pm->triangle_end &&
+           pm->geometric_error && pm->appearance_error && pm->palette;
+}
+
+static bool read_arrays(strl_pm *pm, strl_unpacker *unpacker)
+{
+    models m;
+    models_init(&m);
+    if (!read_ends(pm, &m, unpacker))
+        return false;
+    read_errors(pm, &m, unpacker);
+    if (!read_parents(pm, &m, unpacker))
+        return false;
+    read_positions(pm, &m, unpacker);
+    read_attributes(pm, &m, unpacker);
+    if (!read_triangles(pm, &m, unpacker))
+        return false;
+    read_palette(pm, &m, unpacker);
+    return !unpacker->failed;
+}
+
+strl_status strl_pm_spill_read(const void *data, size_t size, strl_arena *arena, strl_pm *pm, strl_error *err)
+{
+    strl_cursor cursor = strl_cursor_make(data, size);
+    *pm = (strl_pm){0};
+    pm->vertex_count = strl_cursor_u32(&cursor);
+    pm->triangle_count = strl_cursor_u32(&cursor);
+    pm->step_count = strl_cursor_u32(&cursor);
+    pm->palette_count = strl_cursor_u32(&cursor);
+    uint32_t vertices = strl_cursor_u32(&cursor), triangles = strl_cursor_u32(&cursor), flags = strl_cursor_u32(&cursor);
+    if (cursor.failed || pm->vertex_count > STRL_PM_MAX_VERTICES || pm->triangle_count > STRL_PM_MAX_TRIANGLES ||
+        pm->palette_count == 0 || pm->palette_count > STRL_PM_MAX_PALETTE || vertices > pm->vertex_count ||
+        triangles > pm->triangle_count || pm->step_count > pm->vertex_count - vertices)
+        return strl__fail(err, STRL_ERR_INTERNAL, "a node's progressive mesh in scratch is damaged");
+    if (!create(pm, flags, arena))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", pm->triangle_count);
+    pm->vertex_end[0] = vertices;
+    pm->triangle_end[0] = triangles;
+    strl_unpacker unpacker = strl_unpacker_make((const uint8_t *)data + cursor.at, size - cursor.at);
+    if (!read_arrays(pm, &unpacker) || strl_pm_check(pm, NULL))
+        return strl__fail(err, STRL_ERR_INTERNAL, "a node's progressive mesh in scratch is cut off or damaged");
+    return STRL_OK;
+}
