@@ -134,7 +134,7 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
     const strl_ingest *ingest = hierarchy->ingest;
     strl_arena_mark mark = strl_arena_get_mark(arena);
     strl_simplified simplified;
-    strl_pm pm;
+    strl_pm pm, decoded, *given = NULL;
     strl_node_mesh base = {0};
     uint32_t *point_map = strl_arena_alloc(arena, node->mesh.point_count, sizeof *point_map);
     strl_status status = point_map ? simplify(hierarchy, &node->mesh, target, arena, &simplified, err)
@@ -144,13 +144,13 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
     if (!status && hierarchy->context->desc->compact)
         coarsen_normals(&pm);
     if (!status)
-        strl_pm_spill_write(&pm, &made->payload);
-    if (!status && made->payload.failed)
-        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", pm.triangle_count);
+        status = strl_pm_spill_write(&pm, arena, &made->payload, err);
     if (!status)
         status = strl_mesh_after(&node->mesh, &simplified, point_map, arena, &base.mesh, err);
     /* where hardly any triangles share points, positions are most of a base mesh: they are not spilled twice */
     made->state.needs_payload = !status && base.mesh.point_count / 3 > base.mesh.triangle_count / 4;
+    if (made->state.needs_payload && !strl_pm_spill_keeps_order(&pm))
+        status = strl_pm_spill_read(made->payload.data, made->payload.size, arena, &decoded, err);
     if (status)
         goto done;
     memcpy(base.anchor, node->anchor, sizeof base.anchor);
@@ -160,7 +160,9 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
         goto done;
     }
-    status = strl_node_mesh_write(&base, made->state.needs_payload ? &pm : NULL, arena, &made->mesh, err);
+    if (made->state.needs_payload)
+        given = strl_pm_spill_keeps_order(&pm) ? &pm : &decoded;
+    status = strl_node_mesh_write(&base, given, arena, &made->mesh, err);
 done:
     strl_arena_rewind(arena, mark);
     return status;

@@ -4,7 +4,12 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "geometry/payload.h"
 #include "store/pack.h"
+
+/* The first byte. */
+#define PACKED 0u
+#define ENCODED 1u
 
 #define HAS_COLOURS 1u
 #define HAS_PALETTE 2u
@@ -133,7 +138,13 @@ static void write_palette(const strl_pm *pm, models *m, strl_packer *packer)
     }
 }
 
-void strl_pm_spill_write(const strl_pm *pm, strl_writer *writer)
+/* Faces apart have three vertices each. */
+bool strl_pm_spill_keeps_order(const strl_pm *pm)
+{
+    return pm->vertex_count / 9 <= pm->triangle_count / 4;
+}
+
+static void write_packed(const strl_pm *pm, strl_writer *writer)
 {
     models m;
     strl_packer packer = {.out = writer};
@@ -153,6 +164,16 @@ void strl_pm_spill_write(const strl_pm *pm, strl_writer *writer)
     write_triangles(pm, &m, &packer);
     write_palette(pm, &m, &packer);
     strl_pack_finish(&packer);
+}
+
+strl_status strl_pm_spill_write(const strl_pm *pm, strl_arena *scratch, strl_writer *writer, strl_error *err)
+{
+    bool packed = strl_pm_spill_keeps_order(pm);
+    strl_writer_u8(writer, packed ? PACKED : ENCODED);
+    if (!packed)
+        return strl_payload_encode(pm, NULL, scratch, writer, NULL, err);
+    write_packed(pm, writer);
+    return writer->failed ? strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", pm->triangle_count) : STRL_OK;
 }
 
 /* ---- reading: the same in the same order; everything that is used as an index is checked before */
@@ -312,13 +333,16 @@ static bool read_arrays(strl_pm *pm, strl_unpacker *unpacker)
 strl_status strl_pm_spill_read(const void *data, size_t size, strl_arena *arena, strl_pm *pm, strl_error *err)
 {
     strl_cursor cursor = strl_cursor_make(data, size);
+    uint8_t kind = strl_cursor_u8(&cursor);
+    if (!cursor.failed && kind == ENCODED)
+        return strl_payload_decode((const uint8_t *)data + 1, size - 1, NULL, arena, pm, err);
     *pm = (strl_pm){0};
     pm->vertex_count = strl_cursor_u32(&cursor);
     pm->triangle_count = strl_cursor_u32(&cursor);
     pm->step_count = strl_cursor_u32(&cursor);
     pm->palette_count = strl_cursor_u32(&cursor);
     uint32_t vertices = strl_cursor_u32(&cursor), triangles = strl_cursor_u32(&cursor), flags = strl_cursor_u32(&cursor);
-    if (cursor.failed || pm->vertex_count > STRL_PM_MAX_VERTICES || pm->triangle_count > STRL_PM_MAX_TRIANGLES ||
+    if (cursor.failed || kind != PACKED || pm->vertex_count > STRL_PM_MAX_VERTICES || pm->triangle_count > STRL_PM_MAX_TRIANGLES ||
         pm->palette_count == 0 || pm->palette_count > STRL_PM_MAX_PALETTE || vertices > pm->vertex_count ||
         triangles > pm->triangle_count || pm->step_count > pm->vertex_count - vertices)
         return strl__fail(err, STRL_ERR_INTERNAL, "a node's progressive mesh in scratch is damaged");
