@@ -30,6 +30,7 @@ typedef struct strl_build_desc {
                                is less than about a 2^30th of the extent */
     int up_axis;            /* 1 x, 2 y, 3 z; 0 = the inputs' own */
     const char *unit;       /* NULL = unknown */
+    bool certify;           /* measure what nodes claim, and claim no more */
     bool no_dependencies;   /* for measuring what dependencies bring: every group has one member */
     /* Called on the caller's thread, often; false cancels. May be NULL. */
     bool (*progress)(void *context, const strl_build_progress *progress);

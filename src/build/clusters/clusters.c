@@ -23,14 +23,21 @@ static strl_status open_level(strl_hierarchy *hierarchy, uint32_t index, strl_er
     snprintf(name, sizeof name, "payload-%02u", index);
     strl_status status = strl_spill_open(hierarchy->context->spills, name, 0, &level->payloads, err);
     snprintf(name, sizeof name, "mesh-%02u", index);
-    return status ? status : strl_spill_open(hierarchy->context->spills, name, 0, &level->meshes, err);
+    if (!status)
+        status = strl_spill_open(hierarchy->context->spills, name, 0, &level->meshes, err);
+    snprintf(name, sizeof name, "anchors-%02u", index);
+    return status || !hierarchy->context->desc->certify
+               ? status
+               : strl_spill_open(hierarchy->context->spills, name, 0, &level->anchors, err);
 }
 
 static strl_status close_meshes(strl_level *level, strl_error *err)
 {
     strl_status status = strl_spill_close_and_delete(level->meshes, err);
     level->meshes = NULL;
-    return status;
+    strl_status other = strl_spill_close_and_delete(level->anchors, status ? NULL : err);
+    level->anchors = NULL;
+    return status ? status : other;
 }
 
 static strl_status simplify_levels(strl_hierarchy *hierarchy, strl_error *err)
@@ -41,10 +48,14 @@ static strl_status simplify_levels(strl_hierarchy *hierarchy, strl_error *err)
     for (uint32_t level = 0; level <= hierarchy->partition->depth && !status; level++) {
         strl__build_stage(hierarchy->context, names[level < 10 ? level : 10]);
         status = open_level(hierarchy, level, err);
+        if (hierarchy->context->desc->certify)
+            strl_anchor_plan_level(&hierarchy->anchor_plan, level, hierarchy->partition->depth);
         if (!status)
             status = level == 0 ? strl_make_leaves(hierarchy, err) : strl_make_level(hierarchy, level, err);
         if (!status)
             status = strl_spill_flush(hierarchy->levels[level].meshes, err);
+        if (!status && hierarchy->levels[level].anchors)
+            status = strl_spill_flush(hierarchy->levels[level].anchors, err);
         if (!status)
             status = strl_spill_flush(hierarchy->levels[level].payloads, err);
         if (!status && level > 0)
@@ -68,6 +79,7 @@ static void hierarchy_deinit(strl_hierarchy *hierarchy)
     for (uint32_t i = 0; hierarchy->levels && i <= hierarchy->partition->depth; i++) {
         strl_spill_close_and_delete(hierarchy->levels[i].payloads, NULL);
         strl_spill_close_and_delete(hierarchy->levels[i].meshes, NULL);
+        strl_spill_close_and_delete(hierarchy->levels[i].anchors, NULL);
         strl__free(hierarchy->levels[i].nodes);
     }
     strl__free(hierarchy->levels);
@@ -84,6 +96,10 @@ static void place_in_tree(const strl_hierarchy *hierarchy, uint32_t level, uint3
     record->child_count = level ? 2 : 0;
     record->level = level;
     record->group = group_base + hierarchy->levels[level].nodes[index].group;
+    const strl_node_claims *claims = &hierarchy->levels[level].nodes[index].claims;
+    record->geometric_min = claims->least;
+    record->geometric_max = claims->most;
+    record->group_geometric = claims->group;
 }
 
 static strl_status write_nodes(const strl_hierarchy *hierarchy, strl_container_writer *writer, strl_error *err)
@@ -200,6 +216,7 @@ strl_status strl__clusters_run(strl_build_context *context, strl_error *err)
     }
     if (!status) {
         hierarchy.levels = strl__alloc_zero((size_t)partition.depth + 1, sizeof *hierarchy.levels);
+        strl_anchor_plan_begin(&hierarchy.anchor_plan, partition.depth);
         status = hierarchy.levels ? simplify_levels(&hierarchy, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory");
     }
     if (!status) {

@@ -18,6 +18,7 @@ void strl_made_node_deinit(strl_made_node *made)
 {
     strl__free(made->payload.data);
     strl__free(made->mesh.data);
+    strl__free(made->anchors.data);
     strl__free(made->next_neighbour);
     *made = (strl_made_node){0};
 }
@@ -121,12 +122,52 @@ static bool count_neighbours(const strl_node_mesh *base, uint32_t self, strl_mad
     return true;
 }
 
-strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh *node, uint32_t self, uint32_t target,
-                           strl_arena *arena, strl_made_node *made, strl_error *err)
+/* Measured claims in place of chained ones: of the way from the mesh to the input the smaller counts; which input the node stands for
+ * is decided by its pieces, so the way back is the measured one. */
+static void lower_errors(const strl_certificate *certificate, strl_pm *pm)
+{
+    for (uint32_t i = 0; i <= pm->step_count; i++) {
+        float *error = &pm->geometric_error[pm->step_count - i];
+        *error = fmaxf(certificate->down[i], fminf(certificate->up[i], *error));
+    }
+}
+
+static strl_status certify(const strl_hierarchy *hierarchy, const strl_node_mesh *node, const strl_anchors *anchors,
+                           const strl_simplified *simplified, strl_arena *arena, strl_certificate *certificate, strl_pm *pm,
+                           strl_error *err)
+{
+    certificate->triangle = NULL;
+    if (!hierarchy->anchor_plan.has_used || !anchors || anchors->used.count == 0)
+        return STRL_OK;
+    strl_status status = strl_certify(&node->mesh, simplified, anchors->used.item, anchors->used.count, arena, certificate, err);
+    if (!status)
+        lower_errors(certificate, pm);
+    return status;
+}
+
+/* The anchors that go on to the parent. */
+static strl_status pass_anchors(const strl_hierarchy *hierarchy, const strl_anchors *anchors, const strl_mesh *base,
+                                const strl_certificate *certificate, strl_made_node *made, strl_error *err)
+{
+    strl_pieces born = {0};
+    strl_anchors passed = anchors ? *anchors : (strl_anchors){0};
+    bool good = !hierarchy->anchor_plan.bears || strl_anchors_bear(base, certificate->triangle, &born);
+    if (hierarchy->anchor_plan.bears)
+        passed.young = born;
+    if (good)
+        strl_anchors_write(&passed, &made->anchors);
+    good = good && !made->anchors.failed;
+    strl__free(born.item);
+    return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for the anchors of a node");
+}
+
+strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh *node, const strl_anchors *anchors, uint32_t self,
+                           uint32_t target, strl_arena *arena, strl_made_node *made, strl_error *err)
 {
     const strl_ingest *ingest = hierarchy->ingest;
     strl_arena_mark mark = strl_arena_get_mark(arena);
     strl_simplified simplified;
+    strl_certificate certificate;
     strl_pm pm, decoded;
     strl_node_mesh base = {0};
     uint32_t *point_map = strl_arena_alloc(arena, node->mesh.point_count, sizeof *point_map);
@@ -134,6 +175,10 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
                                    : strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
     if (!status)
         status = strl_pm_record(&node->mesh, &simplified, ingest->palette, (uint32_t)ingest->palette_count, arena, &pm, err);
+    if (!status) {
+        fill_record(&made->state.record, node, &simplified, &pm);
+        status = certify(hierarchy, node, anchors, &simplified, arena, &certificate, &pm, err);
+    }
     if (!status)
         status = strl_payload_encode(&pm, arena, &made->payload, err);
     if (!status)
@@ -145,13 +190,16 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
     if (status)
         goto done;
     memcpy(base.anchor, node->anchor, sizeof base.anchor);
-    fill_record(&made->state.record, node, &simplified, &pm);
+    made->state.claims = (strl_node_claims){pm.geometric_error[pm.step_count], pm.geometric_error[0], 0};
     made->state.point_count = base.mesh.point_count;
     if (!keep_shares(node, point_map, &base, arena) || !count_neighbours(&base, self, made)) {
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
         goto done;
     }
-    status = strl_node_mesh_write(&base, made->state.needs_payload ? &decoded : NULL, arena, &made->mesh, err);
+    if (hierarchy->context->desc->certify)
+        status = pass_anchors(hierarchy, anchors, &base.mesh, &certificate, made, err);
+    if (!status)
+        status = strl_node_mesh_write(&base, made->state.needs_payload ? &decoded : NULL, arena, &made->mesh, err);
 done:
     strl_arena_rewind(arena, mark);
     return status;
@@ -166,9 +214,13 @@ strl_status strl_take_node(strl_hierarchy *hierarchy, strl_level *level, uint32_
     state->payload_bytes = (uint32_t)made->payload.size;
     state->mesh_at = strl_spill_bytes(level->meshes);
     state->mesh_bytes = (uint32_t)made->mesh.size;
+    state->anchors_at = level->anchors ? strl_spill_bytes(level->anchors) : 0;
+    state->anchors_bytes = made->anchors.size;
     strl_status status = strl_spill_append(level->payloads, made->payload.data, made->payload.size, err);
     if (!status)
         status = strl_spill_append(level->meshes, made->mesh.data, made->mesh.size, err);
+    if (!status && level->anchors)
+        status = strl_spill_append(level->anchors, made->anchors.data, made->anchors.size, err);
     for (size_t i = 0; i < made->neighbour_count && !status; i++)
         if (!strl_adjacency_add(&hierarchy->next, self >> 1, made->next_neighbour[2 * i], made->next_neighbour[2 * i + 1]))
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the neighbours of a level");

@@ -1,0 +1,243 @@
+#include "build/clusters/anchors.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "geometry/near.h"
+
+#define FEW_NODES 16u     /* levels of so few keep their anchors: they cost nothing there, and the older the tighter */
+#define LATEST_FIRST 2u   /* below, what is claimed without certificates is tight, and most of the triangles are there */
+#define CANDIDATES 256u
+#define PARTS_MAX 64u
+/* A corner that was cut is rounded to the lattice. */
+#define CUT_ERROR 0.8661f
+
+/* ---- plan ---- */
+
+void strl_anchor_plan_begin(strl_anchor_plan *plan, uint32_t depth)
+{
+    *plan = (strl_anchor_plan){.first = depth / 4 < LATEST_FIRST ? depth / 4 : LATEST_FIRST};
+}
+
+void strl_anchor_plan_level(strl_anchor_plan *plan, uint32_t level, uint32_t depth)
+{
+    plan->has_young = plan->has_young || plan->bears; /* of the level before */
+    plan->promotes = plan->has_young && plan->born + 2 <= level;
+    plan->has_used = plan->has_used || plan->promotes;
+    plan->has_young = plan->has_young && !plan->promotes;
+    bool is_turn = level >= plan->first && (level - plan->first) % 2 == 0;
+    plan->bears = is_turn && !plan->has_young && level < depth && (level == plan->first || 1u << (depth - level) > FEW_NODES);
+    if (plan->bears)
+        plan->born = level;
+}
+
+/* ---- pieces ---- */
+
+void strl_anchors_deinit(strl_anchors *anchors)
+{
+    strl__free(anchors->used.item);
+    strl__free(anchors->young.item);
+    *anchors = (strl_anchors){0};
+}
+
+static bool add_piece(strl_pieces *pieces, const strl_piece *piece)
+{
+    if (pieces->count == UINT32_MAX || !strl__grow(&pieces->item, &pieces->capacity, (size_t)pieces->count + 1, sizeof *piece))
+        return false;
+    pieces->item[pieces->count++] = *piece;
+    return true;
+}
+
+static void write_pieces(const strl_pieces *pieces, strl_writer *writer)
+{
+    strl_writer_u32(writer, pieces->count);
+    strl_writer_bytes(writer, pieces->item, pieces->count * sizeof *pieces->item);
+}
+
+void strl_anchors_write(const strl_anchors *anchors, strl_writer *writer)
+{
+    write_pieces(&anchors->used, writer);
+    write_pieces(&anchors->young, writer);
+}
+
+static bool read_pieces(strl_cursor *cursor, const int64_t moved[3], strl_pieces *pieces)
+{
+    uint32_t count = strl_cursor_u32(cursor);
+    const uint8_t *data = strl_cursor_take(cursor, (size_t)count * sizeof(strl_piece));
+    if (!data || !pieces)
+        return data != NULL;
+    if (!strl__grow(&pieces->item, &pieces->capacity, (size_t)pieces->count + count, sizeof *pieces->item))
+        return false;
+    strl_piece *to = pieces->item + pieces->count;
+    memcpy(to, data, (size_t)count * sizeof *to);
+    for (uint32_t i = 0; i < count; i++)
+        for (unsigned k = 0; k < 9; k++)
+            to[i].corner[k / 3][k % 3] += (int32_t)moved[k % 3];
+    pieces->count += count;
+    return true;
+}
+
+strl_status strl_anchors_read(const void *data, size_t size, const int64_t moved[3], bool promotes, strl_anchors *anchors,
+                              strl_error *err)
+{
+    strl_cursor cursor = strl_cursor_make(data, size);
+    bool good = read_pieces(&cursor, moved, promotes ? NULL : &anchors->used) &&
+                read_pieces(&cursor, moved, promotes ? &anchors->used : &anchors->young);
+    return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu bytes of anchors", size);
+}
+
+bool strl_anchors_bear(const strl_mesh *base, const float *certified, strl_pieces *young)
+{
+    for (uint32_t t = 0; t < base->triangle_count; t++) {
+        strl_piece piece = {.claim = strl_mesh_error(base, strl_drift_length(&base->drift[t]))};
+        if (certified)
+            piece.claim = certified[t];
+        for (unsigned c = 0; c < 3; c++)
+            memcpy(piece.corner[c], base->position[base->wedge[base->triangle[t][c]].point], sizeof piece.corner[c]);
+        if (!add_piece(young, &piece))
+            return false;
+    }
+    return true;
+}
+
+/* ---- dividing among members ---- */
+
+typedef struct part {
+    uint32_t member;
+    strl_fragment fragment;
+} part;
+
+typedef struct divider {
+    const uint32_t *owner;
+    strl_near tree;
+    strl_facet *facet; /* [triangles] */
+    strl_facet by[CANDIDATES];
+    uint32_t candidate[CANDIDATES], candidate_count;
+    double distance; /* of the middle of the piece from the first candidate */
+    part parts[PARTS_MAX];
+    uint32_t part_count;
+    bool is_full;
+} divider;
+
+static void take_part(void *context, uint32_t by, const strl_fragment *fragment)
+{
+    divider *d = context;
+    if (d->part_count == PARTS_MAX)
+        d->is_full = true;
+    else
+        d->parts[d->part_count++] = (part){d->owner[d->candidate[by]], *fragment};
+}
+
+static bool add_part(const part *p, float claim, strl_pieces *pieces)
+{
+    int32_t corner[STRL_FRAGMENT_MAX][3];
+    for (uint32_t i = 0; i < p->fragment.count; i++)
+        for (unsigned k = 0; k < 3; k++)
+            corner[i][k] = (int32_t)lround(p->fragment.corner[i][k]);
+    for (uint32_t i = 1; i + 1 < p->fragment.count; i++) {
+        strl_piece piece = {.claim = (claim + CUT_ERROR) * STRL_ROUND_UP};
+        memcpy(piece.corner[0], corner[0], sizeof corner[0]);
+        memcpy(piece.corner[1], corner[i], sizeof corner[i]);
+        memcpy(piece.corner[2], corner[i + 1], sizeof corner[i]);
+        if (!add_piece(pieces, &piece))
+            return false;
+    }
+    return true;
+}
+
+static void list_candidates(divider *d, const strl_facet *piece)
+{
+    double middle[3];
+    for (unsigned k = 0; k < 3; k++)
+        middle[k] = (piece->corner[0][k] + piece->corner[1][k] + piece->corner[2][k]) / 3;
+    d->candidate[0] = strl_near_find(&d->tree, middle, &d->distance);
+    d->candidate_count = 1 + strl_near_list(&d->tree, piece, d->distance, d->candidate + 1, CANDIDATES - 1);
+}
+
+static bool lies_over_one(const divider *d)
+{
+    for (uint32_t i = 1; i < d->candidate_count; i++)
+        if (d->owner[d->candidate[i]] != d->owner[d->candidate[0]])
+            return false;
+    return true;
+}
+
+static bool parts_are_of_one(const divider *d)
+{
+    for (uint32_t i = 1; i < d->part_count; i++)
+        if (d->parts[i].member != d->parts[0].member)
+            return false;
+    return true;
+}
+
+static bool divide_piece(divider *d, const strl_piece *piece, strl_pieces *const *shares)
+{
+    strl_facet facet;
+    double corner[3][3];
+    for (unsigned i = 0; i < 9; i++)
+        corner[i / 3][i % 3] = piece->corner[i / 3][i % 3];
+    strl_facet_set(&facet, corner[0], corner[1], corner[2]);
+    list_candidates(d, &facet);
+    if (lies_over_one(d))
+        return add_piece(shares[d->owner[d->candidate[0]]], piece);
+    for (uint32_t i = 0; i < d->candidate_count; i++) {
+        d->by[i] = d->facet[d->candidate[i]];
+        d->by[i].claim = 0;
+    }
+    d->part_count = 0;
+    d->is_full = false;
+    strl_cover_bound(&facet, &(strl_cover){.by = d->by, .count = d->candidate_count, .near = INFINITY,
+                                           .enough = 2 * d->distance, .take = take_part, .context = d});
+    if (d->is_full || parts_are_of_one(d))
+        return add_piece(shares[d->is_full ? d->owner[d->candidate[0]] : d->parts[0].member], piece);
+    bool good = true;
+    for (uint32_t i = 0; i < d->part_count && good; i++)
+        good = add_part(&d->parts[i], piece->claim, shares[d->parts[i].member]);
+    return good;
+}
+
+static bool prepare_divider(divider *d, const strl_mesh *mesh, strl_arena *arena)
+{
+    uint32_t *order = strl_arena_alloc(arena, mesh->triangle_count, sizeof *order);
+    strl_near_node *nodes = strl_arena_alloc(arena, strl_near_nodes(mesh->triangle_count), sizeof *nodes);
+    d->facet = strl_arena_alloc(arena, mesh->triangle_count, sizeof *d->facet);
+    if (!order || !nodes || !d->facet)
+        return false;
+    for (uint32_t t = 0; t < mesh->triangle_count; t++) {
+        double corner[3][3];
+        for (unsigned i = 0; i < 9; i++)
+            corner[i / 3][i % 3] = mesh->position[mesh->wedge[mesh->triangle[t][i / 3]].point][i % 3];
+        strl_facet_set(&d->facet[t], corner[0], corner[1], corner[2]);
+    }
+    strl_near_build(&d->tree, d->facet, mesh->triangle_count, order, nodes);
+    return true;
+}
+
+static bool divide_all(divider *d, uint32_t members, const strl_anchors *all, strl_anchors *shares)
+{
+    strl_pieces *used[8], *young[8];
+    bool good = true;
+    for (uint32_t m = 0; m < members; m++) {
+        used[m] = &shares[m].used;
+        young[m] = &shares[m].young;
+    }
+    for (uint32_t i = 0; i < all->used.count && good; i++)
+        good = divide_piece(d, &all->used.item[i], used);
+    for (uint32_t i = 0; i < all->young.count && good; i++)
+        good = divide_piece(d, &all->young.item[i], young);
+    return good;
+}
+
+strl_status strl_anchors_divide(const strl_mesh *mesh, const uint32_t *owner, uint32_t members, const strl_anchors *all,
+                                strl_arena *arena, strl_anchors *shares, strl_error *err)
+{
+    strl_arena_mark mark = strl_arena_get_mark(arena);
+    divider *d = strl_arena_alloc(arena, 1, sizeof *d);
+    bool good = d != NULL;
+    if (good)
+        d->owner = owner;
+    good = good && prepare_divider(d, mesh, arena) && divide_all(d, members, all, shares);
+    strl_arena_rewind(arena, mark);
+    return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for the anchors of a group");
+}

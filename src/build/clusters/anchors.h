@@ -1,0 +1,52 @@
+/* `--certify`: the older surfaces that nodes are measured against (geometry/certify.h).
+ *
+ * Base meshes of every second level become *anchors*: their triangles, each with a bound of its own distance from the input, go up the
+ * hierarchy with the nodes that stand for them. From two levels above on, nodes are measured against them; when the next anchors are old
+ * enough these take over, so that bounds do not add up from level to level. Levels of few nodes keep what they have to the top.
+ *
+ * Which node stands for which piece decides who answers for it in a cut, whatever states the nodes take. Where a group has moved the
+ * boundaries of its members, each piece goes to the member over which it lies now; one that lies over several is cut. */
+#ifndef STRL_BUILD_CLUSTERS_ANCHORS_H
+#define STRL_BUILD_CLUSTERS_ANCHORS_H
+
+#include "base/cursor.h"
+#include "build/clusters/node_mesh.h"
+#include "geometry/certify.h"
+
+typedef struct strl_pieces {
+    uint32_t count;
+    strl_piece *item; /* owned */
+    size_t capacity;
+} strl_pieces;
+
+/* Two generations: what nodes are measured against, and what will be. */
+typedef struct strl_anchors {
+    strl_pieces used, young;
+} strl_anchors;
+
+/* What happens at the level being made; the zero value is a build without certificates. */
+typedef struct strl_anchor_plan {
+    uint32_t first;     /* the first level whose base meshes become anchors */
+    uint32_t born;      /* the level of the young ones */
+    bool promotes;      /* the children's young ones are used from here on */
+    bool has_used, has_young;
+    bool bears;         /* the base meshes of this level become young anchors */
+} strl_anchor_plan;
+
+void strl_anchor_plan_begin(strl_anchor_plan *plan, uint32_t depth);
+/* For a level of so many nodes, made after the one before. */
+void strl_anchor_plan_level(strl_anchor_plan *plan, uint32_t level, uint32_t depth);
+
+void strl_anchors_deinit(strl_anchors *anchors);
+/* Scratch format. Pieces are relative to their node's anchor. */
+void strl_anchors_write(const strl_anchors *anchors, strl_writer *writer);
+/* Appends the pieces of a node; moved: what is to be added to their positions. */
+strl_status strl_anchors_read(const void *data, size_t size, const int64_t moved[3], bool promotes, strl_anchors *anchors,
+                              strl_error *err);
+/* The triangles of a base mesh as young anchors. certified: per triangle; NULL = by their drifts. */
+bool strl_anchors_bear(const strl_mesh *base, const float *certified, strl_pieces *young);
+/* Gives each piece of `all` to the members (at most 8) of a group by the triangles over which it lies: owner[] of mesh's triangles. */
+strl_status strl_anchors_divide(const strl_mesh *mesh, const uint32_t *owner, uint32_t members, const strl_anchors *all,
+                                strl_arena *arena, strl_anchors *shares, strl_error *err);
+
+#endif

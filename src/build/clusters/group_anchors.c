@@ -1,0 +1,52 @@
+/* `--certify` at a group: what its members stand for, and what they claim. */
+#include <math.h>
+
+#include "base/fail.h"
+#include "build/clusters/hierarchy.h"
+
+static strl_status read_anchors(const strl_level *children, uint32_t index, const int64_t origin[3], const int64_t anchor[3],
+                                bool promotes, strl_arena *arena, strl_anchors *all, strl_error *err)
+{
+    const strl_node_state *state = &children->nodes[index];
+    strl_arena_mark mark = strl_arena_get_mark(arena);
+    int64_t moved[3] = {anchor[0] - origin[0], anchor[1] - origin[1], anchor[2] - origin[2]};
+    void *data = strl_arena_alloc(arena, state->anchors_bytes, 1);
+    strl_status status = data ? strl_spill_read(children->anchors, state->anchors_at, data, state->anchors_bytes, err)
+                              : strl__fail(err, STRL_ERR_MEMORY, "no memory for the anchors of a node");
+    if (!status)
+        status = strl_anchors_read(data, state->anchors_bytes, moved, promotes, all, err);
+    strl_arena_rewind(arena, mark);
+    return status;
+}
+
+strl_status strl_group_anchors(const strl_level *children, const uint32_t *member, uint32_t count, const strl_node_mesh *merged,
+                               const uint32_t *owner, bool promotes, strl_arena *arena, strl_anchors *shares, strl_error *err)
+{
+    strl_anchors all = {0};
+    strl_status status = STRL_OK;
+    for (uint32_t i = 0; i < 2 * count && !status; i++) {
+        uint32_t child = 2 * member[i / 2] + (i & 1);
+        status = read_anchors(children, child, merged->anchor, children->nodes[child].record.anchor, promotes, arena,
+                              count == 1 ? &shares[0] : &all, err);
+    }
+    if (!status && count > 1)
+        status = strl_anchors_divide(&merged->mesh, owner, count, &all, arena, shares, err);
+    strl_anchors_deinit(&all);
+    return status;
+}
+
+void strl_group_claims(const strl_level *children, const uint32_t *member, uint32_t count, strl_made_node *made)
+{
+    float group = 0;
+    for (uint32_t m = 0; m < count; m++) {
+        strl_node_claims *own = &made[m].state.claims;
+        for (uint32_t i = 0; i < 2; i++) {
+            const strl_node_claims *child = &children->nodes[2 * member[m] + i].claims;
+            own->least = fmaxf(own->least, fmaxf(child->most, child->group));
+        }
+        own->most = fmaxf(own->most, own->least);
+        group = fmaxf(group, own->least);
+    }
+    for (uint32_t m = 0; m < count; m++)
+        made[m].state.claims.group = group;
+}

@@ -1,0 +1,401 @@
+#include "geometry/certify.h"
+
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "geometry/near.h"
+
+#define NO_INDEX UINT32_MAX
+#define AROUND_MAX 64u   /* triangles near a collapse that pieces are measured against at first */
+#define WIDER_MAX 256u   /* the same where that was not enough */
+#define GATHER_MAX 1024u /* pieces that one triangle is measured against */
+/* Of the largest coordinate: what doubles cannot tell apart in the points of fragments and their distances. */
+#define ROUNDING 0x1p-46
+
+/* That a piece was measured against a triangle. */
+typedef struct link {
+    uint32_t piece, next;
+} link;
+
+typedef struct tracker {
+    const strl_mesh *mesh;
+    const strl_piece *pieces;
+    uint32_t piece_count;
+    uint32_t (*point)[3];     /* per triangle */
+    bool *gone;               /* per triangle */
+    uint32_t *head, *tail;    /* per point: corners, 4 * triangle + 0, 1, 2 */
+    uint32_t (*next)[3];      /* per corner: the next at its point */
+    strl_facet *facet;        /* per triangle, as it is now */
+    float *up, *down;         /* per triangle; per piece */
+    uint32_t *first_link;     /* per triangle */
+    link *links;              /* owned; grows */
+    size_t link_count, link_capacity;
+    uint32_t free_link;
+    uint32_t *stamp, *piece_stamp, tick; /* per triangle, per piece */
+    double most_up, most_down;
+    uint32_t *found;          /* [piece_count] gathered pieces */
+    uint32_t found_count;
+    uint32_t *star;           /* [triangle_count] triangles that a collapse changed */
+    uint32_t star_count;
+    uint32_t around[WIDER_MAX], around_count;
+    bool used[WIDER_MAX];
+    strl_facet by[GATHER_MAX];
+} tracker;
+
+/* ---- pieces and triangles ---- */
+
+static void piece_facet(const strl_piece *piece, strl_facet *facet)
+{
+    double corner[3][3];
+    for (unsigned i = 0; i < 9; i++)
+        corner[i / 3][i % 3] = piece->corner[i / 3][i % 3];
+    strl_facet_set(facet, corner[0], corner[1], corner[2]);
+    facet->claim = piece->claim;
+}
+
+static void triangle_facet(tracker *t, uint32_t triangle)
+{
+    double corner[3][3];
+    for (unsigned i = 0; i < 9; i++)
+        corner[i / 3][i % 3] = t->mesh->position[t->point[triangle][i / 3]][i % 3];
+    strl_facet_set(&t->facet[triangle], corner[0], corner[1], corner[2]);
+    t->facet[triangle].claim = 0;
+}
+
+static void append_corner(tracker *t, uint32_t point, uint32_t corner)
+{
+    t->next[corner >> 2][corner & 3] = NO_INDEX;
+    if (t->head[point] == NO_INDEX)
+        t->head[point] = corner;
+    else
+        t->next[t->tail[point] >> 2][t->tail[point] & 3] = corner;
+    t->tail[point] = corner;
+}
+
+/* ---- links ---- */
+
+static bool add_link(tracker *t, uint32_t triangle, uint32_t piece)
+{
+    for (uint32_t at = t->first_link[triangle]; at != NO_INDEX; at = t->links[at].next)
+        if (t->links[at].piece == piece)
+            return true;
+    uint32_t at = t->free_link;
+    if (at != NO_INDEX)
+        t->free_link = t->links[at].next;
+    else if (t->link_count < NO_INDEX && strl__grow(&t->links, &t->link_capacity, t->link_count + 1, sizeof *t->links))
+        at = (uint32_t)t->link_count++;
+    else
+        return false;
+    t->links[at] = (link){piece, t->first_link[triangle]};
+    t->first_link[triangle] = at;
+    return true;
+}
+
+static void gather_pieces(tracker *t, uint32_t triangle)
+{
+    for (uint32_t at = t->first_link[triangle]; at != NO_INDEX; at = t->links[at].next) {
+        uint32_t piece = t->links[at].piece;
+        if (t->piece_stamp[piece] == t->tick)
+            continue;
+        t->piece_stamp[piece] = t->tick;
+        t->found[t->found_count++] = piece;
+    }
+}
+
+static void drop_links(tracker *t, uint32_t triangle)
+{
+    while (t->first_link[triangle] != NO_INDEX) {
+        uint32_t at = t->first_link[triangle];
+        t->first_link[triangle] = t->links[at].next;
+        t->links[at].next = t->free_link;
+        t->free_link = at;
+    }
+}
+
+/* ---- what is round a collapse ---- */
+
+static void add_around(tracker *t, uint32_t triangle, uint32_t most)
+{
+    if (t->gone[triangle] || t->stamp[triangle] == t->tick || t->around_count == most)
+        return;
+    t->stamp[triangle] = t->tick;
+    t->around[t->around_count++] = triangle;
+}
+
+static void add_around_point(tracker *t, uint32_t point, uint32_t most)
+{
+    for (uint32_t corner = t->head[point]; corner != NO_INDEX && t->around_count < most; corner = t->next[corner >> 2][corner & 3])
+        add_around(t, corner >> 2, most);
+}
+
+static void take_around(tracker *t)
+{
+    for (uint32_t i = 0; i < t->around_count; i++)
+        t->by[i] = t->facet[t->around[i]];
+}
+
+/* The changed triangles, those at `point`, and those that share points with them, `rings` times over. */
+static void look_around(tracker *t, uint32_t point, unsigned rings, uint32_t most)
+{
+    t->tick++;
+    t->around_count = 0;
+    for (uint32_t i = 0; i < t->star_count; i++)
+        add_around(t, t->star[i], most);
+    add_around_point(t, point, most);
+    for (unsigned ring = 0; ring < rings; ring++)
+        for (uint32_t i = 0, count = t->around_count; i < count; i++)
+            for (unsigned c = 0; c < 3; c++)
+                add_around_point(t, t->point[t->around[i]][c], most);
+    take_around(t);
+}
+
+/* ---- measuring ---- */
+
+static void note_used(void *context, uint32_t by, const strl_fragment *fragment)
+{
+    tracker *t = context;
+    (void)fragment;
+    t->used[by] = true;
+}
+
+/* A piece against the triangles of `around`, which `by` holds. */
+static double measure_piece(tracker *t, const strl_facet *piece, double near, double enough)
+{
+    memset(t->used, 0, t->around_count);
+    return strl_cover_bound(piece, &(strl_cover){.by = t->by, .count = t->around_count, .near = near, .enough = enough,
+                                                 .take = note_used, .context = t});
+}
+
+static bool keep_measure(tracker *t, uint32_t piece, double bound)
+{
+    bool good = true;
+    t->down[piece] = (float)bound;
+    t->most_down = bound > t->most_down ? bound : t->most_down;
+    for (uint32_t i = 0; i < t->around_count; i++)
+        if (t->used[i])
+            good = good && add_link(t, t->around[i], piece);
+    return good;
+}
+
+/* A triangle against the pieces linked to it; against all that were gathered where these leave something open. */
+static void measure_triangle(tracker *t, uint32_t triangle, bool all)
+{
+    uint32_t count = 0;
+    double enough = fmax(t->most_up, t->most_down);
+    if (all)
+        for (uint32_t i = 0; i < t->found_count && count < GATHER_MAX; i++)
+            piece_facet(&t->pieces[t->found[i]], &t->by[count++]);
+    else
+        for (uint32_t at = t->first_link[triangle]; at != NO_INDEX && count < GATHER_MAX; at = t->links[at].next)
+            piece_facet(&t->pieces[t->links[at].piece], &t->by[count++]);
+    double bound = strl_cover_bound(&t->facet[triangle], &(strl_cover){.by = t->by, .count = count, .near = enough, .enough = enough});
+    t->up[triangle] = all ? fminf(t->up[triangle], (float)bound) : (float)bound;
+}
+
+/* Pieces of all triangles that share a point with this one. */
+static void gather_around(tracker *t, uint32_t triangle)
+{
+    t->tick++;
+    t->around_count = 0;
+    for (unsigned c = 0; c < 3; c++)
+        add_around_point(t, t->point[triangle][c], AROUND_MAX);
+    t->found_count = 0;
+    for (uint32_t i = 0; i < t->around_count; i++)
+        gather_pieces(t, t->around[i]);
+}
+
+static void measure_up(tracker *t, uint32_t triangle)
+{
+    measure_triangle(t, triangle, false);
+    if (t->up[triangle] > fmax(t->most_up, t->most_down)) {
+        gather_around(t, triangle);
+        measure_triangle(t, triangle, true);
+    }
+    t->most_up = fmax(t->most_up, t->up[triangle]);
+}
+
+/* ---- the start ---- */
+
+static bool prepare(tracker *t, const strl_mesh *mesh, strl_arena *arena)
+{
+    uint32_t n = mesh->triangle_count;
+    t->point = strl_arena_alloc(arena, n, sizeof *t->point);
+    t->next = strl_arena_alloc(arena, n, sizeof *t->next);
+    t->gone = strl_arena_alloc_zero(arena, n, sizeof *t->gone);
+    t->facet = strl_arena_alloc(arena, n, sizeof *t->facet);
+    t->up = strl_arena_alloc(arena, n, sizeof *t->up);
+    t->first_link = strl_arena_alloc(arena, n, sizeof *t->first_link);
+    t->stamp = strl_arena_alloc_zero(arena, n, sizeof *t->stamp);
+    t->star = strl_arena_alloc(arena, n, sizeof *t->star);
+    t->head = strl_arena_alloc(arena, mesh->point_count, sizeof *t->head);
+    t->tail = strl_arena_alloc(arena, mesh->point_count, sizeof *t->tail);
+    t->down = strl_arena_alloc(arena, t->piece_count, sizeof *t->down);
+    t->piece_stamp = strl_arena_alloc_zero(arena, t->piece_count, sizeof *t->piece_stamp);
+    t->found = strl_arena_alloc(arena, t->piece_count, sizeof *t->found);
+    if (!t->point || !t->next || !t->gone || !t->facet || !t->up || !t->first_link || !t->stamp || !t->star || !t->head ||
+        !t->tail || !t->down || !t->piece_stamp || !t->found)
+        return false;
+    memset(t->head, 0xff, mesh->point_count * sizeof *t->head);
+    memset(t->first_link, 0xff, n * sizeof *t->first_link);
+    t->free_link = NO_INDEX;
+    for (uint32_t i = 0; i < n; i++) {
+        for (unsigned c = 0; c < 3; c++) {
+            t->point[i][c] = mesh->wedge[mesh->triangle[i][c]].point;
+            append_corner(t, t->point[i][c], 4 * i + c);
+        }
+        triangle_facet(t, i);
+    }
+    return true;
+}
+
+static void middle_of(const strl_facet *facet, double middle[3])
+{
+    for (unsigned k = 0; k < 3; k++)
+        middle[k] = (facet->corner[0][k] + facet->corner[1][k] + facet->corner[2][k]) / 3;
+}
+
+/* Every piece against the triangles near it, before the first collapse. */
+static bool measure_start(tracker *t, strl_arena *arena)
+{
+    uint32_t n = t->mesh->triangle_count;
+    strl_near tree;
+    strl_arena_mark mark = strl_arena_get_mark(arena);
+    uint32_t *order = strl_arena_alloc(arena, n, sizeof *order);
+    strl_near_node *nodes = strl_arena_alloc(arena, strl_near_nodes(n), sizeof *nodes);
+    bool good = order && nodes;
+    if (good)
+        strl_near_build(&tree, t->facet, n, order, nodes);
+    for (uint32_t i = 0; good && i < t->piece_count; i++) {
+        strl_facet piece;
+        double middle[3], distance;
+        piece_facet(&t->pieces[i], &piece);
+        middle_of(&piece, middle);
+        t->around[0] = strl_near_find(&tree, middle, &distance);
+        t->around_count = 1 + strl_near_list(&tree, &piece, 1.5 * distance, t->around + 1, WIDER_MAX - 1);
+        take_around(t);
+        double enough = fmax(t->most_down - piece.claim, 1.5 * distance);
+        good = keep_measure(t, i, measure_piece(t, &piece, INFINITY, enough) + piece.claim);
+    }
+    for (uint32_t i = 0; good && i < n; i++)
+        measure_up(t, i);
+    strl_arena_rewind(arena, mark);
+    return good;
+}
+
+/* ---- a collapse ---- */
+
+/* Carries out u -> v. What lay over the star of u is gathered; star: what of it is left. */
+static void carry_out(tracker *t, uint32_t u, uint32_t v)
+{
+    t->tick++;
+    t->found_count = t->star_count = 0;
+    for (uint32_t corner = t->head[u], next; corner != NO_INDEX; corner = next) {
+        uint32_t triangle = corner >> 2, *point = t->point[triangle];
+        next = t->next[triangle][corner & 3];
+        if (t->gone[triangle])
+            continue;
+        gather_pieces(t, triangle);
+        drop_links(t, triangle);
+        t->gone[triangle] = point[0] == v || point[1] == v || point[2] == v;
+        if (t->gone[triangle])
+            continue;
+        point[corner & 3] = v;
+        append_corner(t, v, corner);
+        triangle_facet(t, triangle);
+        t->star[t->star_count++] = triangle;
+    }
+    t->head[u] = NO_INDEX;
+}
+
+static bool measure_again(tracker *t, uint32_t v)
+{
+    bool good = true;
+    look_around(t, v, 1, AROUND_MAX);
+    bool is_wider = false;
+    for (uint32_t i = 0; i < t->found_count && good; i++) {
+        strl_facet piece;
+        uint32_t id = t->found[i];
+        piece_facet(&t->pieces[id], &piece);
+        if (is_wider)
+            look_around(t, v, 1, AROUND_MAX);
+        is_wider = false;
+        double enough = t->most_down - piece.claim, bound = measure_piece(t, &piece, enough, enough) + piece.claim;
+        if (bound > t->most_down) {
+            look_around(t, v, 3, WIDER_MAX);
+            is_wider = true;
+            bound = measure_piece(t, &piece, INFINITY, enough) + piece.claim;
+        }
+        good = keep_measure(t, id, bound);
+    }
+    for (uint32_t i = 0; i < t->star_count && good; i++)
+        measure_up(t, t->star[i]);
+    return good;
+}
+
+/* What doubles cannot tell apart. */
+static double rounding_of(const strl_mesh *mesh, const strl_piece *pieces, uint32_t count)
+{
+    double most = 1;
+    for (uint32_t p = 0; p < 3 * mesh->point_count; p++)
+        most = fmax(most, fabs((double)mesh->position[p / 3][p % 3]));
+    for (uint32_t i = 0; i < count; i++)
+        for (unsigned k = 0; k < 9; k++)
+            most = fmax(most, fabs((double)pieces[i].corner[k / 3][k % 3]));
+    return most * ROUNDING;
+}
+
+static float rounded_up(double value, double rounding)
+{
+    return nextafterf((float)(value + rounding), INFINITY);
+}
+
+static void conclude(const tracker *t, double rounding, strl_certificate *certificate)
+{
+    uint32_t to = 0;
+    for (uint32_t i = 0; i < t->mesh->triangle_count; i++) {
+        float most = t->up[i];
+        if (t->gone[i])
+            continue;
+        for (uint32_t at = t->first_link[i]; at != NO_INDEX; at = t->links[at].next)
+            most = fmaxf(most, t->down[t->links[at].piece]);
+        certificate->triangle[to++] = rounded_up(most, rounding);
+    }
+}
+
+static bool track(tracker *t, const strl_simplified *simplified, strl_arena *arena, double rounding, strl_certificate *certificate)
+{
+    if (!measure_start(t, arena))
+        return false;
+    for (uint32_t i = 0;; i++) {
+        certificate->down[i] = rounded_up(t->most_down, rounding);
+        certificate->up[i] = rounded_up(t->most_up, rounding);
+        if (i == simplified->collapse_count)
+            break;
+        carry_out(t, simplified->collapses[i].from, simplified->collapses[i].to);
+        if (!measure_again(t, simplified->collapses[i].to))
+            return false;
+    }
+    conclude(t, rounding, certificate);
+    return true;
+}
+
+strl_status strl_certify(const strl_mesh *mesh, const strl_simplified *simplified, const strl_piece *pieces, uint32_t piece_count,
+                         strl_arena *arena, strl_certificate *certificate, strl_error *err)
+{
+    size_t states = (size_t)simplified->collapse_count + 1;
+    certificate->down = strl_arena_alloc(arena, states, sizeof(float));
+    certificate->up = strl_arena_alloc(arena, states, sizeof(float));
+    certificate->triangle = strl_arena_alloc(arena, simplified->triangles_left, sizeof(float));
+    strl_arena_mark mark = strl_arena_get_mark(arena);
+    tracker *t = strl_arena_alloc_zero(arena, 1, sizeof *t);
+    bool good = certificate->down && certificate->up && certificate->triangle && t;
+    if (good) {
+        *t = (tracker){.mesh = mesh, .pieces = pieces, .piece_count = piece_count};
+        good = prepare(t, mesh, arena) &&
+               track(t, simplified, arena, rounding_of(mesh, pieces, piece_count), certificate);
+        strl__free(t->links);
+    }
+    strl_arena_rewind(arena, mark);
+    return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory to certify %u triangles", mesh->triangle_count);
+}
