@@ -9,9 +9,10 @@
 #define NO_INDEX UINT32_MAX
 #define AROUND_MAX 64u   /* triangles near a collapse that pieces are measured against at first */
 #define WIDER_MAX 256u   /* the same where that was not enough */
-#define GATHER_MAX 1024u /* pieces that one triangle is measured against */
+#define QUARTERINGS 2u
+#define LEAST_REACH 0.01
 /* Of the largest coordinate: what doubles cannot tell apart in the points of fragments and their distances. */
-#define ROUNDING 0x1p-46
+#define ROUNDING 0x1p-34
 
 /* That a piece was measured against a triangle. */
 typedef struct link {
@@ -20,8 +21,9 @@ typedef struct link {
 
 typedef struct tracker {
     const strl_mesh *mesh;
-    const strl_piece *pieces;
+    strl_facet *piece;        /* [piece_count] */
     uint32_t piece_count;
+    strl_near piece_tree;
     uint32_t (*point)[3];     /* per triangle */
     bool *gone;               /* per triangle */
     uint32_t *head, *tail;    /* per point: corners, 4 * triangle + 0, 1, 2 */
@@ -34,18 +36,20 @@ typedef struct tracker {
     uint32_t free_link;
     uint32_t *stamp, *piece_stamp, tick; /* per triangle, per piece */
     double most_up, most_down;
+    uint32_t found_near[STRL_COVER_MAX];
     uint32_t *found;          /* [piece_count] gathered pieces */
     uint32_t found_count;
     uint32_t *star;           /* [triangle_count] triangles that a collapse changed */
     uint32_t star_count;
     uint32_t around[WIDER_MAX], around_count;
     bool used[WIDER_MAX];
-    strl_facet by[GATHER_MAX];
+    strl_facet by[STRL_COVER_MAX];
+    strl_prism prisms[WIDER_MAX]; /* over those that are `around` */
 } tracker;
 
 /* ---- pieces and triangles ---- */
 
-static void piece_facet(const strl_piece *piece, strl_facet *facet)
+void strl_piece_facet(const strl_piece *piece, strl_facet *facet)
 {
     double corner[3][3];
     for (unsigned i = 0; i < 9; i++)
@@ -129,14 +133,16 @@ static void add_around_point(tracker *t, uint32_t point, uint32_t most)
         add_around(t, corner >> 2, most);
 }
 
-static void take_around(tracker *t)
+static void take_around(tracker *t, const double along[3])
 {
-    for (uint32_t i = 0; i < t->around_count; i++)
+    for (uint32_t i = 0; i < t->around_count; i++) {
         t->by[i] = t->facet[t->around[i]];
+        strl_prism_set(&t->prisms[i], &t->by[i], along);
+    }
 }
 
 /* The changed triangles, those at `point`, and those that share points with them, `rings` times over. */
-static void look_around(tracker *t, uint32_t point, unsigned rings, uint32_t most)
+static void look_around(tracker *t, uint32_t point, const double along[3], unsigned rings, uint32_t most)
 {
     t->tick++;
     t->around_count = 0;
@@ -147,7 +153,7 @@ static void look_around(tracker *t, uint32_t point, unsigned rings, uint32_t mos
         for (uint32_t i = 0, count = t->around_count; i < count; i++)
             for (unsigned c = 0; c < 3; c++)
                 add_around_point(t, t->point[t->around[i]][c], most);
-    take_around(t);
+    take_around(t, along);
 }
 
 /* ---- measuring ---- */
@@ -159,11 +165,23 @@ static void note_used(void *context, uint32_t by, const strl_fragment *fragment)
     t->used[by] = true;
 }
 
+/* The mean normal of the triangles that a collapse changed. */
+static void normal_of_star(const tracker *t, double normal[3])
+{
+    normal[0] = normal[1] = normal[2] = 0;
+    for (uint32_t i = 0; i < t->star_count; i++) {
+        double one[3];
+        strl_facet_normal(&t->facet[t->star[i]], one);
+        for (unsigned k = 0; k < 3; k++)
+            normal[k] += one[k];
+    }
+}
+
 /* A piece against the triangles of `around`, which `by` holds. */
-static double measure_piece(tracker *t, const strl_facet *piece, double near, double enough)
+static double measure_piece(tracker *t, const strl_facet *piece, double enough)
 {
     memset(t->used, 0, t->around_count);
-    return strl_cover_bound(piece, &(strl_cover){.by = t->by, .count = t->around_count, .near = near, .enough = enough,
+    return strl_cover_bound(piece, &(strl_cover){.by = t->by, .prisms = t->prisms, .count = t->around_count, .enough = enough,
                                                  .take = note_used, .context = t});
 }
 
@@ -178,44 +196,74 @@ static bool keep_measure(tracker *t, uint32_t piece, double bound)
     return good;
 }
 
-/* A triangle against the pieces linked to it; against all that were gathered where these leave something open. */
-static void measure_triangle(tracker *t, uint32_t triangle, bool all)
+static double measure_facet(tracker *t, const strl_facet *facet, const uint32_t *piece, uint32_t count, double enough)
 {
-    uint32_t count = 0;
-    double enough = fmax(t->most_up, t->most_down);
-    if (all)
-        for (uint32_t i = 0; i < t->found_count && count < GATHER_MAX; i++)
-            piece_facet(&t->pieces[t->found[i]], &t->by[count++]);
-    else
-        for (uint32_t at = t->first_link[triangle]; at != NO_INDEX && count < GATHER_MAX; at = t->links[at].next)
-            piece_facet(&t->pieces[t->links[at].piece], &t->by[count++]);
-    double bound = strl_cover_bound(&t->facet[triangle], &(strl_cover){.by = t->by, .count = count, .near = enough, .enough = enough});
-    t->up[triangle] = all ? fminf(t->up[triangle], (float)bound) : (float)bound;
+    for (uint32_t i = 0; i < count; i++)
+        t->by[i] = t->piece[piece[i]];
+    return strl_cover_bound(facet, &(strl_cover){.by = t->by, .count = count, .enough = enough});
 }
 
-/* Pieces of all triangles that share a point with this one. */
-static void gather_around(tracker *t, uint32_t triangle)
+/* Against pieces that are near enough, at first the nearest of them; where these are too many, in quarters. */
+static double measure_near(tracker *t, const strl_facet *facet, double enough, unsigned quarterings)
 {
-    t->tick++;
-    t->around_count = 0;
+    uint32_t count = STRL_COVER_MAX;
+    for (double reach = enough; count == STRL_COVER_MAX && reach > enough * LEAST_REACH; reach /= 3)
+        count = strl_near_list(&t->piece_tree, facet, reach, t->found_near, STRL_COVER_MAX);
+    double bound = measure_facet(t, facet, t->found_near, count, enough);
+    if (bound <= enough || quarterings == 0)
+        return bound;
+    double middle[3][3], most = 0;
     for (unsigned c = 0; c < 3; c++)
-        add_around_point(t, t->point[triangle][c], AROUND_MAX);
-    t->found_count = 0;
-    for (uint32_t i = 0; i < t->around_count; i++)
-        gather_pieces(t, t->around[i]);
+        for (unsigned k = 0; k < 3; k++)
+            middle[c][k] = (facet->corner[c][k] + facet->corner[(c + 1) % 3][k]) / 2;
+    for (unsigned c = 0; c < 4; c++) {
+        strl_facet quarter = {.claim = 0};
+        if (c < 3)
+            strl_facet_set(&quarter, facet->corner[c], middle[c], middle[(c + 2) % 3]);
+        else
+            strl_facet_set(&quarter, middle[0], middle[1], middle[2]);
+        most = fmax(most, measure_near(t, &quarter, fmax(enough, most), quarterings - 1));
+    }
+    return fmin(bound, most);
 }
 
+/* A triangle against the pieces linked to it, and against all near it where these leave something open. */
 static void measure_up(tracker *t, uint32_t triangle)
 {
-    measure_triangle(t, triangle, false);
-    if (t->up[triangle] > fmax(t->most_up, t->most_down)) {
-        gather_around(t, triangle);
-        measure_triangle(t, triangle, true);
-    }
-    t->most_up = fmax(t->most_up, t->up[triangle]);
+    uint32_t count = 0;
+    double most = fmax(t->most_up, t->most_down);
+    for (uint32_t at = t->first_link[triangle]; at != NO_INDEX && count < STRL_COVER_MAX; at = t->links[at].next)
+        t->found_near[count++] = t->links[at].piece;
+    double bound = measure_facet(t, &t->facet[triangle], t->found_near, count, most);
+    if (bound > most)
+        bound = fmin(bound, measure_near(t, &t->facet[triangle], most, QUARTERINGS));
+    t->up[triangle] = (float)bound;
+    t->most_up = fmax(t->most_up, bound);
 }
 
 /* ---- the start ---- */
+
+static bool plant(strl_near *tree, const strl_facet *facet, uint32_t count, strl_arena *arena)
+{
+    uint32_t *order = strl_arena_alloc(arena, count, sizeof *order);
+    strl_near_node *nodes = strl_arena_alloc(arena, strl_near_nodes(count), sizeof *nodes);
+    if (order && nodes)
+        strl_near_build(tree, facet, count, order, nodes);
+    return order && nodes;
+}
+
+static bool prepare_pieces(tracker *t, const strl_piece *pieces, strl_arena *arena)
+{
+    t->piece = strl_arena_alloc(arena, t->piece_count, sizeof *t->piece);
+    t->down = strl_arena_alloc(arena, t->piece_count, sizeof *t->down);
+    t->piece_stamp = strl_arena_alloc_zero(arena, t->piece_count, sizeof *t->piece_stamp);
+    t->found = strl_arena_alloc(arena, t->piece_count, sizeof *t->found);
+    if (!t->piece || !t->down || !t->piece_stamp || !t->found)
+        return false;
+    for (uint32_t i = 0; i < t->piece_count; i++)
+        strl_piece_facet(&pieces[i], &t->piece[i]);
+    return plant(&t->piece_tree, t->piece, t->piece_count, arena);
+}
 
 static bool prepare(tracker *t, const strl_mesh *mesh, strl_arena *arena)
 {
@@ -230,11 +278,8 @@ static bool prepare(tracker *t, const strl_mesh *mesh, strl_arena *arena)
     t->star = strl_arena_alloc(arena, n, sizeof *t->star);
     t->head = strl_arena_alloc(arena, mesh->point_count, sizeof *t->head);
     t->tail = strl_arena_alloc(arena, mesh->point_count, sizeof *t->tail);
-    t->down = strl_arena_alloc(arena, t->piece_count, sizeof *t->down);
-    t->piece_stamp = strl_arena_alloc_zero(arena, t->piece_count, sizeof *t->piece_stamp);
-    t->found = strl_arena_alloc(arena, t->piece_count, sizeof *t->found);
     if (!t->point || !t->next || !t->gone || !t->facet || !t->up || !t->first_link || !t->stamp || !t->star || !t->head ||
-        !t->tail || !t->down || !t->piece_stamp || !t->found)
+        !t->tail)
         return false;
     memset(t->head, 0xff, mesh->point_count * sizeof *t->head);
     memset(t->first_link, 0xff, n * sizeof *t->first_link);
@@ -261,21 +306,16 @@ static bool measure_start(tracker *t, strl_arena *arena)
     uint32_t n = t->mesh->triangle_count;
     strl_near tree;
     strl_arena_mark mark = strl_arena_get_mark(arena);
-    uint32_t *order = strl_arena_alloc(arena, n, sizeof *order);
-    strl_near_node *nodes = strl_arena_alloc(arena, strl_near_nodes(n), sizeof *nodes);
-    bool good = order && nodes;
-    if (good)
-        strl_near_build(&tree, t->facet, n, order, nodes);
+    bool good = plant(&tree, t->facet, n, arena);
     for (uint32_t i = 0; good && i < t->piece_count; i++) {
-        strl_facet piece;
-        double middle[3], distance;
-        piece_facet(&t->pieces[i], &piece);
-        middle_of(&piece, middle);
+        const strl_facet *piece = &t->piece[i];
+        double middle[3], distance, along[3];
+        middle_of(piece, middle);
         t->around[0] = strl_near_find(&tree, middle, &distance);
-        t->around_count = 1 + strl_near_list(&tree, &piece, 1.5 * distance, t->around + 1, WIDER_MAX - 1);
-        take_around(t);
-        double enough = fmax(t->most_down - piece.claim, 1.5 * distance);
-        good = keep_measure(t, i, measure_piece(t, &piece, INFINITY, enough) + piece.claim);
+        t->around_count = 1 + strl_near_list(&tree, piece, 1.5 * distance, t->around + 1, WIDER_MAX - 1);
+        strl_facet_normal(&t->facet[t->around[0]], along);
+        take_around(t, along);
+        good = keep_measure(t, i, measure_piece(t, piece, fmax(t->most_down - piece->claim, 1.5 * distance)) + piece->claim);
     }
     for (uint32_t i = 0; good && i < n; i++)
         measure_up(t, i);
@@ -308,25 +348,38 @@ static void carry_out(tracker *t, uint32_t u, uint32_t v)
     t->head[u] = NO_INDEX;
 }
 
+/* What a piece is measured against is looked for farther away, and along its own normal, where what is next to the collapse is too far. */
+static double measure_wider(tracker *t, uint32_t v, const strl_facet *piece, double enough)
+{
+    double along[3];
+    strl_facet_normal(piece, along);
+    look_around(t, v, along, 3, WIDER_MAX);
+    return measure_piece(t, piece, enough);
+}
+
 static bool measure_again(tracker *t, uint32_t v)
 {
     bool good = true;
-    look_around(t, v, 1, AROUND_MAX);
-    bool is_wider = false;
+    double along[3];
+    normal_of_star(t, along);
+    look_around(t, v, along, 1, AROUND_MAX);
     for (uint32_t i = 0; i < t->found_count && good; i++) {
-        strl_facet piece;
         uint32_t id = t->found[i];
-        piece_facet(&t->pieces[id], &piece);
-        if (is_wider)
-            look_around(t, v, 1, AROUND_MAX);
-        is_wider = false;
-        double enough = t->most_down - piece.claim, bound = measure_piece(t, &piece, enough, enough) + piece.claim;
-        if (bound > t->most_down) {
-            look_around(t, v, 3, WIDER_MAX);
-            is_wider = true;
-            bound = measure_piece(t, &piece, INFINITY, enough) + piece.claim;
+        const strl_facet *piece = &t->piece[id];
+        double enough = t->most_down - piece->claim, bound = measure_piece(t, piece, enough);
+        if (bound <= enough) {
+            good = keep_measure(t, id, bound + piece->claim);
+            continue;
         }
-        good = keep_measure(t, id, bound);
+        double wider = measure_wider(t, v, piece, enough);
+        bool is_better = wider < bound;
+        if (is_better)
+            good = keep_measure(t, id, wider + piece->claim);
+        look_around(t, v, along, 1, AROUND_MAX);
+        if (!is_better) {
+            bound = measure_piece(t, piece, enough);
+            good = keep_measure(t, id, bound + piece->claim);
+        }
     }
     for (uint32_t i = 0; i < t->star_count && good; i++)
         measure_up(t, t->star[i]);
@@ -391,8 +444,8 @@ strl_status strl_certify(const strl_mesh *mesh, const strl_simplified *simplifie
     tracker *t = strl_arena_alloc_zero(arena, 1, sizeof *t);
     bool good = certificate->down && certificate->up && certificate->triangle && t;
     if (good) {
-        *t = (tracker){.mesh = mesh, .pieces = pieces, .piece_count = piece_count};
-        good = prepare(t, mesh, arena) &&
+        *t = (tracker){.mesh = mesh, .piece_count = piece_count};
+        good = prepare(t, mesh, arena) && prepare_pieces(t, pieces, arena) &&
                track(t, simplified, arena, rounding_of(mesh, pieces, piece_count), certificate);
         strl__free(t->links);
     }

@@ -8,6 +8,7 @@
 #ifndef STRL_GEOMETRY_CERTIFY_H
 #define STRL_GEOMETRY_CERTIFY_H
 
+#include "geometry/cover.h"
 #include "geometry/simplify.h"
 
 /* A triangle of an older surface, which may be a line or a point. */
@@ -21,6 +22,8 @@ typedef struct strl_certificate {
     float *up;       /* [collapse_count + 1] how far the mesh is from what the pieces stand for */
     float *triangle; /* [triangles_left] at the end, in their old order: both, of this piece of surface */
 } strl_certificate;
+
+void strl_piece_facet(const strl_piece *piece, strl_facet *facet);
 
 /* Neither down nor up ever decreases; INFINITY = nothing is known. Arrays live in the arena. */
 strl_status strl_certify(const strl_mesh *mesh, const strl_simplified *simplified, const strl_piece *pieces, uint32_t piece_count,

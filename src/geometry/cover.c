@@ -4,11 +4,21 @@
 #include <string.h>
 
 /* Fragments that wait for the facets still to come; what does not fit is not cut any further. */
-#define WAITING_MAX 40u
-/* A fragment that no prism holds is halved so often at most. */
-#define HALVINGS 6u
+#define WAITING_MAX 32u
+/* A triangle near more facets than this is halved first, so often at most, and while that leaves at most such a share of them. */
+#define PROGRESS 0.75
+#define CROWD 16u
+#define HALVINGS 9u
+/* Facets that are looked at before anything is cut. */
+#define LIKELY 6u
+/* So many fragments are cut again for being too far from what is nearest to their middles. */
+#define CUTS_MAX 200u
+/* No bound is improved below what it must be by so much. */
+#define GAP 0.05
 /* Corners of what may still be cut: should rounding make it not quite convex, each second edge crosses the cut. */
 #define CUT_MAX (STRL_FRAGMENT_MAX * 2 / 3)
+/* Squared sine: thinner triangles count as their edges, because doubles cannot tell where their insides are. */
+#define FLAT 0x1p-32
 /* Of the triangle's size: what sticks out of a prism by no more is not cut off. */
 #define SLIVER 1e-9
 
@@ -40,6 +50,14 @@ void strl_facet_set(strl_facet *facet, const double a[3], const double b[3], con
     }
 }
 
+void strl_facet_normal(const strl_facet *facet, double normal[3])
+{
+    double ab[3], ac[3];
+    subtract(facet->corner[1], facet->corner[0], ab);
+    subtract(facet->corner[2], facet->corner[0], ac);
+    cross(ab, ac, normal);
+}
+
 static double segment_distance2(const double p[3], const double a[3], const double b[3])
 {
     double ab[3], ap[3], rest[3];
@@ -66,11 +84,11 @@ double strl_facet_distance2(const strl_facet *facet, const double p[3])
     abp = dot(side, n);
     cross(ap, ac, side);
     acp = dot(side, n);
-    if (size2 > 0 && abp >= 0 && acp >= 0 && abp + acp <= size2) {
+    bool flat = size2 <= FLAT * dot(ab, ab) * dot(ac, ac);
+    if (!flat && abp >= 0 && acp >= 0 && abp + acp <= size2) {
         double height = dot(ap, n);
         return height * height / size2;
     }
-    bool flat = !(size2 > 0);
     if (flat || abp <= 0)
         best = segment_distance2(p, facet->corner[0], facet->corner[1]);
     if (flat || acp <= 0)
@@ -82,20 +100,14 @@ double strl_facet_distance2(const strl_facet *facet, const double p[3])
 
 typedef struct work {
     const strl_cover *cover;
-    const strl_facet *triangle;
-    double normal[3]; /* unit */
-    double sliver;    /* length */
+    double along[3];
     double bound;
+    double limit; /* a bound so large is good enough */
+    unsigned cuts; /* that settle may still make */
     strl_fragment waiting[WAITING_MAX];
     uint32_t waiting_count;
+    uint32_t order[STRL_COVER_MAX]; /* of the facets: those that matter now come first */
 } work;
-
-/* The side planes of the prism over a facet: inside is where inward . (x - corner) is not below `least`. */
-typedef struct prism {
-    const strl_facet *facet;
-    double inward[3][3];
-    double least[3]; /* what counts as inside: minus the sliver, in the measure of each plane */
-} prism;
 
 static double fragment_distance(const strl_fragment *fragment, const strl_facet *facet)
 {
@@ -133,43 +145,50 @@ static void cut(const strl_fragment *fragment, const double *side, strl_fragment
     }
 }
 
-static bool make_prism(const work *w, const strl_facet *facet, prism *p)
+void strl_prism_set(strl_prism *prism, const strl_facet *facet, const double along[3])
 {
-    double ab[3], ac[3], n[3];
-    subtract(facet->corner[1], facet->corner[0], ab);
-    subtract(facet->corner[2], facet->corner[0], ac);
-    cross(ab, ac, n);
-    double facing = dot(n, w->normal), sign = facing < 0 ? -1 : 1;
-    p->facet = facet;
-    if (fabs(facing) <= w->sliver * w->sliver)
-        return false;
+    double normal[3], size = 0;
+    strl_facet_normal(facet, normal);
+    double facing = dot(normal, along), sign = facing < 0 ? -1 : 1;
+    prism->is_flat = facing * facing <= FLAT * dot(normal, normal) * dot(along, along);
+    for (unsigned k = 0; k < 3; k++)
+        size = fmax(size, facet->most[k] - facet->least[k]);
     for (unsigned e = 0; e < 3; e++) {
         double edge[3];
         subtract(facet->corner[e == 2 ? 0 : e + 1], facet->corner[e], edge);
-        cross(w->normal, edge, p->inward[e]);
+        cross(along, edge, prism->inward[e]);
         for (unsigned k = 0; k < 3; k++)
-            p->inward[e][k] *= sign;
-        p->least[e] = -w->sliver * sqrt(dot(p->inward[e], p->inward[e]));
+            prism->inward[e][k] *= sign;
+        prism->offset[e] = dot(prism->inward[e], facet->corner[e]);
+        prism->slack[e] = SLIVER * size * sqrt(dot(prism->inward[e], prism->inward[e]));
     }
-    return true;
 }
 
-/* How many of the corners are inside of an edge, and how many are outside by more than a sliver. */
-static void classify(const prism *p, unsigned e, const strl_fragment *fragment, double *side, bool *none_in, bool *none_out)
+/* The prism over a facet; NULL where it has no inside. */
+static const strl_prism *prism_of(const work *w, uint32_t facet, strl_prism *own)
 {
-    *none_in = *none_out = true;
+    const strl_prism *prism = w->cover->prisms ? &w->cover->prisms[facet] : own;
+    if (!w->cover->prisms)
+        strl_prism_set(own, &w->cover->by[facet], w->along);
+    return prism->is_flat ? NULL : prism;
+}
+
+/* Where the corners are to one side of a prism, and whether none is inside, or none outside, by more than the slack. */
+static void classify(const strl_prism *p, unsigned e, const strl_fragment *fragment, double *side, bool *none_in, bool *none_out)
+{
+    double least = INFINITY, most = -INFINITY;
     for (uint32_t i = 0; i < fragment->count; i++) {
-        double from[3];
-        subtract(fragment->corner[i], p->facet->corner[e], from);
-        side[i] = dot(p->inward[e], from);
-        *none_in &= side[i] <= -p->least[e];
-        *none_out &= side[i] >= p->least[e];
+        side[i] = dot(p->inward[e], fragment->corner[i]) - p->offset[e];
+        least = side[i] < least ? side[i] : least;
+        most = side[i] > most ? side[i] : most;
     }
+    *none_in = most <= p->slack[e];
+    *none_out = least >= -p->slack[e];
 }
 
 /* The part within the prism, into *inside; what is cut off goes to the end of the waiting ones. False where nothing is within, or
  * no room is left: then nothing was cut. */
-static bool cut_by_prism(work *w, const prism *p, const strl_fragment *fragment, strl_fragment *inside)
+static bool cut_by_prism(work *w, const strl_prism *p, const strl_fragment *fragment, strl_fragment *inside)
 {
     double side[STRL_FRAGMENT_MAX];
     bool none_in, crosses[3];
@@ -198,42 +217,39 @@ static bool cut_by_prism(work *w, const prism *p, const strl_fragment *fragment,
     return true;
 }
 
-static bool is_near(const work *w, const strl_facet *facet)
-{
-    double near = w->cover->near;
-    for (unsigned k = 0; k < 3; k++)
-        if (facet->least[k] > w->triangle->most[k] + near || facet->most[k] < w->triangle->least[k] - near)
-            return false;
-    return true;
-}
-
 static void cut_along(work *w, uint32_t to)
 {
-    prism p;
+    strl_prism own;
     const strl_facet *facet = &w->cover->by[to];
-    if (!is_near(w, facet) || !make_prism(w, facet, &p))
+    const strl_prism *prism = prism_of(w, to, &own);
+    if (!prism)
         return;
     for (uint32_t i = w->waiting_count; i-- > 0;) {
         strl_fragment inside;
-        if (!cut_by_prism(w, &p, &w->waiting[i], &inside))
+        uint32_t waiting = w->waiting_count;
+        if (!cut_by_prism(w, prism, &w->waiting[i], &inside))
             continue;
+        double bound = fragment_distance(&inside, facet);
+        if (bound > w->limit) { /* another sheet, or a fold: something nearer may hold it */
+            w->waiting_count = waiting;
+            continue;
+        }
         w->waiting[i] = w->waiting[--w->waiting_count];
-        give(w, to, &inside, fragment_distance(&inside, facet));
+        give(w, to, &inside, bound);
     }
 }
 
-static uint32_t nearest_of(const work *w, const strl_fragment *fragment)
+/* The facet nearest to a point, of the first `count`. */
+static uint32_t nearest_of(const work *w, const double p[3], uint32_t count, double *nearest)
 {
-    double middle[3] = {0}, least = INFINITY;
-    uint32_t best = 0;
-    for (uint32_t i = 0; i < fragment->count; i++)
-        for (unsigned k = 0; k < 3; k++)
-            middle[k] += fragment->corner[i][k] / fragment->count;
-    for (uint32_t i = 0; i < w->cover->count; i++) {
-        double distance = sqrt(strl_facet_distance2(&w->cover->by[i], middle)) + w->cover->by[i].claim;
-        if (distance < least) {
-            least = distance;
-            best = i;
+    uint32_t best = w->order[0];
+    *nearest = INFINITY;
+    for (uint32_t i = 0; i < count; i++) {
+        const strl_facet *facet = &w->cover->by[w->order[i]];
+        double distance = sqrt(strl_facet_distance2(facet, p)) + facet->claim;
+        if (distance < *nearest) {
+            *nearest = distance;
+            best = w->order[i];
         }
     }
     return best;
@@ -262,44 +278,123 @@ static bool halve(const strl_fragment *fragment, double *side)
     return true;
 }
 
-static void give_to_nearest(work *w, const strl_fragment *fragment, unsigned halvings)
+/* One fragment by what is nearest to its middle: given away where that is near enough, else cut along that prism, else halved. The
+ * middle's own distance cannot be bettered, so nothing much less is aimed at. */
+static void settle(work *w, uint32_t near)
 {
-    uint32_t to = nearest_of(w, fragment);
-    double bound = fragment_distance(fragment, &w->cover->by[to]), side[STRL_FRAGMENT_MAX];
-    if (bound <= w->cover->enough || bound <= w->bound || halvings == 0 || !halve(fragment, side)) {
-        give(w, to, fragment, bound);
+    strl_fragment fragment = w->waiting[--w->waiting_count], inside;
+    double nearest, side[STRL_FRAGMENT_MAX], middle[3] = {0};
+    for (uint32_t i = 0; i < fragment.count; i++)
+        for (unsigned k = 0; k < 3; k++)
+            middle[k] += fragment.corner[i][k] / fragment.count;
+    uint32_t to = nearest_of(w, middle, near, &nearest);
+    if (nearest > w->limit && near < w->cover->count)
+        to = nearest_of(w, middle, w->cover->count, &nearest);
+    const strl_facet *facet = &w->cover->by[to];
+    double bound = fragment_distance(&fragment, facet);
+    strl_prism own;
+    w->limit = fmax(w->limit, nearest * (1 + GAP));
+    if (bound <= w->limit || w->cuts == 0 || w->waiting_count + 5 > WAITING_MAX) {
+        give(w, to, &fragment, bound);
         return;
     }
-    strl_fragment halves[2];
-    cut(fragment, side, &halves[0], &halves[1]);
-    give_to_nearest(w, &halves[0], halvings - 1);
-    give_to_nearest(w, &halves[1], halvings - 1);
+    w->cuts--;
+    uint32_t waiting = w->waiting_count;
+    const strl_prism *prism = prism_of(w, to, &own);
+    if (prism && cut_by_prism(w, prism, &fragment, &inside) && w->waiting_count > waiting) {
+        w->waiting[w->waiting_count++] = inside;
+        return;
+    }
+    if (!halve(&fragment, side)) {
+        give(w, to, &fragment, bound);
+        return;
+    }
+    cut(&fragment, side, &w->waiting[waiting], &w->waiting[waiting + 1]);
+    w->waiting_count = waiting + 2;
+}
+
+/* Moves the facets whose boxes are within the limit of the fragment's to the front of the first `count`; how many they are. */
+static uint32_t find_near(work *w, const strl_fragment *fragment, uint32_t count)
+{
+    double least[3] = {INFINITY, INFINITY, INFINITY}, most[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (uint32_t i = 0; i < fragment->count; i++)
+        for (unsigned k = 0; k < 3; k++) {
+            least[k] = fragment->corner[i][k] < least[k] ? fragment->corner[i][k] : least[k];
+            most[k] = fragment->corner[i][k] > most[k] ? fragment->corner[i][k] : most[k];
+        }
+    uint32_t near = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t at = w->order[i];
+        const strl_facet *f = &w->cover->by[at];
+        double reach = w->limit - f->claim;
+        bool meets = true;
+        for (unsigned k = 0; k < 3; k++)
+            meets &= f->least[k] <= most[k] + reach && f->most[k] >= least[k] - reach;
+        if (!meets)
+            continue;
+        w->order[i] = w->order[near];
+        w->order[near++] = at;
+    }
+    return near;
+}
+
+static void place(work *w, const strl_fragment *fragment, uint32_t count, unsigned halvings)
+{
+    double side[STRL_FRAGMENT_MAX];
+    uint32_t near = find_near(w, fragment, count);
+    bool helps = halvings == HALVINGS || near <= count * PROGRESS;
+    if (near > CROWD && halvings > 0 && helps && halve(fragment, side)) {
+        strl_fragment halves[2];
+        cut(fragment, side, &halves[0], &halves[1]);
+        place(w, &halves[0], near, halvings - 1);
+        place(w, &halves[1], near, halvings - 1);
+        return;
+    }
+    w->waiting[0] = *fragment;
+    w->waiting_count = 1;
+    for (uint32_t i = 0; i < near && w->waiting_count; i++)
+        cut_along(w, w->order[i]);
+    while (w->waiting_count)
+        settle(w, near);
+}
+
+/* The first few facets are likely: one that is near enough to all corners is near enough to everything between them. */
+static bool is_settled_at_once(work *w, const strl_fragment *whole)
+{
+    const strl_cover *cover = w->cover;
+    for (uint32_t i = 0; i < cover->count && i < LIKELY; i++) {
+        const strl_facet *facet = &cover->by[i];
+        double reach = cover->enough - facet->claim, most = 0;
+        for (unsigned c = 0; c < 3 && most <= reach * reach && reach >= 0; c++)
+            most = fmax(most, strl_facet_distance2(facet, whole->corner[c]));
+        if (reach >= 0 && most <= reach * reach) {
+            give(w, i, whole, sqrt(most) + facet->claim);
+            return true;
+        }
+    }
+    return false;
 }
 
 double strl_cover_bound(const strl_facet *triangle, const strl_cover *cover)
 {
     work w;
-    double ab[3], ac[3], size = 0;
+    strl_fragment whole;
+    whole.count = 3;
     if (cover->count == 0)
         return INFINITY;
+    memcpy(whole.corner, triangle->corner, sizeof triangle->corner);
     w.cover = cover;
-    w.triangle = triangle;
     w.bound = 0;
-    w.waiting_count = 1;
-    w.waiting[0].count = 3;
-    memcpy(w.waiting[0].corner, triangle->corner, sizeof triangle->corner);
-    for (unsigned k = 0; k < 3; k++)
-        size = fmax(size, triangle->most[k] - triangle->least[k]);
-    w.sliver = SLIVER * size;
-    subtract(triangle->corner[1], triangle->corner[0], ab);
-    subtract(triangle->corner[2], triangle->corner[0], ac);
-    cross(ab, ac, w.normal);
-    double length = sqrt(dot(w.normal, w.normal));
-    for (unsigned k = 0; k < 3; k++)
-        w.normal[k] /= length;
-    for (uint32_t i = 0; i < cover->count && w.waiting_count && length > 0; i++)
-        cut_along(&w, i);
-    for (uint32_t i = 0; i < w.waiting_count; i++)
-        give_to_nearest(&w, &w.waiting[i], HALVINGS);
+    w.limit = cover->enough;
+    w.cuts = CUTS_MAX;
+    if (is_settled_at_once(&w, &whole))
+        return w.bound;
+    for (uint32_t i = 0; i < cover->count; i++)
+        w.order[i] = i;
+    if (cover->along)
+        memcpy(w.along, cover->along, sizeof w.along);
+    else
+        strl_facet_normal(triangle, w.along);
+    place(&w, &whole, cover->count, HALVINGS);
     return w.bound;
 }

@@ -6,10 +6,12 @@
 #include "base/fail.h"
 #include "geometry/near.h"
 
-#define FEW_NODES 16u     /* levels of so few keep their anchors: they cost nothing there, and the older the tighter */
+#define FEW_NODES 8u      /* levels of so few keep their anchors: they cost nothing there, and the older the tighter */
 #define LATEST_FIRST 2u   /* below, what is claimed without certificates is tight, and most of the triangles are there */
 #define CANDIDATES 256u
 #define PARTS_MAX 64u
+/* Of the distance of a piece's middle: what lies so near is looked at. */
+#define NEAR_ENOUGH 1.5
 /* A corner that was cut is rounded to the lattice. */
 #define CUT_ERROR 0.8661f
 
@@ -114,6 +116,7 @@ typedef struct divider {
     strl_facet *facet; /* [triangles] */
     strl_facet by[CANDIDATES];
     uint32_t candidate[CANDIDATES], candidate_count;
+    double tolerance;
     double distance; /* of the middle of the piece from the first candidate */
     part parts[PARTS_MAX];
     uint32_t part_count;
@@ -152,7 +155,7 @@ static void list_candidates(divider *d, const strl_facet *piece)
     for (unsigned k = 0; k < 3; k++)
         middle[k] = (piece->corner[0][k] + piece->corner[1][k] + piece->corner[2][k]) / 3;
     d->candidate[0] = strl_near_find(&d->tree, middle, &d->distance);
-    d->candidate_count = 1 + strl_near_list(&d->tree, piece, d->distance, d->candidate + 1, CANDIDATES - 1);
+    d->candidate_count = 1 + strl_near_list(&d->tree, piece, NEAR_ENOUGH * d->distance, d->candidate + 1, CANDIDATES - 1);
 }
 
 static bool lies_over_one(const divider *d)
@@ -171,26 +174,37 @@ static bool parts_are_of_one(const divider *d)
     return true;
 }
 
+/* A piece need not be cut where one member's triangles are near enough to all of it. */
+static bool is_near_to(divider *d, const strl_facet *piece, const double along[3], double enough, uint32_t member)
+{
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < d->candidate_count; i++)
+        if (d->owner[d->candidate[i]] == member)
+            d->by[count++] = d->facet[d->candidate[i]];
+    return strl_cover_bound(piece, &(strl_cover){.by = d->by, .count = count, .along = along, .enough = enough}) <= enough;
+}
+
 static bool divide_piece(divider *d, const strl_piece *piece, strl_pieces *const *shares)
 {
     strl_facet facet;
-    double corner[3][3];
-    for (unsigned i = 0; i < 9; i++)
-        corner[i / 3][i % 3] = piece->corner[i / 3][i % 3];
-    strl_facet_set(&facet, corner[0], corner[1], corner[2]);
+    double along[3];
+    strl_piece_facet(piece, &facet);
     list_candidates(d, &facet);
+    uint32_t first = d->owner[d->candidate[0]];
     if (lies_over_one(d))
-        return add_piece(shares[d->owner[d->candidate[0]]], piece);
-    for (uint32_t i = 0; i < d->candidate_count; i++) {
+        return add_piece(shares[first], piece);
+    double enough = fmax(NEAR_ENOUGH * d->distance, d->tolerance);
+    strl_facet_normal(&d->facet[d->candidate[0]], along);
+    if (is_near_to(d, &facet, along, enough, first))
+        return add_piece(shares[first], piece);
+    for (uint32_t i = 0; i < d->candidate_count; i++)
         d->by[i] = d->facet[d->candidate[i]];
-        d->by[i].claim = 0;
-    }
     d->part_count = 0;
     d->is_full = false;
-    strl_cover_bound(&facet, &(strl_cover){.by = d->by, .count = d->candidate_count, .near = INFINITY,
-                                           .enough = 2 * d->distance, .take = take_part, .context = d});
+    strl_cover_bound(&facet, &(strl_cover){.by = d->by, .count = d->candidate_count, .along = along, .enough = enough,
+                                           .take = take_part, .context = d});
     if (d->is_full || parts_are_of_one(d))
-        return add_piece(shares[d->is_full ? d->owner[d->candidate[0]] : d->parts[0].member], piece);
+        return add_piece(shares[d->is_full ? first : d->parts[0].member], piece);
     bool good = true;
     for (uint32_t i = 0; i < d->part_count && good; i++)
         good = add_part(&d->parts[i], piece->claim, shares[d->parts[i].member]);
@@ -209,6 +223,7 @@ static bool prepare_divider(divider *d, const strl_mesh *mesh, strl_arena *arena
         for (unsigned i = 0; i < 9; i++)
             corner[i / 3][i % 3] = mesh->position[mesh->wedge[mesh->triangle[t][i / 3]].point][i % 3];
         strl_facet_set(&d->facet[t], corner[0], corner[1], corner[2]);
+        d->facet[t].claim = 0;
     }
     strl_near_build(&d->tree, d->facet, mesh->triangle_count, order, nodes);
     return true;
@@ -229,14 +244,14 @@ static bool divide_all(divider *d, uint32_t members, const strl_anchors *all, st
     return good;
 }
 
-strl_status strl_anchors_divide(const strl_mesh *mesh, const uint32_t *owner, uint32_t members, const strl_anchors *all,
+strl_status strl_anchors_divide(const strl_mesh *mesh, const uint32_t *owner, uint32_t members, double tolerance, const strl_anchors *all,
                                 strl_arena *arena, strl_anchors *shares, strl_error *err)
 {
     strl_arena_mark mark = strl_arena_get_mark(arena);
     divider *d = strl_arena_alloc(arena, 1, sizeof *d);
     bool good = d != NULL;
     if (good)
-        d->owner = owner;
+        d->owner = owner, d->tolerance = tolerance;
     good = good && prepare_divider(d, mesh, arena) && divide_all(d, members, all, shares);
     strl_arena_rewind(arena, mark);
     return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for the anchors of a group");
