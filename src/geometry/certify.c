@@ -9,8 +9,10 @@
 #define NO_INDEX UINT32_MAX
 #define AROUND_MAX 64u   /* triangles near a collapse that pieces are measured against at first */
 #define WIDER_MAX 256u   /* the same where that was not enough */
+#define FIRST_REACH 1.5   /* of the distance of a piece's middle: what lies so near is looked at */
 #define QUARTERINGS 2u
-#define LEAST_REACH 0.01
+#define LEAST_REACH 0.03125 /* of the bound that is good enough */
+#define REACH_GROWTH 5.6
 /* Of the largest coordinate: what doubles cannot tell apart in the points of fragments and their distances. */
 #define ROUNDING 0x1p-34
 
@@ -36,14 +38,14 @@ typedef struct tracker {
     uint32_t free_link;
     uint32_t *stamp, *piece_stamp, tick; /* per triangle, per piece */
     double most_up, most_down;
-    uint32_t found_near[STRL_COVER_MAX];
+    uint32_t near[STRL_COVER_MAX];
     uint32_t *found;          /* [piece_count] gathered pieces */
     uint32_t found_count;
     uint32_t *star;           /* [triangle_count] triangles that a collapse changed */
     uint32_t star_count;
     uint32_t around[WIDER_MAX], around_count;
     bool used[WIDER_MAX];
-    strl_facet by[STRL_COVER_MAX];
+    strl_facet by[WIDER_MAX];
     strl_prism prisms[WIDER_MAX]; /* over those that are `around` */
 } tracker;
 
@@ -198,18 +200,17 @@ static bool keep_measure(tracker *t, uint32_t piece, double bound)
 
 static double measure_facet(tracker *t, const strl_facet *facet, const uint32_t *piece, uint32_t count, double enough)
 {
-    for (uint32_t i = 0; i < count; i++)
-        t->by[i] = t->piece[piece[i]];
-    return strl_cover_bound(facet, &(strl_cover){.by = t->by, .count = count, .enough = enough});
+    return strl_cover_bound(facet, &(strl_cover){.by = t->piece, .pick = piece, .count = count, .enough = enough});
 }
 
-/* Against pieces that are near enough, at first the nearest of them; where these are too many, in quarters. */
+/* Against all pieces that are near enough: what is within a part of that does mostly. A facet near too many goes in quarters. */
 static double measure_near(tracker *t, const strl_facet *facet, double enough, unsigned quarterings)
 {
-    uint32_t count = STRL_COVER_MAX;
-    for (double reach = enough; count == STRL_COVER_MAX && reach > enough * LEAST_REACH; reach /= 3)
-        count = strl_near_list(&t->piece_tree, facet, reach, t->found_near, STRL_COVER_MAX);
-    double bound = measure_facet(t, facet, t->found_near, count, enough);
+    double bound = INFINITY;
+    for (double share = LEAST_REACH; share <= 1 && bound > enough; share *= REACH_GROWTH) {
+        uint32_t count = strl_near_list(&t->piece_tree, facet, share * enough, t->near, STRL_COVER_MAX);
+        bound = fmin(bound, measure_facet(t, facet, t->near, count, enough));
+    }
     if (bound <= enough || quarterings == 0)
         return bound;
     double middle[3][3], most = 0;
@@ -227,16 +228,14 @@ static double measure_near(tracker *t, const strl_facet *facet, double enough, u
     return fmin(bound, most);
 }
 
-/* A triangle against the pieces linked to it, and against all near it where these leave something open. */
+/* A triangle against the pieces gathered, and against others where these leave something open. */
 static void measure_up(tracker *t, uint32_t triangle)
 {
-    uint32_t count = 0;
-    double most = fmax(t->most_up, t->most_down);
-    for (uint32_t at = t->first_link[triangle]; at != NO_INDEX && count < STRL_COVER_MAX; at = t->links[at].next)
-        t->found_near[count++] = t->links[at].piece;
-    double bound = measure_facet(t, &t->facet[triangle], t->found_near, count, most);
-    if (bound > most)
-        bound = fmin(bound, measure_near(t, &t->facet[triangle], most, QUARTERINGS));
+    double enough = fmax(t->most_up, t->most_down);
+    uint32_t count = t->found_count < STRL_COVER_MAX ? t->found_count : STRL_COVER_MAX;
+    double bound = measure_facet(t, &t->facet[triangle], t->found, count, enough);
+    if (bound > enough)
+        bound = fmin(bound, measure_near(t, &t->facet[triangle], enough, QUARTERINGS));
     t->up[triangle] = (float)bound;
     t->most_up = fmax(t->most_up, bound);
 }
@@ -300,24 +299,32 @@ static void middle_of(const strl_facet *facet, double middle[3])
         middle[k] = (facet->corner[0][k] + facet->corner[1][k] + facet->corner[2][k]) / 3;
 }
 
-/* Every piece against the triangles near it, before the first collapse. */
+/* A piece against the triangles near it, before the first collapse. */
+static bool measure_first(tracker *t, const strl_near *tree, uint32_t id)
+{
+    const strl_facet *piece = &t->piece[id];
+    double middle[3], distance, along[3];
+    middle_of(piece, middle);
+    t->around[0] = strl_near_find(tree, middle, t->around[0], &distance);
+    double enough = fmax(t->most_down - piece->claim, FIRST_REACH * distance), bound = INFINITY;
+    strl_facet_normal(&t->facet[t->around[0]], along);
+    for (uint32_t most = 0; most < WIDER_MAX && bound > enough; most += WIDER_MAX - 1) {
+        t->around_count = 1 + strl_near_list(tree, piece, FIRST_REACH * distance, t->around + 1, most);
+        take_around(t, along);
+        bound = measure_piece(t, piece, enough);
+    }
+    return keep_measure(t, id, bound + piece->claim);
+}
+
 static bool measure_start(tracker *t, strl_arena *arena)
 {
-    uint32_t n = t->mesh->triangle_count;
     strl_near tree;
     strl_arena_mark mark = strl_arena_get_mark(arena);
-    bool good = plant(&tree, t->facet, n, arena);
-    for (uint32_t i = 0; good && i < t->piece_count; i++) {
-        const strl_facet *piece = &t->piece[i];
-        double middle[3], distance, along[3];
-        middle_of(piece, middle);
-        t->around[0] = strl_near_find(&tree, middle, &distance);
-        t->around_count = 1 + strl_near_list(&tree, piece, 1.5 * distance, t->around + 1, WIDER_MAX - 1);
-        strl_facet_normal(&t->facet[t->around[0]], along);
-        take_around(t, along);
-        good = keep_measure(t, i, measure_piece(t, piece, fmax(t->most_down - piece->claim, 1.5 * distance)) + piece->claim);
-    }
-    for (uint32_t i = 0; good && i < n; i++)
+    bool good = plant(&tree, t->facet, t->mesh->triangle_count, arena);
+    t->around[0] = 0;
+    for (uint32_t i = 0; good && i < t->piece_count; i++)
+        good = measure_first(t, &tree, i);
+    for (uint32_t i = 0; good && i < t->mesh->triangle_count; i++)
         measure_up(t, i);
     strl_arena_rewind(arena, mark);
     return good;

@@ -9,6 +9,8 @@
 #define PROGRESS 0.75
 #define CROWD 16u
 #define HALVINGS 9u
+/* Fragments of so many times the limit are tried as they are. */
+#define SMALL 3
 /* Facets that are looked at before anything is cut. */
 #define LIKELY 6u
 /* So many fragments are cut again for being too far from what is nearest to their middles. */
@@ -239,6 +241,14 @@ static void cut_along(work *w, uint32_t to)
     }
 }
 
+static void middle_of(const strl_fragment *fragment, double middle[3])
+{
+    middle[0] = middle[1] = middle[2] = 0;
+    for (uint32_t i = 0; i < fragment->count; i++)
+        for (unsigned k = 0; k < 3; k++)
+            middle[k] += fragment->corner[i][k] / fragment->count;
+}
+
 /* The facet nearest to a point, of the first `count`. */
 static uint32_t nearest_of(const work *w, const double p[3], uint32_t count, double *nearest)
 {
@@ -283,10 +293,8 @@ static bool halve(const strl_fragment *fragment, double *side)
 static void settle(work *w, uint32_t near)
 {
     strl_fragment fragment = w->waiting[--w->waiting_count], inside;
-    double nearest, side[STRL_FRAGMENT_MAX], middle[3] = {0};
-    for (uint32_t i = 0; i < fragment.count; i++)
-        for (unsigned k = 0; k < 3; k++)
-            middle[k] += fragment.corner[i][k] / fragment.count;
+    double nearest, side[STRL_FRAGMENT_MAX], middle[3];
+    middle_of(&fragment, middle);
     uint32_t to = nearest_of(w, middle, near, &nearest);
     if (nearest > w->limit && near < w->cover->count)
         to = nearest_of(w, middle, w->cover->count, &nearest);
@@ -338,10 +346,30 @@ static uint32_t find_near(work *w, const strl_fragment *fragment, uint32_t count
     return near;
 }
 
+/* Whether what is nearest to the middle of a small fragment is near enough to all of it. */
+static bool is_given_at_once(work *w, const strl_fragment *fragment, uint32_t near)
+{
+    double middle[3], nearest, size2 = 0, way[3];
+    for (uint32_t i = 1; i < fragment->count; i++) {
+        subtract(fragment->corner[i], fragment->corner[0], way);
+        size2 = fmax(size2, dot(way, way));
+    }
+    if (near == 0 || size2 > SMALL * SMALL * w->limit * w->limit)
+        return false;
+    middle_of(fragment, middle);
+    uint32_t to = nearest_of(w, middle, near, &nearest);
+    double bound = fragment_distance(fragment, &w->cover->by[to]);
+    if (bound <= w->limit)
+        give(w, to, fragment, bound);
+    return bound <= w->limit;
+}
+
 static void place(work *w, const strl_fragment *fragment, uint32_t count, unsigned halvings)
 {
     double side[STRL_FRAGMENT_MAX];
     uint32_t near = find_near(w, fragment, count);
+    if (is_given_at_once(w, fragment, near))
+        return;
     bool helps = halvings == HALVINGS || near <= count * PROGRESS;
     if (near > CROWD && halvings > 0 && helps && halve(fragment, side)) {
         strl_fragment halves[2];
@@ -363,12 +391,13 @@ static bool is_settled_at_once(work *w, const strl_fragment *whole)
 {
     const strl_cover *cover = w->cover;
     for (uint32_t i = 0; i < cover->count && i < LIKELY; i++) {
-        const strl_facet *facet = &cover->by[i];
+        uint32_t at = cover->pick ? cover->pick[i] : i;
+        const strl_facet *facet = &cover->by[at];
         double reach = cover->enough - facet->claim, most = 0;
         for (unsigned c = 0; c < 3 && most <= reach * reach && reach >= 0; c++)
             most = fmax(most, strl_facet_distance2(facet, whole->corner[c]));
         if (reach >= 0 && most <= reach * reach) {
-            give(w, i, whole, sqrt(most) + facet->claim);
+            give(w, at, whole, sqrt(most) + facet->claim);
             return true;
         }
     }
@@ -390,7 +419,7 @@ double strl_cover_bound(const strl_facet *triangle, const strl_cover *cover)
     if (is_settled_at_once(&w, &whole))
         return w.bound;
     for (uint32_t i = 0; i < cover->count; i++)
-        w.order[i] = i;
+        w.order[i] = cover->pick ? cover->pick[i] : i;
     if (cover->along)
         memcpy(w.along, cover->along, sizeof w.along);
     else

@@ -36,7 +36,8 @@ typedef struct strl_prism {
 
 typedef struct strl_cover {
     const strl_facet *by;
-    const strl_prism *prisms; /* [count] over the facets, along `along`; NULL = made when needed */
+    const uint32_t *pick;     /* [count] which of them; NULL = the first `count` */
+    const strl_prism *prisms; /* over the facets, along `along`; NULL = made when needed */
     uint32_t count;      /* up to STRL_COVER_MAX */
     const double *along; /* direction of the prisms, of any length; NULL = the triangle's normal */
     double enough; /* a bound so large is good enough: no nearer facet is looked for */

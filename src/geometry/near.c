@@ -93,10 +93,10 @@ static double box_distance2(const strl_near_node *node, const double p[3])
     return sum;
 }
 
-uint32_t strl_near_find(const strl_near *tree, const double p[3], double *distance)
+uint32_t strl_near_find(const strl_near *tree, const double p[3], uint32_t guess, double *distance)
 {
-    uint32_t stack[STACK_MAX], top = 0, found = 0;
-    double best = INFINITY;
+    uint32_t stack[STACK_MAX], top = 0, found = guess;
+    double best = strl_facet_distance2(&tree->facet[guess], p);
     stack[top++] = 0;
     while (top) {
         const strl_near_node *node = &tree->nodes[stack[--top]];

@@ -24,8 +24,8 @@ static inline uint32_t strl_near_nodes(uint32_t facets)
 
 /* Builds the tree over `count` (at least 1) facets into the arrays given. */
 void strl_near_build(strl_near *tree, const strl_facet *facet, uint32_t count, uint32_t *order, strl_near_node *nodes);
-/* The facet nearest to p, and its distance, claims left out. */
-uint32_t strl_near_find(const strl_near *tree, const double p[3], double *distance);
+/* The facet nearest to p, and its distance, claims left out. guess: a facet that is likely near. */
+uint32_t strl_near_find(const strl_near *tree, const double p[3], uint32_t guess, double *distance);
 /* Facets whose boxes meet the box of `facet`, widened by `reach`: the first `most` of them. Returns how many there are in found. */
 uint32_t strl_near_list(const strl_near *tree, const strl_facet *facet, double reach, uint32_t *found, uint32_t most);
 

@@ -154,7 +154,7 @@ static void list_candidates(divider *d, const strl_facet *piece)
     double middle[3];
     for (unsigned k = 0; k < 3; k++)
         middle[k] = (piece->corner[0][k] + piece->corner[1][k] + piece->corner[2][k]) / 3;
-    d->candidate[0] = strl_near_find(&d->tree, middle, &d->distance);
+    d->candidate[0] = strl_near_find(&d->tree, middle, d->candidate[0], &d->distance);
     d->candidate_count = 1 + strl_near_list(&d->tree, piece, NEAR_ENOUGH * d->distance, d->candidate + 1, CANDIDATES - 1);
 }
 
@@ -251,7 +251,7 @@ strl_status strl_anchors_divide(const strl_mesh *mesh, const uint32_t *owner, ui
     divider *d = strl_arena_alloc(arena, 1, sizeof *d);
     bool good = d != NULL;
     if (good)
-        d->owner = owner, d->tolerance = tolerance;
+        d->owner = owner, d->tolerance = tolerance, d->candidate[0] = 0;
     good = good && prepare_divider(d, mesh, arena) && divide_all(d, members, all, shares);
     strl_arena_rewind(arena, mark);
     return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for the anchors of a group");
