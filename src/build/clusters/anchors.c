@@ -114,9 +114,8 @@ typedef struct divider {
     const uint32_t *owner;
     strl_near tree;
     strl_facet *facet; /* [triangles] */
-    strl_facet by[CANDIDATES];
     uint32_t candidate[CANDIDATES], candidate_count;
-    double tolerance;
+    double tolerance, enough; /* distances within which a member's triangles are near enough: always, and to the piece at hand */
     double distance; /* of the middle of the piece from the first candidate */
     part parts[PARTS_MAX];
     uint32_t part_count;
@@ -129,7 +128,7 @@ static void take_part(void *context, uint32_t by, const strl_fragment *fragment)
     if (d->part_count == PARTS_MAX)
         d->is_full = true;
     else
-        d->parts[d->part_count++] = (part){d->owner[d->candidate[by]], *fragment};
+        d->parts[d->part_count++] = (part){d->owner[by], *fragment};
 }
 
 static bool add_part(const part *p, float claim, strl_pieces *pieces)
@@ -155,13 +154,14 @@ static void list_candidates(divider *d, const strl_facet *piece)
     for (unsigned k = 0; k < 3; k++)
         middle[k] = (piece->corner[0][k] + piece->corner[1][k] + piece->corner[2][k]) / 3;
     d->candidate[0] = strl_near_find(&d->tree, middle, d->candidate[0], &d->distance);
-    d->candidate_count = 1 + strl_near_list(&d->tree, piece, NEAR_ENOUGH * d->distance, d->candidate + 1, CANDIDATES - 1);
+    d->enough = fmax(NEAR_ENOUGH * d->distance, d->tolerance);
+    d->candidate_count = 1 + strl_near_list(&d->tree, piece, d->enough, d->candidate + 1, CANDIDATES - 1);
 }
 
-static bool lies_over_one(const divider *d)
+static bool is_near_all(const divider *d, uint32_t member)
 {
-    for (uint32_t i = 1; i < d->candidate_count; i++)
-        if (d->owner[d->candidate[i]] != d->owner[d->candidate[0]])
+    for (uint32_t i = 0; i < d->candidate_count; i++)
+        if (d->owner[d->candidate[i]] != member)
             return false;
     return true;
 }
@@ -175,36 +175,33 @@ static bool parts_are_of_one(const divider *d)
 }
 
 /* A piece need not be cut where one member's triangles are near enough to all of it. */
-static bool is_near_to(divider *d, const strl_facet *piece, const double along[3], double enough, uint32_t member)
+static bool is_near_to(divider *d, const strl_facet *piece, const double along[3], uint32_t member)
 {
-    uint32_t count = 0;
+    uint32_t pick[CANDIDATES], count = 0;
     for (uint32_t i = 0; i < d->candidate_count; i++)
         if (d->owner[d->candidate[i]] == member)
-            d->by[count++] = d->facet[d->candidate[i]];
-    return strl_cover_bound(piece, &(strl_cover){.by = d->by, .count = count, .along = along, .enough = enough}) <= enough;
+            pick[count++] = d->candidate[i];
+    strl_cover cover = {.by = d->facet, .pick = pick, .count = count, .along = along, .enough = d->enough};
+    return count && strl_cover_bound(piece, &cover) <= d->enough;
 }
 
-static bool divide_piece(divider *d, const strl_piece *piece, strl_pieces *const *shares)
+/* What was a member's stays with it where it can: where sheets overlap, the nearest may well be another's. */
+static bool divide_piece(divider *d, const strl_piece *piece, uint32_t own, strl_pieces *const *shares)
 {
     strl_facet facet;
     double along[3];
     strl_piece_facet(piece, &facet);
+    facet.claim = 0;
     list_candidates(d, &facet);
-    uint32_t first = d->owner[d->candidate[0]];
-    if (lies_over_one(d))
-        return add_piece(shares[first], piece);
-    double enough = fmax(NEAR_ENOUGH * d->distance, d->tolerance);
     strl_facet_normal(&d->facet[d->candidate[0]], along);
-    if (is_near_to(d, &facet, along, enough, first))
-        return add_piece(shares[first], piece);
-    for (uint32_t i = 0; i < d->candidate_count; i++)
-        d->by[i] = d->facet[d->candidate[i]];
+    if (is_near_all(d, own) || is_near_to(d, &facet, along, own))
+        return add_piece(shares[own], piece);
     d->part_count = 0;
     d->is_full = false;
-    strl_cover_bound(&facet, &(strl_cover){.by = d->by, .count = d->candidate_count, .along = along, .enough = enough,
-                                           .take = take_part, .context = d});
+    strl_cover_bound(&facet, &(strl_cover){.by = d->facet, .pick = d->candidate, .count = d->candidate_count, .along = along,
+                                           .enough = d->enough, .take = take_part, .context = d});
     if (d->is_full || parts_are_of_one(d))
-        return add_piece(shares[d->is_full ? first : d->parts[0].member], piece);
+        return add_piece(shares[d->is_full ? d->owner[d->candidate[0]] : d->parts[0].member], piece);
     bool good = true;
     for (uint32_t i = 0; i < d->part_count && good; i++)
         good = add_part(&d->parts[i], piece->claim, shares[d->parts[i].member]);
@@ -229,7 +226,15 @@ static bool prepare_divider(divider *d, const strl_mesh *mesh, strl_arena *arena
     return true;
 }
 
-static bool divide_all(divider *d, uint32_t members, const strl_anchors *all, strl_anchors *shares)
+static bool divide_pieces(divider *d, const strl_pieces *pieces, uint32_t own, strl_pieces *const *shares)
+{
+    bool good = true;
+    for (uint32_t i = 0; i < pieces->count && good; i++)
+        good = divide_piece(d, &pieces->item[i], own, shares);
+    return good;
+}
+
+static bool divide_all(divider *d, uint32_t members, const strl_anchors *own, strl_anchors *shares)
 {
     strl_pieces *used[8], *young[8];
     bool good = true;
@@ -237,14 +242,12 @@ static bool divide_all(divider *d, uint32_t members, const strl_anchors *all, st
         used[m] = &shares[m].used;
         young[m] = &shares[m].young;
     }
-    for (uint32_t i = 0; i < all->used.count && good; i++)
-        good = divide_piece(d, &all->used.item[i], used);
-    for (uint32_t i = 0; i < all->young.count && good; i++)
-        good = divide_piece(d, &all->young.item[i], young);
+    for (uint32_t m = 0; m < members && good; m++)
+        good = divide_pieces(d, &own[m].used, m, used) && divide_pieces(d, &own[m].young, m, young);
     return good;
 }
 
-strl_status strl_anchors_divide(const strl_mesh *mesh, const uint32_t *owner, uint32_t members, double tolerance, const strl_anchors *all,
+strl_status strl_anchors_divide(const strl_mesh *mesh, const uint32_t *owner, uint32_t members, double tolerance, const strl_anchors *own,
                                 strl_arena *arena, strl_anchors *shares, strl_error *err)
 {
     strl_arena_mark mark = strl_arena_get_mark(arena);
@@ -252,7 +255,7 @@ strl_status strl_anchors_divide(const strl_mesh *mesh, const uint32_t *owner, ui
     bool good = d != NULL;
     if (good)
         d->owner = owner, d->tolerance = tolerance, d->candidate[0] = 0;
-    good = good && prepare_divider(d, mesh, arena) && divide_all(d, members, all, shares);
+    good = good && prepare_divider(d, mesh, arena) && divide_all(d, members, own, shares);
     strl_arena_rewind(arena, mark);
     return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for the anchors of a group");
 }

@@ -45,9 +45,9 @@ strl_status strl_anchors_read(const void *data, size_t size, const int64_t moved
                               strl_error *err);
 /* The triangles of a base mesh as young anchors. certified: per triangle; NULL = by their drifts. */
 bool strl_anchors_bear(const strl_mesh *base, const float *certified, strl_pieces *young);
-/* Gives each piece of `all` to the members (at most 8) of a group by the triangles over which it lies: owner[] of mesh's triangles. One
- * that reaches into another member's by no more than `tolerance` is not cut. */
-strl_status strl_anchors_divide(const strl_mesh *mesh, const uint32_t *owner, uint32_t members, double tolerance, const strl_anchors *all,
+/* Divides what a group's members (at most 8) stood for as children among them, as their boundaries are now: own[i] becomes shares[i] as far
+ * as it lies over triangles of member i (owner: of mesh's triangles), or reaches beyond them by no more than `tolerance`. */
+strl_status strl_anchors_divide(const strl_mesh *mesh, const uint32_t *owner, uint32_t members, double tolerance, const strl_anchors *own,
                                 strl_arena *arena, strl_anchors *shares, strl_error *err);
 
 #endif

@@ -22,18 +22,19 @@ static strl_status read_anchors(const strl_level *children, uint32_t index, cons
 strl_status strl_group_anchors(const strl_level *children, const uint32_t *member, uint32_t count, const strl_node_mesh *merged,
                                const uint32_t *owner, bool promotes, strl_arena *arena, strl_anchors *shares, strl_error *err)
 {
-    strl_anchors all = {0};
+    strl_anchors own[STRL_GROUP_MAX] = {0};
     double claimed = 0;
     strl_status status = STRL_OK;
     for (uint32_t i = 0; i < 2 * count && !status; i++) {
         uint32_t child = 2 * member[i / 2] + (i & 1);
         status = read_anchors(children, child, merged->anchor, children->nodes[child].record.anchor, promotes, arena,
-                              count == 1 ? &shares[0] : &all, err);
+                              count == 1 ? &shares[0] : &own[i / 2], err);
         claimed += children->nodes[child].claims.most / (2. * count);
     }
     if (!status && count > 1)
-        status = strl_anchors_divide(&merged->mesh, owner, count, claimed, &all, arena, shares, err);
-    strl_anchors_deinit(&all);
+        status = strl_anchors_divide(&merged->mesh, owner, count, claimed, own, arena, shares, err);
+    for (uint32_t m = 0; m < count; m++)
+        strl_anchors_deinit(&own[m]);
     return status;
 }
 
