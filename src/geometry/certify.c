@@ -25,7 +25,7 @@ typedef struct tracker {
     const strl_mesh *mesh;
     strl_facet *piece;        /* [piece_count] */
     uint32_t piece_count;
-    strl_near piece_tree;
+    strl_near tree, piece_tree; /* over facet, as it was and as it is now, and over piece */
     uint32_t (*point)[3];     /* per triangle */
     bool *gone;               /* per triangle */
     uint32_t *head, *tail;    /* per point: corners, 4 * triangle + 0, 1, 2 */
@@ -121,18 +121,19 @@ static void drop_links(tracker *t, uint32_t triangle)
 
 /* ---- what is round a collapse ---- */
 
-static void add_around(tracker *t, uint32_t triangle, uint32_t most)
+static void add_around(tracker *t, uint32_t triangle)
 {
-    if (t->gone[triangle] || t->stamp[triangle] == t->tick || t->around_count == most)
+    if (t->gone[triangle] || t->stamp[triangle] == t->tick || t->around_count == AROUND_MAX)
         return;
     t->stamp[triangle] = t->tick;
     t->around[t->around_count++] = triangle;
 }
 
-static void add_around_point(tracker *t, uint32_t point, uint32_t most)
+static void add_around_point(tracker *t, uint32_t point)
 {
-    for (uint32_t corner = t->head[point]; corner != NO_INDEX && t->around_count < most; corner = t->next[corner >> 2][corner & 3])
-        add_around(t, corner >> 2, most);
+    for (uint32_t corner = t->head[point]; corner != NO_INDEX && t->around_count < AROUND_MAX;
+         corner = t->next[corner >> 2][corner & 3])
+        add_around(t, corner >> 2);
 }
 
 static void take_around(tracker *t, const double along[3])
@@ -143,18 +144,17 @@ static void take_around(tracker *t, const double along[3])
     }
 }
 
-/* The changed triangles, those at `point`, and those that share points with them, `rings` times over. */
-static void look_around(tracker *t, uint32_t point, const double along[3], unsigned rings, uint32_t most)
+/* The changed triangles, those at `point`, and those that share points with them. */
+static void look_around(tracker *t, uint32_t point, const double along[3])
 {
     t->tick++;
     t->around_count = 0;
     for (uint32_t i = 0; i < t->star_count; i++)
-        add_around(t, t->star[i], most);
-    add_around_point(t, point, most);
-    for (unsigned ring = 0; ring < rings; ring++)
-        for (uint32_t i = 0, count = t->around_count; i < count; i++)
-            for (unsigned c = 0; c < 3; c++)
-                add_around_point(t, t->point[t->around[i]][c], most);
+        add_around(t, t->star[i]);
+    add_around_point(t, point);
+    for (uint32_t i = 0, count = t->around_count; i < count; i++)
+        for (unsigned c = 0; c < 3; c++)
+            add_around_point(t, t->point[t->around[i]][c]);
     take_around(t, along);
 }
 
@@ -244,11 +244,14 @@ static void measure_up(tracker *t, uint32_t triangle)
 
 static bool plant(strl_near *tree, const strl_facet *facet, uint32_t count, strl_arena *arena)
 {
-    uint32_t *order = strl_arena_alloc(arena, count, sizeof *order);
-    strl_near_node *nodes = strl_arena_alloc(arena, strl_near_nodes(count), sizeof *nodes);
-    if (order && nodes)
-        strl_near_build(tree, facet, count, order, nodes);
-    return order && nodes;
+    tree->facet = facet;
+    tree->order = strl_arena_alloc(arena, count, sizeof *tree->order);
+    tree->leaf = strl_arena_alloc(arena, count, sizeof *tree->leaf);
+    tree->nodes = strl_arena_alloc(arena, strl_near_nodes(count), sizeof *tree->nodes);
+    if (!tree->order || !tree->leaf || !tree->nodes)
+        return false;
+    strl_near_build(tree, count);
+    return true;
 }
 
 static bool prepare_pieces(tracker *t, const strl_piece *pieces, strl_arena *arena)
@@ -290,7 +293,7 @@ static bool prepare(tracker *t, const strl_mesh *mesh, strl_arena *arena)
         }
         triangle_facet(t, i);
     }
-    return true;
+    return plant(&t->tree, t->facet, n, arena);
 }
 
 static void middle_of(const strl_facet *facet, double middle[3])
@@ -300,33 +303,30 @@ static void middle_of(const strl_facet *facet, double middle[3])
 }
 
 /* A piece against the triangles near it, before the first collapse. */
-static bool measure_first(tracker *t, const strl_near *tree, uint32_t id)
+static bool measure_first(tracker *t, uint32_t id)
 {
     const strl_facet *piece = &t->piece[id];
     double middle[3], distance, along[3];
     middle_of(piece, middle);
-    t->around[0] = strl_near_find(tree, middle, t->around[0], &distance);
+    t->around[0] = strl_near_find(&t->tree, middle, t->around[0], &distance);
     double enough = fmax(t->most_down - piece->claim, FIRST_REACH * distance), bound = INFINITY;
     strl_facet_normal(&t->facet[t->around[0]], along);
     for (uint32_t most = 0; most < WIDER_MAX && bound > enough; most += WIDER_MAX - 1) {
-        t->around_count = 1 + strl_near_list(tree, piece, FIRST_REACH * distance, t->around + 1, most);
+        t->around_count = 1 + strl_near_list(&t->tree, piece, FIRST_REACH * distance, t->around + 1, most);
         take_around(t, along);
         bound = measure_piece(t, piece, enough);
     }
     return keep_measure(t, id, bound + piece->claim);
 }
 
-static bool measure_start(tracker *t, strl_arena *arena)
+static bool measure_start(tracker *t)
 {
-    strl_near tree;
-    strl_arena_mark mark = strl_arena_get_mark(arena);
-    bool good = plant(&tree, t->facet, t->mesh->triangle_count, arena);
+    bool good = true;
     t->around[0] = 0;
     for (uint32_t i = 0; good && i < t->piece_count; i++)
-        good = measure_first(t, &tree, i);
+        good = measure_first(t, i);
     for (uint32_t i = 0; good && i < t->mesh->triangle_count; i++)
         measure_up(t, i);
-    strl_arena_rewind(arena, mark);
     return good;
 }
 
@@ -345,23 +345,30 @@ static void carry_out(tracker *t, uint32_t u, uint32_t v)
         gather_pieces(t, triangle);
         drop_links(t, triangle);
         t->gone[triangle] = point[0] == v || point[1] == v || point[2] == v;
-        if (t->gone[triangle])
+        if (t->gone[triangle]) {
+            t->facet[triangle].least[0] = INFINITY; /* near nothing */
             continue;
+        }
         point[corner & 3] = v;
         append_corner(t, v, corner);
         triangle_facet(t, triangle);
+        strl_near_update(&t->tree, triangle);
         t->star[t->star_count++] = triangle;
     }
     t->head[u] = NO_INDEX;
 }
 
-/* What a piece is measured against is looked for farther away, and along its own normal, where what is next to the collapse is too far. */
-static double measure_wider(tracker *t, uint32_t v, const strl_facet *piece, double enough)
+/* A piece against all triangles in reach, whether or not they hang together with what the collapse changed, and along its own normal. */
+static double measure_wider(tracker *t, const strl_facet *piece, double enough)
 {
-    double along[3];
+    double along[3], bound = INFINITY;
     strl_facet_normal(piece, along);
-    look_around(t, v, along, 3, WIDER_MAX);
-    return measure_piece(t, piece, enough);
+    for (double share = LEAST_REACH; share <= 1 && bound > enough; share *= REACH_GROWTH) {
+        t->around_count = strl_near_list(&t->tree, piece, share * enough, t->around, WIDER_MAX);
+        take_around(t, along);
+        bound = measure_piece(t, piece, enough);
+    }
+    return bound;
 }
 
 static bool measure_again(tracker *t, uint32_t v)
@@ -369,7 +376,7 @@ static bool measure_again(tracker *t, uint32_t v)
     bool good = true;
     double along[3];
     normal_of_star(t, along);
-    look_around(t, v, along, 1, AROUND_MAX);
+    look_around(t, v, along);
     for (uint32_t i = 0; i < t->found_count && good; i++) {
         uint32_t id = t->found[i];
         const strl_facet *piece = &t->piece[id];
@@ -378,11 +385,11 @@ static bool measure_again(tracker *t, uint32_t v)
             good = keep_measure(t, id, bound + piece->claim);
             continue;
         }
-        double wider = measure_wider(t, v, piece, enough);
+        double wider = measure_wider(t, piece, enough);
         bool is_better = wider < bound;
         if (is_better)
             good = keep_measure(t, id, wider + piece->claim);
-        look_around(t, v, along, 1, AROUND_MAX);
+        look_around(t, v, along);
         if (!is_better) {
             bound = measure_piece(t, piece, enough);
             good = keep_measure(t, id, bound + piece->claim);
@@ -423,9 +430,9 @@ static void conclude(const tracker *t, double rounding, strl_certificate *certif
     }
 }
 
-static bool track(tracker *t, const strl_simplified *simplified, strl_arena *arena, double rounding, strl_certificate *certificate)
+static bool track(tracker *t, const strl_simplified *simplified, double rounding, strl_certificate *certificate)
 {
-    if (!measure_start(t, arena))
+    if (!measure_start(t))
         return false;
     for (uint32_t i = 0;; i++) {
         certificate->down[i] = rounded_up(t->most_down, rounding);
@@ -453,7 +460,7 @@ strl_status strl_certify(const strl_mesh *mesh, const strl_simplified *simplifie
     if (good) {
         *t = (tracker){.mesh = mesh, .piece_count = piece_count};
         good = prepare(t, mesh, arena) && prepare_pieces(t, pieces, arena) &&
-               track(t, simplified, arena, rounding_of(mesh, pieces, piece_count), certificate);
+               track(t, simplified, rounding_of(mesh, pieces, piece_count), certificate);
         strl__free(t->links);
     }
     strl_arena_rewind(arena, mark);

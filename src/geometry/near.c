@@ -63,6 +63,8 @@ static void split(strl_near *tree, uint32_t at, uint32_t first, uint32_t count, 
     if (count <= STRL_NEAR_LEAF) {
         node->first = first;
         node->count = count;
+        for (uint32_t i = first; i < first + count; i++)
+            tree->leaf[tree->order[i]] = at;
         return;
     }
     uint32_t half = count / 2, children = *used;
@@ -70,17 +72,34 @@ static void split(strl_near *tree, uint32_t at, uint32_t first, uint32_t count, 
     *used += 2;
     node->first = children;
     node->count = 0;
+    tree->nodes[children].parent = tree->nodes[children + 1].parent = at;
     split(tree, children, first, half, used);
     split(tree, children + 1, first + half, count - half, used);
 }
 
-void strl_near_build(strl_near *tree, const strl_facet *facet, uint32_t count, uint32_t *order, strl_near_node *nodes)
+void strl_near_build(strl_near *tree, uint32_t count)
 {
     uint32_t used = 1;
-    *tree = (strl_near){facet, order, nodes};
     for (uint32_t i = 0; i < count; i++)
-        order[i] = i;
+        tree->order[i] = i;
+    tree->nodes[0].parent = 0;
     split(tree, 0, 0, count, &used);
+}
+
+void strl_near_update(strl_near *tree, uint32_t facet)
+{
+    const strl_facet *f = &tree->facet[facet];
+    for (uint32_t at = tree->leaf[facet];; at = tree->nodes[at].parent) {
+        strl_near_node *node = &tree->nodes[at];
+        bool grows = false;
+        for (unsigned k = 0; k < 3; k++) {
+            grows |= f->least[k] < node->least[k] || f->most[k] > node->most[k];
+            node->least[k] = f->least[k] < node->least[k] ? f->least[k] : node->least[k];
+            node->most[k] = f->most[k] > node->most[k] ? f->most[k] : node->most[k];
+        }
+        if (!grows || at == 0)
+            return;
+    }
 }
 
 static double box_distance2(const strl_near_node *node, const double p[3])

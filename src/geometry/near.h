@@ -8,12 +8,14 @@
 
 typedef struct strl_near_node {
     double least[3], most[3];
+    uint32_t parent;       /* 0 at the root */
     uint32_t first, count; /* of a leaf, into order; count 0 = inner: the children are first and first + 1 */
 } strl_near_node;
 
 typedef struct strl_near {
     const strl_facet *facet;
     uint32_t *order;       /* [facets] */
+    uint32_t *leaf;        /* [facets] the node that has it */
     strl_near_node *nodes; /* [strl_near_nodes(facets)] */
 } strl_near;
 
@@ -22,8 +24,10 @@ static inline uint32_t strl_near_nodes(uint32_t facets)
     return facets < 1 ? 1 : 2 * facets - 1;
 }
 
-/* Builds the tree over `count` (at least 1) facets into the arrays given. */
-void strl_near_build(strl_near *tree, const strl_facet *facet, uint32_t count, uint32_t *order, strl_near_node *nodes);
+/* Builds the tree over `count` (at least 1) facets; the arrays are the caller's. */
+void strl_near_build(strl_near *tree, uint32_t count);
+/* The facet has moved: boxes grow to hold it. */
+void strl_near_update(strl_near *tree, uint32_t facet);
 /* The facet nearest to p, and its distance, claims left out. guess: a facet that is likely near. */
 uint32_t strl_near_find(const strl_near *tree, const double p[3], uint32_t guess, double *distance);
 /* Facets whose boxes meet the box of `facet`, widened by `reach`: the first `most` of them. Returns how many there are in found. */

@@ -210,10 +210,12 @@ static bool divide_piece(divider *d, const strl_piece *piece, uint32_t own, strl
 
 static bool prepare_divider(divider *d, const strl_mesh *mesh, strl_arena *arena)
 {
-    uint32_t *order = strl_arena_alloc(arena, mesh->triangle_count, sizeof *order);
-    strl_near_node *nodes = strl_arena_alloc(arena, strl_near_nodes(mesh->triangle_count), sizeof *nodes);
     d->facet = strl_arena_alloc(arena, mesh->triangle_count, sizeof *d->facet);
-    if (!order || !nodes || !d->facet)
+    d->tree.facet = d->facet;
+    d->tree.order = strl_arena_alloc(arena, mesh->triangle_count, sizeof *d->tree.order);
+    d->tree.leaf = strl_arena_alloc(arena, mesh->triangle_count, sizeof *d->tree.leaf);
+    d->tree.nodes = strl_arena_alloc(arena, strl_near_nodes(mesh->triangle_count), sizeof *d->tree.nodes);
+    if (!d->facet || !d->tree.order || !d->tree.leaf || !d->tree.nodes)
         return false;
     for (uint32_t t = 0; t < mesh->triangle_count; t++) {
         double corner[3][3];
@@ -222,7 +224,7 @@ static bool prepare_divider(divider *d, const strl_mesh *mesh, strl_arena *arena
         strl_facet_set(&d->facet[t], corner[0], corner[1], corner[2]);
         d->facet[t].claim = 0;
     }
-    strl_near_build(&d->tree, d->facet, mesh->triangle_count, order, nodes);
+    strl_near_build(&d->tree, mesh->triangle_count);
     return true;
 }
 
