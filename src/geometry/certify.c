@@ -9,6 +9,7 @@
 #define NO_INDEX UINT32_MAX
 #define AROUND_MAX 64u   /* triangles near a collapse that pieces are measured against at first */
 #define WIDER_MAX 256u   /* the same where that was not enough */
+#define FEW_PIECES 64u    /* more than this are not all looked at for one triangle */
 #define FIRST_REACH 1.5   /* of the distance of a piece's middle: what lies so near is looked at */
 #define QUARTERINGS 2u
 #define LEAST_REACH 0.03125 /* of the bound that is good enough */
@@ -232,8 +233,9 @@ static double measure_near(tracker *t, const strl_facet *facet, double enough, u
 static void measure_up(tracker *t, uint32_t triangle)
 {
     double enough = fmax(t->most_up, t->most_down);
-    uint32_t count = t->found_count < STRL_COVER_MAX ? t->found_count : STRL_COVER_MAX;
-    double bound = measure_facet(t, &t->facet[triangle], t->found, count, enough);
+    double bound = INFINITY;
+    if (t->found_count <= FEW_PIECES)
+        bound = measure_facet(t, &t->facet[triangle], t->found, t->found_count, enough);
     if (bound > enough)
         bound = fmin(bound, measure_near(t, &t->facet[triangle], enough, QUARTERINGS));
     t->up[triangle] = (float)bound;
@@ -322,7 +324,7 @@ static bool measure_first(tracker *t, uint32_t id)
 static bool measure_start(tracker *t)
 {
     bool good = true;
-    t->around[0] = 0;
+    t->around[0] = t->found_count = 0;
     for (uint32_t i = 0; good && i < t->piece_count; i++)
         good = measure_first(t, i);
     for (uint32_t i = 0; good && i < t->mesh->triangle_count; i++)

@@ -346,22 +346,34 @@ static uint32_t find_near(work *w, const strl_fragment *fragment, uint32_t count
     return near;
 }
 
-/* Whether what is nearest to the middle of a small fragment is near enough to all of it. */
+/* Whether one facet is near enough to all corners, and so to all of the fragment. */
+static bool is_within(const strl_fragment *fragment, const strl_facet *facet, double limit, double *bound)
+{
+    double reach = limit - facet->claim, most = 0;
+    if (reach < 0)
+        return false;
+    for (uint32_t i = 0; i < fragment->count && most <= reach * reach; i++)
+        most = fmax(most, strl_facet_distance2(facet, fragment->corner[i]));
+    *bound = sqrt(most) + facet->claim;
+    return most <= reach * reach;
+}
+
+/* Whether any facet will do for a small fragment as it is. */
 static bool is_given_at_once(work *w, const strl_fragment *fragment, uint32_t near)
 {
-    double middle[3], nearest, size2 = 0, way[3];
+    double bound, size2 = 0, way[3];
     for (uint32_t i = 1; i < fragment->count; i++) {
         subtract(fragment->corner[i], fragment->corner[0], way);
         size2 = fmax(size2, dot(way, way));
     }
-    if (near == 0 || size2 > SMALL * SMALL * w->limit * w->limit)
+    if (size2 > SMALL * SMALL * w->limit * w->limit)
         return false;
-    middle_of(fragment, middle);
-    uint32_t to = nearest_of(w, middle, near, &nearest);
-    double bound = fragment_distance(fragment, &w->cover->by[to]);
-    if (bound <= w->limit)
-        give(w, to, fragment, bound);
-    return bound <= w->limit;
+    for (uint32_t i = 0; i < near; i++)
+        if (is_within(fragment, &w->cover->by[w->order[i]], w->limit, &bound)) {
+            give(w, w->order[i], fragment, bound);
+            return true;
+        }
+    return false;
 }
 
 static void place(work *w, const strl_fragment *fragment, uint32_t count, unsigned halvings)
@@ -386,18 +398,15 @@ static void place(work *w, const strl_fragment *fragment, uint32_t count, unsign
         settle(w, near);
 }
 
-/* The first few facets are likely: one that is near enough to all corners is near enough to everything between them. */
+/* The first few facets are likely. */
 static bool is_settled_at_once(work *w, const strl_fragment *whole)
 {
     const strl_cover *cover = w->cover;
+    double bound;
     for (uint32_t i = 0; i < cover->count && i < LIKELY; i++) {
         uint32_t at = cover->pick ? cover->pick[i] : i;
-        const strl_facet *facet = &cover->by[at];
-        double reach = cover->enough - facet->claim, most = 0;
-        for (unsigned c = 0; c < 3 && most <= reach * reach && reach >= 0; c++)
-            most = fmax(most, strl_facet_distance2(facet, whole->corner[c]));
-        if (reach >= 0 && most <= reach * reach) {
-            give(w, at, whole, sqrt(most) + facet->claim);
+        if (is_within(whole, &cover->by[at], cover->enough, &bound)) {
+            give(w, at, whole, bound);
             return true;
         }
     }

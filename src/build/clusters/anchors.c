@@ -7,7 +7,8 @@
 #include "geometry/near.h"
 
 #define FEW_NODES 8u      /* levels of so few keep their anchors: they cost nothing there, and the older the tighter */
-#define LATEST_FIRST 2u   /* below, what is claimed without certificates is tight, and most of the triangles are there */
+#define LATEST_FIRST 3u   /* below, what is claimed without certificates is tight, and most of the triangles are there */
+#define FEW_LEVELS 4u     /* so far from the root certificates begin without --certify: the few levels where claims by drifts are loose */
 #define CANDIDATES 256u
 #define PARTS_MAX 64u
 /* Of the distance of a piece's middle: what lies so near is looked at. */
@@ -17,9 +18,11 @@
 
 /* ---- plan ---- */
 
-void strl_anchor_plan_begin(strl_anchor_plan *plan, uint32_t depth)
+void strl_anchor_plan_begin(strl_anchor_plan *plan, uint32_t depth, bool certify)
 {
-    *plan = (strl_anchor_plan){.first = depth / 4 < LATEST_FIRST ? depth / 4 : LATEST_FIRST};
+    uint32_t early = depth / 4 < LATEST_FIRST ? depth / 4 : LATEST_FIRST;
+    uint32_t late = depth > 2 * FEW_LEVELS ? depth - FEW_LEVELS : depth / 2;
+    *plan = (strl_anchor_plan){.first = certify && early < late ? early : late};
 }
 
 void strl_anchor_plan_level(strl_anchor_plan *plan, uint32_t level, uint32_t depth)
@@ -28,10 +31,11 @@ void strl_anchor_plan_level(strl_anchor_plan *plan, uint32_t level, uint32_t dep
     plan->promotes = plan->has_young && plan->born + 2 <= level;
     plan->has_used = plan->has_used || plan->promotes;
     plan->has_young = plan->has_young && !plan->promotes;
-    bool is_turn = level >= plan->first && (level - plan->first) % 2 == 0;
-    plan->bears = is_turn && !plan->has_young && level < depth && (level == plan->first || 1u << (depth - level) > FEW_NODES);
+    bool is_turn = level >= plan->first && (level - plan->first) % 2 == 0, are_many = 1u << (depth - level) > FEW_NODES;
+    plan->bears = is_turn && !plan->has_young && level < depth && (level == plan->first || are_many);
     if (plan->bears)
         plan->born = level;
+    plan->is_on = plan->has_used || plan->has_young || plan->bears;
 }
 
 /* ---- pieces ---- */
@@ -148,14 +152,29 @@ static bool add_part(const part *p, float claim, strl_pieces *pieces)
     return true;
 }
 
-static void list_candidates(divider *d, const strl_facet *piece)
+/* The triangle nearest to the piece's middle becomes the first candidate. */
+static void find_nearest(divider *d, const strl_facet *piece)
 {
     double middle[3];
     for (unsigned k = 0; k < 3; k++)
         middle[k] = (piece->corner[0][k] + piece->corner[1][k] + piece->corner[2][k]) / 3;
     d->candidate[0] = strl_near_find(&d->tree, middle, d->candidate[0], &d->distance);
     d->enough = fmax(NEAR_ENOUGH * d->distance, d->tolerance);
-    d->candidate_count = 1 + strl_near_list(&d->tree, piece, d->enough, d->candidate + 1, CANDIDATES - 1);
+}
+
+static void list_candidates(divider *d, const strl_facet *piece, double reach)
+{
+    d->candidate_count = 1 + strl_near_list(&d->tree, piece, reach, d->candidate + 1, CANDIDATES - 1);
+}
+
+/* Whether all corners, and so all points, are near enough to one triangle of the member. */
+static bool is_near_first(const divider *d, const strl_facet *piece, uint32_t member)
+{
+    const strl_facet *facet = &d->facet[d->candidate[0]];
+    bool near = d->owner[d->candidate[0]] == member;
+    for (unsigned c = 0; c < 3 && near; c++)
+        near = strl_facet_distance2(facet, piece->corner[c]) <= d->enough * d->enough;
+    return near;
 }
 
 static bool is_near_all(const divider *d, uint32_t member)
@@ -192,9 +211,15 @@ static bool divide_piece(divider *d, const strl_piece *piece, uint32_t own, strl
     double along[3];
     strl_piece_facet(piece, &facet);
     facet.claim = 0;
-    list_candidates(d, &facet);
+    find_nearest(d, &facet);
+    if (is_near_first(d, &facet, own))
+        return add_piece(shares[own], piece);
+    list_candidates(d, &facet, NEAR_ENOUGH * d->distance);
+    if (is_near_all(d, own))
+        return add_piece(shares[own], piece);
+    list_candidates(d, &facet, d->enough);
     strl_facet_normal(&d->facet[d->candidate[0]], along);
-    if (is_near_all(d, own) || is_near_to(d, &facet, along, own))
+    if (is_near_to(d, &facet, along, own))
         return add_piece(shares[own], piece);
     d->part_count = 0;
     d->is_full = false;

@@ -1,4 +1,4 @@
-/* `--certify`: the older surfaces that nodes are measured against (geometry/certify.h).
+/* The older surfaces that nodes are measured against (geometry/certify.h).
  *
  * Base meshes of every second level become *anchors*: their triangles, each with a bound of its own distance from the input, go up the
  * hierarchy with the nodes that stand for them. From two levels above on, nodes are measured against them; when the next anchors are old
@@ -24,16 +24,18 @@ typedef struct strl_anchors {
     strl_pieces used, young;
 } strl_anchors;
 
-/* What happens at the level being made; the zero value is a build without certificates. */
+/* What happens at the level being made. */
 typedef struct strl_anchor_plan {
     uint32_t first;     /* the first level whose base meshes become anchors */
     uint32_t born;      /* the level of the young ones */
     bool promotes;      /* the children's young ones are used from here on */
     bool has_used, has_young;
+    bool is_on;         /* any of it */
     bool bears;         /* the base meshes of this level become young anchors */
 } strl_anchor_plan;
 
-void strl_anchor_plan_begin(strl_anchor_plan *plan, uint32_t depth);
+/* certify: from as low a level as pays; else near the root only. */
+void strl_anchor_plan_begin(strl_anchor_plan *plan, uint32_t depth, bool certify);
 /* For a level of so many nodes, made after the one before. */
 void strl_anchor_plan_level(strl_anchor_plan *plan, uint32_t level, uint32_t depth);
 

@@ -26,7 +26,7 @@ static strl_status open_level(strl_hierarchy *hierarchy, uint32_t index, strl_er
     if (!status)
         status = strl_spill_open(hierarchy->context->spills, name, 0, &level->meshes, err);
     snprintf(name, sizeof name, "anchors-%02u", index);
-    return status || !hierarchy->context->desc->certify
+    return status || !hierarchy->anchor_plan.is_on
                ? status
                : strl_spill_open(hierarchy->context->spills, name, 0, &level->anchors, err);
 }
@@ -47,9 +47,8 @@ static strl_status simplify_levels(strl_hierarchy *hierarchy, strl_error *err)
     strl_status status = STRL_OK;
     for (uint32_t level = 0; level <= hierarchy->partition->depth && !status; level++) {
         strl__build_stage(hierarchy->context, names[level < 10 ? level : 10]);
+        strl_anchor_plan_level(&hierarchy->anchor_plan, level, hierarchy->partition->depth);
         status = open_level(hierarchy, level, err);
-        if (hierarchy->context->desc->certify)
-            strl_anchor_plan_level(&hierarchy->anchor_plan, level, hierarchy->partition->depth);
         if (!status)
             status = level == 0 ? strl_make_leaves(hierarchy, err) : strl_make_level(hierarchy, level, err);
         if (!status)
@@ -216,7 +215,7 @@ strl_status strl__clusters_run(strl_build_context *context, strl_error *err)
     }
     if (!status) {
         hierarchy.levels = strl__alloc_zero((size_t)partition.depth + 1, sizeof *hierarchy.levels);
-        strl_anchor_plan_begin(&hierarchy.anchor_plan, partition.depth);
+        strl_anchor_plan_begin(&hierarchy.anchor_plan, partition.depth, context->desc->certify);
         status = hierarchy.levels ? simplify_levels(&hierarchy, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory");
     }
     if (!status) {

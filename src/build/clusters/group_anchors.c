@@ -1,4 +1,4 @@
-/* `--certify` at a group: what its members stand for, and what they claim. */
+/* Certificates of a group: what its members stand for, and what they claim. */
 #include <math.h>
 
 #include "base/fail.h"

@@ -47,7 +47,7 @@ typedef struct strl_level {
     uint32_t group_count;
     strl_spill *payloads;
     strl_spill *meshes;     /* base meshes; deleted when the next level is done */
-    strl_spill *anchors;    /* the same of anchors; NULL without certificates */
+    strl_spill *anchors;    /* the same of anchors; NULL where there are none */
 } strl_level;
 
 /* How many points two nodes of the next level share: counted while a level is made. */

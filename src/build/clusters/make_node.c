@@ -196,7 +196,7 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
         goto done;
     }
-    if (hierarchy->context->desc->certify)
+    if (hierarchy->anchor_plan.is_on)
         status = pass_anchors(hierarchy, anchors, &base.mesh, &certificate, made, err);
     if (!status)
         status = strl_node_mesh_write(&base, made->state.needs_payload ? &decoded : NULL, arena, &made->mesh, err);
