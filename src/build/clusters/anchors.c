@@ -21,7 +21,7 @@
 void strl_anchor_plan_begin(strl_anchor_plan *plan, uint32_t depth, bool certify)
 {
     uint32_t early = depth / 4 < LATEST_FIRST ? depth / 4 : LATEST_FIRST;
-    uint32_t late = depth > 2 * FEW_LEVELS ? depth - FEW_LEVELS : depth / 2;
+    uint32_t late = depth > FEW_LEVELS ? depth - FEW_LEVELS : depth / 2;
     *plan = (strl_anchor_plan){.first = certify && early < late ? early : late};
 }
 
