@@ -11,6 +11,7 @@
 #define WIDER_MAX 256u   /* the same where that was not enough */
 #define FEW_PIECES 64u    /* more than this are not all looked at for one triangle */
 #define FIRST_REACH 1.5   /* of the distance of a piece's middle: what lies so near is looked at */
+#define FARTHEST 0x1p34   /* lattice units: nothing is farther apart */
 #define QUARTERINGS 2u
 #define LEAST_REACH 0.03125 /* of the bound that is good enough */
 #define REACH_GROWTH 5.6
@@ -367,6 +368,11 @@ static double measure_wider(tracker *t, const strl_facet *piece, double enough)
     strl_facet_normal(piece, along);
     for (double share = LEAST_REACH; share <= 1 && bound > enough; share *= REACH_GROWTH) {
         t->around_count = strl_near_list(&t->tree, piece, share * enough, t->around, WIDER_MAX);
+        take_around(t, along);
+        bound = measure_piece(t, piece, enough);
+    }
+    for (double reach = fmax(enough, 1); isinf(bound) && reach < FARTHEST; reach *= 2) {
+        t->around_count = strl_near_list(&t->tree, piece, reach, t->around, WIDER_MAX);
         take_around(t, along);
         bound = measure_piece(t, piece, enough);
     }

@@ -4,6 +4,9 @@
 #include "base/fail.h"
 #include "build/clusters/hierarchy.h"
 
+/* Of what children claim: a piece that reaches beyond its member's boundary by so little may be measured there. */
+#define TOLERANCE 0.5
+
 static strl_status read_anchors(const strl_level *children, uint32_t index, const int64_t origin[3], const int64_t anchor[3],
                                 bool promotes, strl_arena *arena, strl_anchors *all, strl_error *err)
 {
@@ -29,7 +32,7 @@ strl_status strl_group_anchors(const strl_level *children, const uint32_t *membe
         uint32_t child = 2 * member[i / 2] + (i & 1);
         status = read_anchors(children, child, merged->anchor, children->nodes[child].record.anchor, promotes, arena,
                               count == 1 ? &shares[0] : &own[i / 2], err);
-        claimed += children->nodes[child].claims.most / (2. * count);
+        claimed += children->nodes[child].claims.most * TOLERANCE / (2. * count);
     }
     if (!status && count > 1)
         status = strl_anchors_divide(&merged->mesh, owner, count, claimed, own, arena, shares, err);

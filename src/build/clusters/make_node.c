@@ -128,7 +128,8 @@ static void lower_errors(const strl_certificate *certificate, strl_pm *pm)
 {
     for (uint32_t i = 0; i <= pm->step_count; i++) {
         float *error = &pm->geometric_error[pm->step_count - i];
-        *error = fmaxf(certificate->down[i], fminf(certificate->up[i], *error));
+        if (isfinite(certificate->down[i]))
+            *error = fmaxf(certificate->down[i], fminf(certificate->up[i], *error));
     }
 }
 
