@@ -26,7 +26,7 @@ typedef struct link {
 typedef struct tracker {
     const strl_mesh *mesh;
     strl_facet *piece;        /* [piece_count] */
-    uint32_t piece_count;
+    uint32_t own_count, piece_count; /* own ones come first */
     strl_near tree, piece_tree; /* over facet, as it was and as it is now, and over piece */
     uint32_t (*point)[3];     /* per triangle */
     bool *gone;               /* per triangle */
@@ -41,7 +41,7 @@ typedef struct tracker {
     uint32_t *stamp, *piece_stamp, tick; /* per triangle, per piece */
     double most_up, most_down;
     uint32_t near[STRL_COVER_MAX];
-    uint32_t *found;          /* [piece_count] gathered pieces */
+    uint32_t *found;          /* [own_count] gathered pieces */
     uint32_t found_count;
     uint32_t *star;           /* [triangle_count] triangles that a collapse changed */
     uint32_t star_count;
@@ -260,9 +260,9 @@ static bool plant(strl_near *tree, const strl_facet *facet, uint32_t count, strl
 static bool prepare_pieces(tracker *t, const strl_piece *pieces, strl_arena *arena)
 {
     t->piece = strl_arena_alloc(arena, t->piece_count, sizeof *t->piece);
-    t->down = strl_arena_alloc(arena, t->piece_count, sizeof *t->down);
-    t->piece_stamp = strl_arena_alloc_zero(arena, t->piece_count, sizeof *t->piece_stamp);
-    t->found = strl_arena_alloc(arena, t->piece_count, sizeof *t->found);
+    t->down = strl_arena_alloc(arena, t->own_count, sizeof *t->down);
+    t->piece_stamp = strl_arena_alloc_zero(arena, t->own_count, sizeof *t->piece_stamp);
+    t->found = strl_arena_alloc(arena, t->own_count, sizeof *t->found);
     if (!t->piece || !t->down || !t->piece_stamp || !t->found)
         return false;
     for (uint32_t i = 0; i < t->piece_count; i++)
@@ -326,7 +326,7 @@ static bool measure_start(tracker *t)
 {
     bool good = true;
     t->around[0] = t->found_count = 0;
-    for (uint32_t i = 0; good && i < t->piece_count; i++)
+    for (uint32_t i = 0; good && i < t->own_count; i++)
         good = measure_first(t, i);
     for (uint32_t i = 0; good && i < t->mesh->triangle_count; i++)
         measure_up(t, i);
@@ -429,12 +429,13 @@ static void conclude(const tracker *t, double rounding, strl_certificate *certif
 {
     uint32_t to = 0;
     for (uint32_t i = 0; i < t->mesh->triangle_count; i++) {
-        float most = t->up[i];
+        float most = 0;
         if (t->gone[i])
             continue;
         for (uint32_t at = t->first_link[i]; at != NO_INDEX; at = t->links[at].next)
             most = fmaxf(most, t->down[t->links[at].piece]);
-        certificate->triangle[to++] = rounded_up(most, rounding);
+        certificate->triangle_up[to] = rounded_up(t->up[i], rounding);
+        certificate->triangle_down[to++] = rounded_up(most, rounding);
     }
 }
 
@@ -455,20 +456,21 @@ static bool track(tracker *t, const strl_simplified *simplified, double rounding
     return true;
 }
 
-strl_status strl_certify(const strl_mesh *mesh, const strl_simplified *simplified, const strl_piece *pieces, uint32_t piece_count,
-                         strl_arena *arena, strl_certificate *certificate, strl_error *err)
+strl_status strl_certify(const strl_mesh *mesh, const strl_simplified *simplified, const strl_older *older, strl_arena *arena,
+                         strl_certificate *certificate, strl_error *err)
 {
     size_t states = (size_t)simplified->collapse_count + 1;
     certificate->down = strl_arena_alloc(arena, states, sizeof(float));
     certificate->up = strl_arena_alloc(arena, states, sizeof(float));
-    certificate->triangle = strl_arena_alloc(arena, simplified->triangles_left, sizeof(float));
+    certificate->triangle_down = strl_arena_alloc(arena, simplified->triangles_left, sizeof(float));
+    certificate->triangle_up = strl_arena_alloc(arena, simplified->triangles_left, sizeof(float));
     strl_arena_mark mark = strl_arena_get_mark(arena);
-    tracker *t = strl_arena_alloc_zero(arena, 1, sizeof *t);
-    bool good = certificate->down && certificate->up && certificate->triangle && t;
+    tracker *t = strl_arena_alloc(arena, 1, sizeof *t);
+    bool good = certificate->down && certificate->up && certificate->triangle_down && certificate->triangle_up && t;
     if (good) {
-        *t = (tracker){.mesh = mesh, .piece_count = piece_count};
-        good = prepare(t, mesh, arena) && prepare_pieces(t, pieces, arena) &&
-               track(t, simplified, rounding_of(mesh, pieces, piece_count), certificate);
+        *t = (tracker){.mesh = mesh, .own_count = older->own, .piece_count = older->count};
+        good = prepare(t, mesh, arena) && prepare_pieces(t, older->piece, arena) &&
+               track(t, simplified, rounding_of(mesh, older->piece, older->count), certificate);
         strl__free(t->links);
     }
     strl_arena_rewind(arena, mark);

@@ -20,13 +20,20 @@ typedef struct strl_piece {
 typedef struct strl_certificate {
     float *down;     /* [collapse_count + 1] after so many collapses: how far what the pieces stand for is from the mesh */
     float *up;       /* [collapse_count + 1] how far the mesh is from what the pieces stand for */
-    float *triangle; /* [triangles_left] at the end, in their old order: both, of this piece of surface */
+    /* [triangles_left] at the end, in their old order: the same of what lies over each triangle, and of the triangle */
+    float *triangle_down, *triangle_up;
 } strl_certificate;
+
+/* The older surface near the mesh. */
+typedef struct strl_older {
+    const strl_piece *piece; /* [count] those before `own` are what the mesh stands for; the others only show how far it is from them */
+    uint32_t own, count;
+} strl_older;
 
 void strl_piece_facet(const strl_piece *piece, strl_facet *facet);
 
 /* Neither down nor up ever decreases; INFINITY = nothing is known. Arrays live in the arena. */
-strl_status strl_certify(const strl_mesh *mesh, const strl_simplified *simplified, const strl_piece *pieces, uint32_t piece_count,
-                         strl_arena *arena, strl_certificate *certificate, strl_error *err);
+strl_status strl_certify(const strl_mesh *mesh, const strl_simplified *simplified, const strl_older *older, strl_arena *arena,
+                         strl_certificate *certificate, strl_error *err);
 
 #endif

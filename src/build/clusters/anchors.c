@@ -44,6 +44,7 @@ void strl_anchors_deinit(strl_anchors *anchors)
 {
     strl__free(anchors->used.item);
     strl__free(anchors->young.item);
+    strl__free(anchors->beside.item);
     *anchors = (strl_anchors){0};
 }
 
@@ -93,18 +94,60 @@ strl_status strl_anchors_read(const void *data, size_t size, const int64_t moved
     return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu bytes of anchors", size);
 }
 
-bool strl_anchors_bear(const strl_mesh *base, const float *certified, strl_pieces *young)
+bool strl_anchors_bear(const strl_mesh *base, const strl_certificate *certificate, strl_pieces *young)
 {
     for (uint32_t t = 0; t < base->triangle_count; t++) {
         strl_piece piece = {.claim = strl_mesh_error(base, strl_drift_length(&base->drift[t]))};
-        if (certified)
-            piece.claim = certified[t];
+        if (certificate && isfinite(certificate->triangle_down[t]))
+            piece.claim = fmaxf(certificate->triangle_down[t], fminf(certificate->triangle_up[t], piece.claim));
         for (unsigned c = 0; c < 3; c++)
             memcpy(piece.corner[c], base->position[base->wedge[base->triangle[t][c]].point], sizeof piece.corner[c]);
         if (!add_piece(young, &piece))
             return false;
     }
     return true;
+}
+
+/* ---- beside ---- */
+
+typedef struct extent {
+    double least[3], most[3];
+} extent;
+
+static void include_piece(extent *e, const strl_piece *piece)
+{
+    for (unsigned i = 0; i < 9; i++) {
+        double x = piece->corner[i / 3][i % 3];
+        e->least[i % 3] = fmin(e->least[i % 3], x);
+        e->most[i % 3] = fmax(e->most[i % 3], x);
+    }
+}
+
+static const extent nothing = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+
+static bool lies_near(const extent *e, const strl_piece *piece, double reach)
+{
+    extent own = nothing;
+    include_piece(&own, piece);
+    bool near = true;
+    for (unsigned k = 0; k < 3; k++)
+        near &= own.least[k] <= e->most[k] + reach && own.most[k] >= e->least[k] - reach;
+    return near;
+}
+
+bool strl_anchors_find_beside(strl_anchors *shares, uint32_t members, double reach)
+{
+    bool good = true;
+    for (uint32_t m = 0; m < members; m++) {
+        extent e = nothing;
+        for (uint32_t i = 0; i < shares[m].used.count; i++)
+            include_piece(&e, &shares[m].used.item[i]);
+        for (uint32_t other = 0; other < members; other++)
+            for (uint32_t i = 0; other != m && i < shares[other].used.count && good; i++)
+                if (lies_near(&e, &shares[other].used.item[i], reach))
+                    good = add_piece(&shares[m].beside, &shares[other].used.item[i]);
+    }
+    return good;
 }
 
 /* ---- dividing among members ---- */

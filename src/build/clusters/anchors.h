@@ -22,6 +22,7 @@ typedef struct strl_pieces {
 /* Two generations: what nodes are measured against, and what will be. */
 typedef struct strl_anchors {
     strl_pieces used, young;
+    strl_pieces beside; /* used ones of other members of the group, near this one: not written */
 } strl_anchors;
 
 /* What happens at the level being made. */
@@ -45,8 +46,10 @@ void strl_anchors_write(const strl_anchors *anchors, strl_writer *writer);
 /* Appends the pieces of a node; moved: what is to be added to their positions. */
 strl_status strl_anchors_read(const void *data, size_t size, const int64_t moved[3], bool promotes, strl_anchors *anchors,
                               strl_error *err);
-/* The triangles of a base mesh as young anchors. certified: per triangle; NULL = by their drifts. */
-bool strl_anchors_bear(const strl_mesh *base, const float *certified, strl_pieces *young);
+/* The triangles of a base mesh as young anchors. certificate: NULL = by their drifts. */
+bool strl_anchors_bear(const strl_mesh *base, const strl_certificate *certificate, strl_pieces *young);
+/* Fills `beside` of all members. */
+bool strl_anchors_find_beside(strl_anchors *shares, uint32_t members, double reach);
 /* Divides what a group's members (at most 8) stood for as children among them, as their boundaries are now: own[i] becomes shares[i] as far
  * as it lies over triangles of member i (owner: of mesh's triangles), or reaches beyond them by no more than `tolerance`. */
 strl_status strl_anchors_divide(const strl_mesh *mesh, const uint32_t *owner, uint32_t members, double tolerance, const strl_anchors *own,

@@ -36,6 +36,8 @@ strl_status strl_group_anchors(const strl_level *children, const uint32_t *membe
     }
     if (!status && count > 1)
         status = strl_anchors_divide(&merged->mesh, owner, count, claimed, own, arena, shares, err);
+    if (!status && !strl_anchors_find_beside(shares, count, claimed))
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the anchors of a group");
     for (uint32_t m = 0; m < count; m++)
         strl_anchors_deinit(&own[m]);
     return status;

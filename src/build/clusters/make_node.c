@@ -133,14 +133,17 @@ static void lower_errors(const strl_certificate *certificate, strl_pm *pm)
     }
 }
 
-static strl_status certify(const strl_hierarchy *hierarchy, const strl_node_mesh *node, const strl_anchors *anchors,
-                           const strl_simplified *simplified, strl_arena *arena, strl_certificate *certificate, strl_pm *pm,
-                           strl_error *err)
+static strl_status certify(const strl_node_mesh *node, const strl_anchors *anchors, const strl_simplified *simplified,
+                           strl_arena *arena, strl_certificate *certificate, strl_pm *pm, strl_error *err)
 {
-    certificate->triangle = NULL;
-    if (!hierarchy->anchor_plan.has_used || !anchors || anchors->used.count == 0)
-        return STRL_OK;
-    strl_status status = strl_certify(&node->mesh, simplified, anchors->used.item, anchors->used.count, arena, certificate, err);
+    uint32_t own = anchors->used.count, beside = anchors->beside.count;
+    strl_piece *piece = strl_arena_alloc(arena, (size_t)own + beside, sizeof *piece);
+    if (!piece)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for the anchors of a node");
+    memcpy(piece, anchors->used.item, own * sizeof *piece);
+    if (beside)
+        memcpy(piece + own, anchors->beside.item, beside * sizeof *piece);
+    strl_status status = strl_certify(&node->mesh, simplified, &(strl_older){piece, own, own + beside}, arena, certificate, err);
     if (!status)
         lower_errors(certificate, pm);
     return status;
@@ -152,7 +155,7 @@ static strl_status pass_anchors(const strl_hierarchy *hierarchy, const strl_anch
 {
     strl_pieces born = {0};
     strl_anchors passed = anchors ? *anchors : (strl_anchors){0};
-    bool good = !hierarchy->anchor_plan.bears || strl_anchors_bear(base, certificate->triangle, &born);
+    bool good = !hierarchy->anchor_plan.bears || strl_anchors_bear(base, certificate, &born);
     if (hierarchy->anchor_plan.bears)
         passed.young = born;
     if (good)
@@ -176,10 +179,11 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
                                    : strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
     if (!status)
         status = strl_pm_record(&node->mesh, &simplified, ingest->palette, (uint32_t)ingest->palette_count, arena, &pm, err);
-    if (!status) {
+    if (!status)
         fill_record(&made->state.record, node, &simplified, &pm);
-        status = certify(hierarchy, node, anchors, &simplified, arena, &certificate, &pm, err);
-    }
+    bool is_certified = hierarchy->anchor_plan.has_used && anchors && anchors->used.count > 0;
+    if (!status && is_certified)
+        status = certify(node, anchors, &simplified, arena, &certificate, &pm, err);
     if (!status)
         status = strl_payload_encode(&pm, arena, &made->payload, err);
     if (!status)
@@ -198,7 +202,7 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
         goto done;
     }
     if (hierarchy->anchor_plan.is_on)
-        status = pass_anchors(hierarchy, anchors, &base.mesh, &certificate, made, err);
+        status = pass_anchors(hierarchy, anchors, &base.mesh, is_certified ? &certificate : NULL, made, err);
     if (!status)
         status = strl_node_mesh_write(&base, made->state.needs_payload ? &decoded : NULL, arena, &made->mesh, err);
 done:
