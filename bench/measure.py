@@ -4,8 +4,10 @@ import json
 import os
 import pathlib
 import platform
+import resource
 import statistics
 import subprocess
+import threading
 import time
 
 
@@ -58,6 +60,7 @@ class Outcome:
         self.status, self.output, self.errors, self.seconds = status, output, errors.strip(), seconds
         self.cpu_seconds = usage.ru_utime + usage.ru_stime
         self.peak_rss_bytes = usage.ru_maxrss * 1024
+        self.disk_read_bytes = usage.ru_inblock * 512
 
     def json(self):
         try:
@@ -66,11 +69,18 @@ class Outcome:
             raise Failed(f"the program printed no JSON object ({error}): {self.output[:200]!r} {self.errors[:200]}")
 
 
-def run(command, cores=None, allowed=(0,)):
-    """Runs a command on the first `cores` processors (None = all). Raises Failed at any exit status not allowed."""
+def run(command, cores=None, allowed=(0,), limits=None):
+    """Runs a command on the first `cores` processors (None = all), under the system's `limits` (a dict from
+    resource.RLIMIT_... to a number). Raises Failed at any exit status not allowed; None allows all."""
     words = [str(word) for word in command]
     processors = sorted(os.sched_getaffinity(0))
-    confine = (lambda: os.sched_setaffinity(0, processors[:cores])) if cores else None
+
+    def confine():
+        if cores:
+            os.sched_setaffinity(0, processors[:cores])
+        for limit, value in (limits or {}).items():
+            resource.setrlimit(limit, (value, value))
+
     output_file, error_file = os.memfd_create("output"), os.memfd_create("errors")
     start = time.monotonic()
     process = subprocess.Popen(words, stdout=output_file, stderr=error_file, preexec_fn=confine)
@@ -83,9 +93,43 @@ def run(command, cores=None, allowed=(0,)):
         with os.fdopen(handle, "r", encoding="utf-8", errors="replace") as file:
             texts.append(file.read())
     outcome = Outcome(process.returncode, texts[0], texts[1], seconds, usage)
-    if outcome.status not in allowed:
+    if allowed is not None and outcome.status not in allowed:
         raise Failed(f"{' '.join(words)} ended with {outcome.status}: {outcome.errors[:500]}")
     return outcome
+
+
+class DiskWatch:
+    """The most bytes that the files of a folder took while it was watched; an unfinished output (*.part) is no scratch."""
+
+    def __init__(self, folder):
+        self.folder, self.most_bytes, self.stop = folder, 0, threading.Event()
+        self.thread = threading.Thread(target=self.watch, daemon=True)
+
+    def watch(self):
+        while not self.stop.wait(0.05):
+            taken = 0
+            try:
+                for entry in os.scandir(self.folder):
+                    if not entry.name.endswith(".part"):
+                        taken += entry.stat().st_blocks * 512
+            except OSError:
+                continue
+            self.most_bytes = max(self.most_bytes, taken)
+
+    def __enter__(self):
+        self.thread.start()
+        return self
+
+    def __exit__(self, *_):
+        self.stop.set()
+        self.thread.join()
+
+
+def forget_pages(path):
+    """The system keeps nothing of the file in memory: who reads it next waits for the disk."""
+    with open(path, "rb") as file:
+        os.fsync(file.fileno())
+        os.posix_fadvise(file.fileno(), 0, 0, os.POSIX_FADV_DONTNEED)
 
 
 def read_lines(path):

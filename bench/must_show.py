@@ -3,8 +3,9 @@
 
     bench/must_show.py --data DIR [--models a,b] [--parts build,images,...] [--frames N] [--again] [--write-docs]
 
-A model is a file of DIR (NAME.ply, .stl, .obj, or those with .zst) or isosurface_N (isosurface_10m), which is generated.
---models replaces each part's own models. Parts:
+A model is a file of DIR (NAME.ply, .stl, .obj, or those with .zst) or isosurface_N or boxes_N (isosurface_10m), which is
+generated, with _shuffled behind it in a random order, with _stl behind that as STL. --models replaces each part's own
+models. Parts:
 
     build         one build under --memory 1G: counts, bytes per triangle, peak memory, root      (all models)
     images        orbit and fly-through against the input as read: coverage, depth; sheets        (all models)
@@ -16,6 +17,13 @@ A model is a file of DIR (NAME.ply, .stl, .obj, or those with .zst) or isosurfac
     dependencies  with and without: locked vertices per level, triangles drawn at one pixel       (isosurface_10m)
     walk          select_ms and frame_ms of all models on one smooth path                         (isosurface_1m, _10m)
     roots         builds every PLY, STL and OBJ file of DIR: the root's size                      (all files)
+    scale         builds of one surface of ever more triangles, under --memory 1G           (isosurface_1m to _372m)
+    shapes        builds of other kinds of models, against the first one's rate      (isosurface_10m, shuffled, STL, boxes, scans)
+    cap           a build under the system's own limit, which ends a program that passes it       (isosurface_10m)
+    walk_cold     a walk under --memory 600M, the file cold and warm                   (isosurface_10m, isosurface_372m)
+
+The largest scene takes 9 GB of --scratch, its build 30 GB more. Parts scale, shapes and walk_cold delete the scenes that
+they have made (--keep leaves them).
 
 Each record goes at once to --log (JSON lines). What is there of the same program with the same settings is kept, so a
 run that was stopped goes on; --again measures anew. --write-docs rewrites the tables of docs/benchmarks.md from the log
@@ -32,6 +40,7 @@ import time
 
 import counts
 import measure
+import scale_parts
 import sheets
 import tables
 
@@ -39,7 +48,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 MODELS = ("terrain_n49e011", "dragon_scans", "iso_engine", "motorBike", "turbineblade", "isosurface_10m")
 PATHS = ("orbit", "flythrough")
 SUFFIXES = (".ply", ".stl", ".obj")
-SCENE = re.compile(r"isosurface_(\d+)([km]?)")
+SCENE = re.compile(r"(isosurface|boxes)_(\d+)([km]?)(_shuffled)?(_stl)?")
 BACKEND_FRAMES = 8
 WALK_FRAMES_A_FRAME = 5  # 300 where the others have 60: a smooth path
 
@@ -63,11 +72,11 @@ class Bench:
     def input_of(self, model):
         """The model's file, generated or unpacked where it must be."""
         if scene_triangles(model):
-            path = self.scratch / f"{model}.ply"
+            path = self.scene_path(model)
             if not self.is_fresh(path):
-                partial = path.with_suffix(".part.ply")
-                self.program("scene", "isosurface", "--triangles", scene_triangles(model), "--seed", 1, "-o", partial)
-                partial.rename(path)
+                name, shuffled = SCENE.fullmatch(model).group(1, 4)
+                self.program("scene", name, "--triangles", scene_triangles(model), "--seed", 1, "-o", path,
+                             *(["--shuffle"] if shuffled else []))
             return path
         for path in sorted(self.data.rglob(f"{model}.*")):
             if path.suffix in SUFFIXES:
@@ -78,6 +87,19 @@ class Bench:
                     measure.run(["zstd", "-q", "-d", path, "-o", unpacked])
                 return unpacked
         raise measure.Failed(f"{self.data} holds no {model}.ply, .stl or .obj")
+
+    def triangles_of(self, model):
+        """As asked for, of a scene; 0 of a file."""
+        return scene_triangles(model)
+
+    def scene_path(self, model):
+        return self.scratch / f"{model}.{'stl' if SCENE.fullmatch(model)[5] else 'ply'}"
+
+    def forget_scenes(self, models):
+        """Those that anybody can generate again."""
+        for model in () if self.options.keep else models:
+            if scene_triangles(model):
+                self.scene_path(model).unlink(missing_ok=True)
 
     def is_fresh(self, path):
         """Made by the program as it is now."""
@@ -97,15 +119,18 @@ class Bench:
                                "-o", target, "--stats", stats, *options)
         return measure.read_lines(stats), outcome.seconds
 
+    def write_spiral(self, path, model, frames):
+        write_spiral(path, self.program("info", self.container_of(model), "--json").json()["bounds"], frames)
+
     def drop(self, *folders):
         for folder in () if self.options.keep else folders:
             shutil.rmtree(folder)
 
 
 def scene_triangles(model):
-    """How many triangles isosurface_N has; 0 = it is a file."""
+    """How many triangles isosurface_N or boxes_N has; 0 = it is a file."""
     match = SCENE.fullmatch(model)
-    return int(match[1]) * {"": 1, "k": 10**3, "m": 10**6}[match[2]] if match else 0
+    return int(match[2]) * {"": 1, "k": 10**3, "m": 10**6}[match[3]] if match else 0
 
 
 def part_build(bench, model):
@@ -262,8 +287,7 @@ def part_walk(bench, models):
     if all([bench.kept("walk", model, settings) for model in models]):
         return
     path, stats = bench.scratch / "spiral.json", bench.scratch / "walk.jsonl"
-    bounds = bench.program("info", bench.container_of(models[-1]), "--json").json()["bounds"]
-    write_spiral(path, bounds, settings["frames"])
+    bench.write_spiral(path, models[-1], settings["frames"])
     frames = {model: [] for model in models}
     for _ in range(3):
         for model in models:
@@ -292,14 +316,15 @@ PARTS = {"build": (part_build, MODELS), "images": (part_images, MODELS), "psnr":
          "verify": (part_verify, MODELS), "backends": (part_backends, ("dragon_scans", "isosurface_1m")),
          "rate": (part_rate, ("isosurface_10m",)), "bytes": (part_bytes, ("isosurface_1m",)),
          "dependencies": (part_dependencies, ("isosurface_10m",)),
-         "walk": (part_walk, (("isosurface_1m", "isosurface_10m"),)), "roots": (part_roots, ("",))}
+         "walk": (part_walk, (("isosurface_1m", "isosurface_10m"),)), "roots": (part_roots, ("",)), **scale_parts.PARTS}
 
 
 def models_of(part, chosen):
+    """A part that compares its models is given all of them at once."""
     own = PARTS[part][1]
     if not chosen or part == "roots":
         return own
-    return (tuple(chosen),) if part == "walk" else chosen
+    return (tuple(chosen),) if isinstance(own[0], tuple) else chosen
 
 
 def run_parts(bench, parts, chosen):
@@ -319,9 +344,10 @@ def run_parts(bench, parts, chosen):
 def put_counts(bench, table):
     """What no clock changes, of the program as it is."""
     for (name, model), record in bench.log.latest().items():
-        if name in ("build", "root") and record["report"] and bench.log.is_current(record):
-            triangles = scene_triangles(model)
-            key = ("isosurface", triangles, 1) if triangles else (model, "", "")
+        if name in ("build", "root", "scale", "shapes") and record["report"] and bench.log.is_current(record):
+            scene = SCENE.fullmatch(model)
+            is_plain = scene and not scene[4] and not scene[5]
+            key = (scene[1], scene_triangles(model), 1) if is_plain else (model, "", "")
             counts.put_row(counts.row_of(*key, record["report"]), table)
 
 
@@ -341,8 +367,10 @@ def parse_options():
     parser.add_argument("--psnr-frames", type=int, default=0, help="of each path of part psnr (as --frames)")
     parser.add_argument("--size", default="1280x720", help="of images (1280x720)")
     parser.add_argument("--pairs", type=int, default=5, help="of builds in part rate (5)")
+    parser.add_argument("--runs", type=int, default=3,
+                        help="builds of each model in parts scale and shapes; one of what is over 20 M triangles (3)")
     parser.add_argument("--again", action="store_true", help="measure what the log has already")
-    parser.add_argument("--keep", action="store_true", help="keep the frames")
+    parser.add_argument("--keep", action="store_true", help="keep the frames, and the scenes that parts delete")
     parser.add_argument("--write-docs", action="store_true", help="rewrite the tables and the counts from the log")
     parser.add_argument("--docs", type=pathlib.Path, default=ROOT / "docs" / "benchmarks.md")
     parser.add_argument("--counts", type=pathlib.Path, default=counts.TABLE)

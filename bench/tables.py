@@ -124,6 +124,78 @@ def root_rows(records):
                number(root <= MOST_ROOT_TRIANGLES) if record["holds"] else record["said"])
 
 
+def least_to_most(figures, digits=1):
+    least, most = (number(figures[name], digits) for name in ("min", "max"))
+    return number(figures["median"], digits) + (f" ({least} to {most})" if figures["count"] > 1 else "")
+
+
+def rate_of(record, name):
+    """Million triangles a second."""
+    return record["report"]["triangles_in"] / record[name]["median"] * 1e-6
+
+
+def scale_rows(records):
+    for record in sorted(records_of(records, "scale"), key=lambda record: record["report"]["triangles_in"]):
+        triangles = record["report"]["triangles_in"]
+        yield (record["model"], number(triangles), least_to_most(record["seconds"]), least_to_most(record["cpu_seconds"]),
+               number(rate_of(record, "seconds"), 3), number(rate_of(record, "cpu_seconds"), 3),
+               mebibytes(record["system_peak_rss_bytes"]), number(record["system_peak_rss_bytes"] <= record["memory_bytes"]),
+               mebibytes(record["scratch_bytes"]), number(record["scratch_bytes"] / triangles, 1),
+               number(record["bytes_per_triangle"]))
+
+
+def shape_limit(model):
+    return 2.0 if model.endswith(("_shuffled", "_stl")) else 1.5
+
+
+def shape_rows(records):
+    of = {record["model"]: record for record in records_of(records, "shapes")}
+    for model in next(iter(of.values()))["settings"]["models"] if of else ():
+        record, base = of.get(model), of.get(next(iter(of.values()))["settings"]["models"][0])
+        if not record or not base:
+            continue
+        ratios = [rate_of(base, name) / rate_of(record, name) for name in ("seconds", "cpu_seconds")]
+        yield (model, number(record["report"]["triangles_in"]), least_to_most(record["seconds"]),
+               least_to_most(record["cpu_seconds"]), number(rate_of(record, "cpu_seconds"), 3),
+               number(ratios[0]), number(ratios[1]), number(max(ratios) <= shape_limit(model)) + f" ({shape_limit(model)})",
+               mebibytes(record["system_peak_rss_bytes"]), number(record["scratch_bytes"] / record["report"]["triangles_in"], 1),
+               number(record["bytes_per_triangle"]))
+
+
+def cap_rows(records):
+    for record in records_of(records, "cap"):
+        for row in record["rows"]:
+            yield (record["model"], row["memory"], mebibytes(row["data_limit_bytes"]), mebibytes(row["address_limit_bytes"]),
+                   "yes" if row["holds"] else row["said"], mebibytes(row["system_peak_rss_bytes"]) if row["holds"] else "NO",
+                   number(row["seconds"], 1) if row["holds"] else "NO", number(record["quarter_status"] != 0))
+
+
+def cold_rows(records):
+    for record in records_of(records, "walk_cold"):
+        for state in ("cold", "warm"):
+            walk = record[state]
+            yield (record["model"], state, walk["frame_ms"]["count"], number(walk["frame_ms"]["median"], 1),
+                   number(walk["frame_ms"]["p99"], 1), number(walk["select_ms"]["median"], 3),
+                   number(walk["select_ms"]["p99"], 3), number(int(walk["triangles"]["median"])),
+                   number(int(walk["missing_nodes"]["p99"])), mebibytes(walk["resident_bytes"]["max"]),
+                   mebibytes(walk["gpu_bytes"]["max"]), walk["frames_over_budget"], walk["frames_waiting_for_disk"],
+                   mebibytes(walk["disk_read_bytes"]), mebibytes(walk["system_peak_rss_bytes"]))
+
+
+def scale_lines(records):
+    """How much the largest model costs more than the smallest, and its walk than the smaller one's."""
+    sizes = sorted(records_of(records, "scale"), key=lambda record: record["report"]["triangles_in"])
+    if len(sizes) > 1:
+        growth = rate_of(sizes[0], "cpu_seconds") / rate_of(sizes[-1], "cpu_seconds")
+        yield f"CPU time a triangle from {sizes[0]['model']} to {sizes[-1]['model']}: x {number(growth)} (asked: less than 1.5)."
+    for record in records_of(records, "walk_cold"):
+        first = records.get(("walk_cold", record["settings"]["models"][0]))
+        if first and record["model"] == record["settings"]["models"][-1] != first["model"]:
+            ratios = ", ".join(f"{name} x {number(record[state][name]['median'] / max(1e-9, first[state][name]['median']))} {state}"
+                               for state in ("cold", "warm") for name in ("frame_ms", "triangles"))
+            yield f"Frame work from {first['model']} to {record['model']} on one path: {ratios} (asked: at most 1.5)."
+
+
 def growth_lines(records):
     for record in records_of(records, "walk"):
         first, last = record["settings"]["models"][0], record["settings"]["models"][-1]
@@ -133,7 +205,7 @@ def growth_lines(records):
 
 
 def closing_lines(records):
-    lines = list(growth_lines(records))
+    lines = list(growth_lines(records)) + list(scale_lines(records))
     for record in records_of(records, "bytes"):
         jobs = ", ".join(str(jobs) for jobs in record["digests"])
         lines.append(f"Same bytes for `--jobs` {jobs} ({record['model']}, `--parts bytes`, commit {record['commit']}): "
@@ -189,6 +261,20 @@ TABLES = (
     ("dependencies", "Dependencies: triangles drawn at one pixel, median of the path",
      ("model", "path", "with", "without", "without over with"), drawn_rows),
     ("walk", "A walk on one smooth path", ("model", "figure", "median", "lower quartile", "upper quartile", "p99"), walk_rows),
+    ("scale", "Builds of ever larger models, `--memory 1G`",
+     ("model", "triangles in", "seconds (least to most)", "CPU seconds", "M triangles/s", "M triangles per CPU second",
+      "peak memory", "within 1 GiB", "peak scratch", "scratch bytes per triangle", "bytes per triangle"), scale_rows),
+    ("shapes", "Builds of other kinds of models, `--memory 1G`",
+     ("model", "triangles in", "seconds (least to most)", "CPU seconds", "M triangles per CPU second",
+      "time a triangle over the first model's", "CPU time a triangle over it", "within (limit)", "peak memory",
+      "scratch bytes per triangle", "bytes per triangle"), shape_rows),
+    ("cap", "Builds under the system's own limit",
+     ("model", "`--memory`", "RLIMIT_DATA", "RLIMIT_AS", "built", "peak memory", "seconds",
+      "a quarter of the memory ends it"), cap_rows),
+    ("walk_cold", "A walk under `--memory 600M`, cold and warm",
+     ("model", "file", "frames", "frame_ms, median", "p99", "select_ms, median", "p99", "triangles, median",
+      "missing nodes, p99", "resident, most", "GPU, most", "frames over a budget", "frames that waited for the disk",
+      "read from disk", "peak memory"), cold_rows),
     ("roots", "Roots", ("file", "triangles in", "root triangles", f"at most {MOST_ROOT_TRIANGLES:,}"), root_rows),
 )
 

@@ -91,9 +91,9 @@ strl_status strl__scene_boxes(strl__scene_run *run, strl_error *err)
             box_frame frame = random_box(run->desc->seed, first + i, spacing);
             put_box(&frame, positions + i * CORNERS * 3, (uint32_t)((first + i) * CORNERS), corners + i * FACES * 3);
         }
-        strl_status status = strl__ply_vertices(run->writer, positions, count * CORNERS, err);
+        strl_status status = strl__scene_mesh_vertices(run->writer, positions, count * CORNERS, err);
         if (status == STRL_OK)
-            status = strl__ply_triangles(run->writer, corners, count * FACES, err);
+            status = strl__scene_mesh_triangles(run->writer, corners, count * FACES, err);
         if (status == STRL_OK)
             status = strl__scene_report(run, "placing", first + count, boxes, err);
         if (status != STRL_OK)

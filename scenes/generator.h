@@ -2,7 +2,7 @@
 #ifndef STRL_SCENES_GENERATOR_H
 #define STRL_SCENES_GENERATOR_H
 
-#include "scenes/ply_writer.h"
+#include "scenes/scene_mesh.h"
 #include "scenes/scene.h"
 #include "scenes/tile.h"
 
@@ -10,7 +10,7 @@
 typedef struct strl__scene_run {
     const strl_scene_desc *desc;
     const strl_scene_progress *progress;
-    strl__ply_writer *writer;
+    strl__scene_mesh *writer;
 } strl__scene_run;
 
 /* Reports progress; STRL_ERR_CANCELLED where the caller wants to stop. */

@@ -78,13 +78,14 @@ static strl_status write_tile(void *context, uint64_t index, unsigned slot, unsi
     (void)worker;
     extraction_run *run = context;
     strl__tile_mesh *mesh = &run->meshes[slot];
-    strl__ply_writer *writer = run->scene->writer;
+    strl__scene_mesh *writer = run->scene->writer;
     uint64_t tile[3];
     tile_at(&run->surface.grid, index, tile);
     block_starts *own = starts_at(run, tile);
     for (unsigned block = 0; block < STRL__BLOCKS_OWN; block++) {
-        own->start[block] = strl__ply_vertex_count(writer);
-        strl_status status = strl__ply_vertices(writer, mesh->blocks[block].vertices, mesh->blocks[block].count, err);
+        own->start[block] = strl__scene_mesh_vertex_count(writer);
+        strl_status status =
+            strl__scene_mesh_vertices(writer, mesh->blocks[block].vertices, mesh->blocks[block].count, err);
         if (status != STRL_OK)
             return status;
     }
@@ -94,7 +95,7 @@ static strl_status write_tile(void *context, uint64_t index, unsigned slot, unsi
         uint32_t corner = mesh->corners[i];
         mesh->corners[i] = (uint32_t)starts[corner >> STRL__BLOCK_SHIFT] + (corner & ((1u << STRL__BLOCK_SHIFT) - 1));
     }
-    strl_status status = strl__ply_triangles(writer, mesh->corners, mesh->triangles, err);
+    strl_status status = strl__scene_mesh_triangles(writer, mesh->corners, mesh->triangles, err);
     if (status != STRL_OK)
         return status;
     return strl__scene_report(run->scene, "extracting", index + 1, run->tile_count, err);

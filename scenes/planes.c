@@ -122,10 +122,10 @@ static strl_status write_plane(strl__scene_run *run, bool painted, strl_error *e
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for one row of the plane");
     for (uint64_t row = 0; status == STRL_OK && row <= grid.rows; row++) {
         fill_row(run->desc, &grid, row, painted, records);
-        status = strl__ply_vertices(run->writer, records, grid.columns + 1, err);
+        status = strl__scene_mesh_vertices(run->writer, records, grid.columns + 1, err);
         if (status == STRL_OK && row < grid.rows) {
             fill_strip(grid.columns, row, corners);
-            status = strl__ply_triangles(run->writer, corners, 2 * grid.columns, err);
+            status = strl__scene_mesh_triangles(run->writer, corners, 2 * grid.columns, err);
         }
         if (status == STRL_OK)
             status = strl__scene_report(run, "painting", row, grid.rows, err);

@@ -10,7 +10,7 @@
 typedef struct scene_entry {
     strl_scene_info info;
     strl_status (*generate)(strl__scene_run *run, strl_error *err);
-    strl__ply_layout layout;
+    strl__scene_mesh_layout layout;
 } scene_entry;
 
 static const scene_entry scenes[] = {
@@ -18,19 +18,19 @@ static const scene_entry scenes[] = {
       "turbulent mixing layer: high genus, many layers, open at its four side walls only (count within 2 %)", 1000,
       4000000000},
      strl__scene_isosurface,
-     STRL__PLY_POSITION_NORMAL},
+     STRL__SCENE_MESH_POSITION_NORMAL},
     {{"painted-plane",
       "square of jittered triangles with a pattern of sharp edges in vertex colours (count within 2 %)", 1000,
       4000000000},
      strl__scene_painted_plane,
-     STRL__PLY_POSITION_COLOUR},
+     STRL__SCENE_MESH_POSITION_COLOUR},
     {{"plain-plane", "the same square in one colour", 1000, 4000000000},
      strl__scene_plain_plane,
-     STRL__PLY_POSITION_COLOUR},
+     STRL__SCENE_MESH_POSITION_COLOUR},
     {{"boxes", "separate boxes of any orientation and size in a cube (count rounded down to whole boxes)", 12,
       3200000000},
      strl__scene_boxes,
-     STRL__PLY_POSITION},
+     STRL__SCENE_MESH_POSITION},
 };
 
 enum { SCENE_COUNT = sizeof scenes / sizeof scenes[0] };
@@ -62,32 +62,37 @@ static strl_status find_scene(const strl_scene_desc *desc, const scene_entry **e
     if (desc->triangles < info->triangles_min || desc->triangles > info->triangles_max)
         return strl__fail(err, STRL_ERR_LIMIT,
                           "scene %s has %" PRIu64 " to %" PRIu64
-                          " triangles (its PLY numbers vertices with an int), not %" PRIu64,
+                          " triangles (PLY numbers vertices with an int), not %" PRIu64,
                           info->name, info->triangles_min, info->triangles_max, desc->triangles);
     return STRL_OK;
 }
 
-static strl_status report_faces(void *context, uint64_t done, uint64_t total, strl_error *err)
+static strl_status report_finish(void *context, uint64_t done, uint64_t total, strl_error *err)
 {
-    return strl__scene_report(context, "faces", done, total, err);
+    return strl__scene_report(context, "arranging", done, total, err);
 }
 
 static strl_status generate(const scene_entry *entry, strl__scene_run *run, strl_scene_result *result, strl_error *err)
 {
     strl_scene_result made = {0};
-    bool bare = entry->layout == STRL__PLY_POSITION_NORMAL && run->desc->no_normals;
-    strl_status status =
-        strl__ply_create(run->desc->path, bare ? STRL__PLY_POSITION : entry->layout, &run->writer, err);
+    const strl_scene_desc *desc = run->desc;
+    bool bare = entry->layout == STRL__SCENE_MESH_POSITION_NORMAL && desc->no_normals;
+    const strl__scene_mesh_desc mesh = {.path = desc->path,
+                                        .layout = bare ? STRL__SCENE_MESH_POSITION : entry->layout,
+                                        .shuffle = desc->shuffle,
+                                        .seed = desc->seed,
+                                        .memory_bytes = desc->memory_bytes};
+    strl_status status = strl__scene_mesh_create(&mesh, &run->writer, err);
     if (status == STRL_OK)
         status = entry->generate(run, err);
     if (status == STRL_OK)
-        status = strl__ply_finish(run->writer, report_faces, run, &made.bytes, err);
+        status = strl__scene_mesh_finish(run->writer, report_finish, run, &made.bytes, err);
     if (status == STRL_OK && result) {
-        made.vertices = strl__ply_vertex_count(run->writer);
-        made.triangles = strl__ply_triangle_count(run->writer);
+        made.vertices = strl__scene_mesh_vertex_count(run->writer);
+        made.triangles = strl__scene_mesh_triangle_count(run->writer);
         *result = made;
     }
-    strl__ply_destroy(run->writer);
+    strl__scene_mesh_destroy(run->writer);
     return status;
 }
 

@@ -1,4 +1,4 @@
-/* Seeded models for tests and benchmarks, streamed into a binary little-endian PLY file of any size in constant memory.
+/* Seeded models for tests and benchmarks, streamed into a binary PLY or STL file of any size in constant memory.
  * The name, the count and the seed fix every byte of the file, on every machine and for every number of threads. */
 #ifndef STRL_SCENES_SCENE_H
 #define STRL_SCENES_SCENE_H
@@ -12,14 +12,16 @@
 
 /* What to write. Zero-initialise: every 0 takes its default. */
 typedef struct strl_scene_desc {
-    const char *name;   /* one of strl_scene_info's names */
-    const char *path;   /* the output; appears, or replaces an older file, when it is whole (platform/output.h) */
+    const char *name; /* one of strl_scene_info's names */
+    const char
+        *path; /* the output, .ply or .stl; appears, or replaces an older file, when it is whole (platform/output.h) */
     uint64_t triangles; /* wanted; 0 = 1,000,000. strl_scene_info says how closely a scene keeps to it */
     uint64_t seed;
     uint64_t memory_bytes; /* budget of the buffers; 0 = 256 MiB */
     strl_pool *pool;       /* borrowed; NULL = the caller's thread alone */
     strl_cancel *cancel;   /* may be NULL */
-    bool no_normals;       /* leave nx ny nz out, where the scene has them */
+    bool no_normals;       /* leave nx ny nz out, where the scene has them; STL has none of vertices */
+    bool shuffle;          /* vertices and triangles of PLY, triangles of STL, in a random order that the seed fixes */
 } strl_scene_desc;
 
 /* Called on the caller's thread. done and total are items of one phase (tiles, rows); false cancels. */
@@ -41,7 +43,7 @@ const strl_scene_info *strl_scene_at(size_t index);
 
 /* What was written. */
 typedef struct strl_scene_result {
-    uint64_t vertices;
+    uint64_t vertices; /* of the surface; STL repeats them in every triangle */
     uint64_t triangles;
     uint64_t bytes;
 } strl_scene_result;

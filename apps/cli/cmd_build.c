@@ -3,22 +3,28 @@
 #include <string.h>
 
 #include "build/build.h"
+#include "build_progress.h"
 #include "interrupt.h"
 #include "options.h"
-#include "progress.h"
 #include "units.h"
 
 /* What the build calls back with. */
 typedef struct build_watch {
-    strl_cli_progress progress;
+    strl_cli_build_progress progress;
     bool quiet;
 } build_watch;
 
 static bool show_progress(void *context, const strl_build_progress *progress)
 {
     build_watch *watch = context;
-    strl_cli_progress_update(&watch->progress, progress->stage, progress->done, progress->total, "items");
+    strl_cli_build_progress_update(&watch->progress, progress);
     return !strl_cli_interrupted();
+}
+
+static void show_estimate(void *context, const strl_build_estimate *estimate)
+{
+    build_watch *watch = context;
+    strl_cli_build_progress_estimate(&watch->progress, estimate);
 }
 
 static void show_warning(void *context, const char *sentence)
@@ -26,7 +32,7 @@ static void show_warning(void *context, const char *sentence)
     build_watch *watch = context;
     if (watch->quiet)
         return;
-    strl_cli_progress_end(&watch->progress);
+    strl_cli_build_progress_end(&watch->progress);
     fprintf(stderr, "stroll: warning: %s\n", sentence);
 }
 
@@ -39,7 +45,7 @@ static int print_json(const strl_build_result *r)
 {
     uint64_t dropped = r->dropped_nonfinite + r->dropped_degenerate;
     json_t *object = json_pack(
-        "{s:I, s:I, s:{s:I, s:I, s:I, s:I, s:I}, s:{s:I, s:I}, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:f, s:I, s:I}",
+        "{s:I, s:I, s:{s:I, s:I, s:I, s:I, s:I}, s:{s:I, s:I}, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:f, s:I, s:I, s:b}",
         "triangles_in", (json_int_t)r->triangles_in, "triangles_leaf", (json_int_t)r->triangles_leaf, "dropped",
         "triangles", (json_int_t)dropped, "nonfinite", (json_int_t)r->dropped_nonfinite, "degenerate",
         (json_int_t)r->dropped_degenerate, "lines", (json_int_t)r->dropped_lines, "points",
@@ -48,7 +54,7 @@ static int print_json(const strl_build_result *r)
         (json_int_t)r->materials, "placements", (json_int_t)r->placements, "nodes", (json_int_t)r->nodes, "groups",
         (json_int_t)r->groups, "levels", (json_int_t)r->levels, "root_triangles", (json_int_t)r->root_triangles,
         "bytes_out", (json_int_t)r->bytes_out, "seconds", r->seconds, "cpu_seconds", r->cpu_seconds, "peak_rss_bytes",
-        (json_int_t)r->peak_rss_bytes, "scratch_bytes", (json_int_t)r->scratch_bytes);
+        (json_int_t)r->peak_rss_bytes, "scratch_bytes", (json_int_t)r->scratch_bytes, "resumed", r->resumed);
     if (!object)
         return strl_cli_fail(&(strl_error){STRL_ERR_MEMORY, "no memory to print the result"});
     json_dumpf(object, stdout, JSON_COMPACT);
@@ -57,11 +63,21 @@ static int print_json(const strl_build_result *r)
     return 0;
 }
 
-static void print_text(const strl_build_result *r, const char *output)
+/* Of a resumed build there is no rate: its seconds are those of the last run. */
+static void print_time(const strl_build_result *r)
 {
     char rate[16], processor_rate[16];
     format_rate(rate, r->triangles_in, r->seconds);
     format_rate(processor_rate, r->triangles_in, r->cpu_seconds);
+    if (r->resumed)
+        printf("%.1f s after it was resumed", r->seconds);
+    else
+        printf("%.1f s, %s triangles a second (%s a second of processor)", r->seconds, rate, processor_rate);
+    printf(", peak memory %.0f MB, scratch %.0f MB\n", (double)r->peak_rss_bytes / 1e6, (double)r->scratch_bytes / 1e6);
+}
+
+static void print_text(const strl_build_result *r, const char *output)
+{
     printf("%s: %llu triangle%s in %llu node%s on %u level%s, %.1f MB (%.2f bytes a triangle)\n", output,
            (unsigned long long)r->triangles_leaf, strl_cli_plural(r->triangles_leaf), (unsigned long long)r->nodes,
            strl_cli_plural(r->nodes), r->levels, strl_cli_plural(r->levels), (double)r->bytes_out / 1e6,
@@ -77,13 +93,22 @@ static void print_text(const strl_build_result *r, const char *output)
                r->missing_libraries == 1 ? "y" : "ies");
     if (r->coarse_lattices)
         printf("the lattice is coarser than a sixteenth of the short edges\n");
-    printf("%.1f s, %s triangles a second (%s a second of processor), peak memory %.0f MB, scratch %.0f MB\n",
-           r->seconds, rate, processor_rate, (double)r->peak_rss_bytes / 1e6, (double)r->scratch_bytes / 1e6);
+    print_time(r);
+}
+
+/* What was stopped by a signal says that it was, and how to go on. */
+static int fail(const strl_build_result *result, const strl_error *err)
+{
+    if (err->status != STRL_ERR_CANCELLED || !result->scratch_kept)
+        return strl_cli_fail(err);
+    fflush(stdout);
+    fprintf(stderr, "stroll: interrupted; what is finished is kept: the same command with --resume goes on\n");
+    return 1;
 }
 
 static int run(strl_cli_args *args)
 {
-    strl_build_desc desc = {0};
+    strl_build_desc desc = {.keep = true};
     strl_cli_list inputs;
     uint64_t jobs = 0;
     bool json = false, unit_given = false;
@@ -98,7 +123,9 @@ static int run(strl_cli_args *args)
         {.name = "jobs", .letter = 'j', .kind = STRL_CLI_COUNT, .value = &jobs, .help = "threads (one per processor)",
          .least = 1, .most = 256},
         {.name = "scratch", .kind = STRL_CLI_STRING, .value = &desc.scratch, .argument = "DIR",
-         .help = "folder in which OUT.stroll.tmp is made for the time of the build, with it where missing (beside the output)"},
+         .help = "folder in which OUT.stroll.tmp is made, with it where missing, until the build is done (beside the output)"},
+        {.name = "resume", .kind = STRL_CLI_FLAG, .value = &desc.resume,
+         .help = "go on where the same build was killed, interrupted or met a full disk (from the beginning)"},
         {.name = "grid", .kind = STRL_CLI_REAL, .value = &desc.grid, .argument = "STEP",
          .help = "largest lattice step, model units; one below a 2^30th of the extent is refused (chosen from the model)",
          .least = 1e-300, .most = 1e300},
@@ -120,19 +147,20 @@ static int run(strl_cli_args *args)
     build_watch watch = {.quiet = args->quiet};
     strl_build_result result;
     strl_error err = {0};
-    strl_cli_progress_init(&watch.progress, args->quiet);
+    strl_cli_build_progress_init(&watch.progress, args->quiet);
     desc.inputs = (const char *const *)inputs.items;
     desc.input_count = (uint32_t)inputs.count;
     desc.jobs = (unsigned)jobs;
     desc.unit = unit_given ? strl_cli_unit_name(unit) : NULL;
     desc.progress = show_progress;
+    desc.estimate = show_estimate;
     desc.warn = show_warning;
     desc.context = &watch;
     strl_cli_catch_interrupts();
     strl_status status = strl_build_clusters(&desc, &result, &err);
-    strl_cli_progress_end(&watch.progress);
+    strl_cli_build_progress_end(&watch.progress);
     if (status)
-        return strl_cli_fail(&err);
+        return fail(&result, &err);
     if (json)
         return print_json(&result);
     if (!args->quiet)

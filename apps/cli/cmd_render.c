@@ -143,7 +143,9 @@ static strl_status render_frames(const render_options *o, strl_render_model *mod
         strl_camera camera = strl_path_camera(path, f, o->size);
         stats = (strl_image_stats){0};
         keep_pace(o, model, start, f);
+        uint64_t disk_waits = strl_thread_disk_waits();
         status = model->klass->draw(model, renderer, &camera, &options, &stats, err);
+        stats.disk_waits = strl_thread_disk_waits() - disk_waits;
         if (status == STRL_OK)
             status = strl_render_output_add(&output, f, renderer, &stats, err);
         strl_cli_coarse_add(&coarse, o->error_px, stats.allowed_error_px, stats.max_error_px);

@@ -14,7 +14,7 @@ enum { BAR_MOST = 30, LINE_BYTES = 256, REDRAW_NS = 100000000 };
 /* A stage that has just begun has no rate yet, and what it says of the time left would be noise. */
 #define LEAST_RATE_SECONDS 0.1
 
-static void format_time(char text[24], double seconds)
+void strl_cli_format_time(char text[24], double seconds)
 {
     unsigned whole = seconds < 359999 ? (unsigned)(seconds + 0.5) : 359999;
     if (whole >= 3600)
@@ -46,14 +46,14 @@ void strl_cli_progress_format(char *text, unsigned size, const char *stage, uint
         memset(bar, '-', BAR_MOST);
         memset(bar, '#', (size_t)(share * BAR_MOST));
         if (known)
-            format_time(left, seconds * (1 - share) / share);
+            strl_cli_format_time(left, seconds * (1 - share) / share);
         snprintf(text, size, "%-12s [%s] %3.0f %%%s%s%s", stage, bar, share * 100, rate, known ? "  left " : "", left);
     }
     if (strlen(text) > columns)
         text[columns] = '\0';
 }
 
-static unsigned terminal_columns(void)
+unsigned strl_cli_progress_columns(void)
 {
     struct winsize window = {0};
     bool known = ioctl(STDERR_FILENO, TIOCGWINSZ, &window) == 0 && window.ws_col > 1;
@@ -63,6 +63,19 @@ static unsigned terminal_columns(void)
 void strl_cli_progress_init(strl_cli_progress *progress, bool quiet)
 {
     *progress = (strl_cli_progress){.shown = !quiet && isatty(STDERR_FILENO)};
+}
+
+bool strl_cli_progress_is_due(const strl_cli_progress *progress)
+{
+    return progress->shown && strl_clock_ns() - progress->last_ns >= REDRAW_NS;
+}
+
+void strl_cli_progress_draw(strl_cli_progress *progress, const char *line)
+{
+    fprintf(stderr, "\r\033[K%s", line);
+    fflush(stderr);
+    progress->last_ns = strl_clock_ns();
+    progress->drawn = true;
 }
 
 void strl_cli_progress_update(strl_cli_progress *progress, const char *stage, uint64_t done, uint64_t total,
@@ -77,15 +90,12 @@ void strl_cli_progress_update(strl_cli_progress *progress, const char *stage, ui
         progress->start_ns = now_ns;
         progress->last_ns = 0;
     }
-    if (now_ns - progress->last_ns < REDRAW_NS)
+    if (!strl_cli_progress_is_due(progress))
         return;
     char line[LINE_BYTES];
     double seconds = (double)(now_ns - progress->start_ns) * 1e-9;
-    strl_cli_progress_format(line, sizeof line, stage, done, total, unit, seconds, terminal_columns());
-    fprintf(stderr, "\r\033[K%s", line);
-    fflush(stderr);
-    progress->last_ns = now_ns;
-    progress->drawn = true;
+    strl_cli_progress_format(line, sizeof line, stage, done, total, unit, seconds, strl_cli_progress_columns());
+    strl_cli_progress_draw(progress, line);
 }
 
 void strl_cli_progress_end(strl_cli_progress *progress)

@@ -19,6 +19,7 @@ typedef struct strl_image_stats {
     uint32_t fronts; /* selected until the front was resident */
     float max_error_px;
     double allowed_error_px;
+    uint64_t disk_waits;  /* of the drawing thread between camera and finished pixels, see strl_thread_disk_waits */
     uint64_t faults;      /* reads and pages that failed so far: their nodes stay coarse */
     char last_fault[256]; /* the newest one's sentence; empty = none */
 } strl_image_stats;

@@ -186,6 +186,7 @@ static strl_status write_stats(strl_render_output *output, size_t frame, const s
                   {"evictions", s->evictions},
                   {"covered_pixels", count_covered(output)},
                   {"missing_nodes", s->missing_nodes},
+                  {"disk_waits", s->disk_waits},
                   {"fronts", s->fronts},
                   {"faults", s->faults}};
     int failed = !line;

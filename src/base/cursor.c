@@ -14,13 +14,6 @@ void strl_writer_bytes(strl_writer *writer, const void *data, size_t size)
     writer->size += size;
 }
 
-void strl_writer_le(strl_writer *writer, unsigned count, uint64_t value)
-{
-    uint8_t bytes[8];
-    strl__store_le(bytes, count, value);
-    strl_writer_bytes(writer, bytes, count);
-}
-
 void strl_writer_f32(strl_writer *writer, float value)
 {
     uint32_t bits;

@@ -89,7 +89,20 @@ typedef struct strl_writer {
 } strl_writer;
 
 void strl_writer_bytes(strl_writer *writer, const void *data, size_t size);
-void strl_writer_le(strl_writer *writer, unsigned count, uint64_t value);
+
+/* The low bytes of a number, at most 8. */
+static inline void strl_writer_le(strl_writer *writer, unsigned count, uint64_t value)
+{
+    uint8_t bytes[8];
+    strl__store_le(bytes, 8, value);
+    if (writer->capacity - writer->size < 8 || writer->failed) {
+        strl_writer_bytes(writer, bytes, count);
+        return;
+    }
+    memcpy(writer->data + writer->size, bytes, 8); /* what is too much is written over */
+    writer->size += count;
+}
+
 static inline void strl_writer_u8(strl_writer *writer, uint8_t value) { strl_writer_le(writer, 1, value); }
 static inline void strl_writer_u16(strl_writer *writer, uint16_t value) { strl_writer_le(writer, 2, value); }
 static inline void strl_writer_u32(strl_writer *writer, uint32_t value) { strl_writer_le(writer, 4, value); }

@@ -12,11 +12,24 @@
 #define STRL_ROOT_MAX_TRIANGLES 16384u
 
 typedef struct strl_build_progress {
-    const char *stage;   /* "read", "sort", "level 3 of 11", ...; static */
-    uint32_t stage_index, stage_count;
+    const char *stage;   /* "read", "sort", "level 3", ...; static */
+    uint32_t stage_index, stage_count; /* from 1; all levels are one stage; index 0 = a resumed build checks what it has */
     uint64_t done, total; /* items of the stage; total 0 = unknown */
-    uint64_t triangles_in;
+    uint64_t triangles_in; /* as announced by the inputs, until they have been read once */
+    double share;          /* of the whole build, 0 to 1 */
+    double seconds_left;   /* estimated; 0 = unknown */
+    double triangles_per_s; /* of the whole build so far; 0 = unknown */
+    uint64_t scratch_bytes; /* on disk now */
+    uint64_t memory_bytes;  /* the budget; the system knows what is used of it (strl_process_rss_bytes) */
 } strl_build_progress;
+
+/* What a build will take, guessed from the inputs' headers and sizes before they are read. */
+typedef struct strl_build_estimate {
+    uint64_t triangles;          /* 0 = unknown */
+    uint64_t scratch_bytes;      /* at most */
+    uint64_t scratch_free_bytes; /* of that disk now. The build is refused where the triangles, counted, do not fit */
+    double seconds;              /* roughly */
+} strl_build_estimate;
 
 /* How to build. Zero-initialise: every 0 takes its default. */
 typedef struct strl_build_desc {
@@ -31,13 +44,20 @@ typedef struct strl_build_desc {
     int up_axis;            /* 1 x, 2 y, 3 z; 0 = the inputs' own */
     const char *unit;       /* NULL = unknown */
     bool certify;           /* measure what nodes claim, and claim no more */
+    /* A build that is stopped leaves its scratch folder, with the stages that are finished, for a later one that resumes.
+     * Not set: nothing is left. */
+    bool keep;
+    uint64_t keep_triangles; /* of models of fewer nothing is kept: they are built at once; 0 = 65,536 */
+    bool resume; /* goes on with what an earlier build of the same request has left, if anything; keeps, too */
     bool no_dependencies;   /* for measuring what dependencies bring: every group has one member */
     /* Called on the caller's thread, often; false cancels. May be NULL. */
     bool (*progress)(void *context, const strl_build_progress *progress);
     /* Told on the caller's thread, once for each thing amiss that does not stop the build; the sentence is borrowed for the
      * call. May be NULL; the result has the counts. */
     void (*warn)(void *context, const char *sentence);
-    void *context; /* of both */
+    /* Told on the caller's thread, once, before the inputs are read. May be NULL. */
+    void (*estimate)(void *context, const strl_build_estimate *estimate);
+    void *context; /* of all three */
 } strl_build_desc;
 
 typedef struct strl_build_result {
@@ -50,9 +70,12 @@ typedef struct strl_build_result {
     uint64_t placements;
     double seconds, cpu_seconds;
     uint64_t peak_rss_bytes;
+    bool resumed;      /* an earlier build's stages were used; seconds and cpu_seconds are of this run alone */
+    bool scratch_kept; /* of a failed build: there is something to resume */
 } strl_build_result;
 
-/* Writes desc->output, which appears only when whole. On failure nothing is left of it, and an older file of that name stays. */
+/* Writes desc->output, which appears only when whole. On failure nothing is left of it but what desc->keep asks for, and
+ * an older file of that name stays. The bytes are the same whether the build was stopped and resumed, however often, or not. */
 strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err);
 
 #endif

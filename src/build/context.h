@@ -2,7 +2,9 @@
 #ifndef STRL_BUILD_CONTEXT_H
 #define STRL_BUILD_CONTEXT_H
 
+#include "base/cursor.h"
 #include "build/build.h"
+#include "build/progress.h"
 #include "geometry/progressive.h"
 #include "readers/reader.h"
 #include "store/spill.h"
@@ -13,14 +15,23 @@ typedef struct strl_build_context {
     strl_pool *pool;
     strl_spill_set *spills;
     const char *scratch_dir;
-    uint64_t memory_bytes;
+    uint64_t memory_bytes; /* what the output may depend on; of a resumed build, the first one's */
+    bool keep;             /* checkpoints are made (checkpoint.h); settled when the survey is done */
+    bool has_checkpoint;   /* there is one in the scratch folder */
+    strl_writer resumed;   /* the builder's words in the checkpoint to go on with; empty = from the beginning */
     strl_build_progress progress;
+    strl_estimate estimate;
 } strl_build_context;
 
 /* Reports progress; STRL_ERR_CANCELLED where the callback says so. */
 strl_status strl__build_report(strl_build_context *context, uint64_t done, uint64_t total, strl_error *err);
-/* Starts the next stage. */
+/* Starts the next stage. Its share of the time stands in progress.c. */
 void strl__build_stage(strl_build_context *context, const char *stage);
+/* How many triangles there will be, as far as is known. */
+void strl__build_expect(strl_build_context *context, uint64_t triangles);
+
+/* A stream that a checkpoint needs: one that is kept where checkpoints are made. */
+strl_status strl__build_open_stream(strl_build_context *context, const char *name, strl_spill **spill, strl_error *err);
 
 /* The stages of the builder `clusters`. */
 strl_status strl__clusters_run(strl_build_context *context, strl_error *err);

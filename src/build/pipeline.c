@@ -5,6 +5,7 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "build/checkpoint.h"
 #include "build/context.h"
 #include "platform/file.h"
 #include "platform/output.h"
@@ -13,22 +14,43 @@
 
 strl_status strl__build_report(strl_build_context *context, uint64_t done, uint64_t total, strl_error *err)
 {
-    context->progress.done = done;
-    context->progress.total = total;
-    if (context->desc->progress && !context->desc->progress(context->desc->context, &context->progress))
+    strl_build_progress *progress = &context->progress;
+    strl__estimate_update(&context->estimate, done, total, strl_clock_ns());
+    progress->done = done;
+    progress->total = total;
+    progress->share = context->estimate.share;
+    progress->seconds_left = context->estimate.seconds_left;
+    progress->triangles_per_s = strl__estimate_rate(&context->estimate, progress->triangles_in);
+    progress->scratch_bytes = strl_spill_set_bytes(context->spills);
+    if (context->desc->progress && !context->desc->progress(context->desc->context, progress))
         return strl__fail(err, STRL_ERR_CANCELLED, "the build was cancelled");
     return STRL_OK;
 }
 
 void strl__build_stage(strl_build_context *context, const char *stage)
 {
+    strl__estimate_stage(&context->estimate, stage);
     context->progress.stage = stage;
-    context->progress.stage_index++;
+    context->progress.stage_index = context->estimate.stage_index;
+    context->progress.stage_count = STRL_STAGE_COUNT;
     context->progress.done = context->progress.total = 0;
 }
 
-/* What the build puts into its scratch folder: the streams of the stages, a reader's, and the unfinished container. */
-static const char *const scratch_names[] = {"*" STRL_SPILL_SUFFIX, "*.part", NULL};
+void strl__build_expect(strl_build_context *context, uint64_t triangles)
+{
+    context->progress.triangles_in = triangles;
+    strl__estimate_guess(&context->estimate, strl__estimate_seconds(triangles, strl_pool_workers(context->pool)));
+}
+
+strl_status strl__build_open_stream(strl_build_context *context, const char *name, strl_spill **spill, strl_error *err)
+{
+    return context->keep ? strl_spill_open_kept(context->spills, name, 0, spill, err)
+                         : strl_spill_open(context->spills, name, 0, spill, err);
+}
+
+/* What the build puts into its scratch folder: the streams of the stages, a reader's, the unfinished container or
+ * checkpoint, and the checkpoint. */
+static const char *const scratch_names[] = {"*" STRL_SPILL_SUFFIX, "*.part", STRL_CHECKPOINT_NAME, NULL};
 
 static strl_status check_inputs(const strl_build_desc *desc, const char *target, strl_error *err)
 {
@@ -72,7 +94,7 @@ static strl_status open_scratch(const strl_build_desc *desc, const char *target,
         snprintf(path, size, "%s/%s.tmp", desc->scratch, name);
     else
         snprintf(path, size, "%s.tmp", target);
-    const strl_scratch_desc wanted = {.path = path, .parent = desc->scratch, .names = scratch_names};
+    const strl_scratch_desc wanted = {.path = path, .parent = desc->scratch, .names = scratch_names, .keep = desc->resume};
     strl_status status = strl_scratch_create(&wanted, scratch, err);
     strl__free(path);
     return status;
@@ -90,34 +112,100 @@ static unsigned count_workers(const strl_build_desc *desc, uint64_t memory_bytes
     return wanted < fed ? wanted : (unsigned)fed;
 }
 
+static bool is_needed(void *context, const char *name)
+{
+    strl_build_context *build = context;
+    return strcmp(name, STRL_CHECKPOINT_NAME) == 0 || strl_spill_set_uses(build->spills, name);
+}
+
+/* Takes up what an earlier build has left, and removes what it had begun; all of it where there is no checkpoint. */
+static strl_status resume(strl_build_context *context, strl_scratch *scratch, strl_error *err)
+{
+    strl_status status = context->has_checkpoint ? strl__checkpoint_read(context, err) : STRL_OK;
+    if (!status)
+        status = strl_scratch_sweep(scratch, context->has_checkpoint ? is_needed : NULL, context, err);
+    if (!status && context->has_checkpoint)
+        strl__build_expect(context, context->progress.triangles_in);
+    if (!status && !context->has_checkpoint && context->desc->warn) {
+        char text[1200];
+        snprintf(text, sizeof text, "%.1000s holds no finished stage of an earlier build: building from the beginning",
+                 context->scratch_dir);
+        context->desc->warn(context->desc->context, text);
+    }
+    return status;
+}
+
+/* Whether the same command may come further another time. What an earlier build has left and cannot be read is of no
+ * use. */
+static bool is_stopped(const strl_build_context *context, bool resumes, strl_status status)
+{
+    return status == STRL_ERR_DISK_FULL || status == STRL_ERR_CANCELLED || status == STRL_ERR_MEMORY ||
+           (status == STRL_ERR_IO && (!resumes || context->result->resumed));
+}
+
+/* What failed and left its scratch tells how to go on. */
+static strl_status tell_way_on(const strl_build_context *context, bool resumes, strl_status status, strl_error *err)
+{
+    if (!err || !context->result->scratch_kept)
+        return status;
+    char sentence[sizeof err->message];
+    const char *way = ": leave --resume out to begin anew";
+    if (is_stopped(context, resumes, status))
+        way = status == STRL_ERR_DISK_FULL
+                  ? "; what is finished is kept: make room, then the same command with --resume goes on"
+                  : "; what is finished is kept: the same command with --resume goes on";
+    else if (status == STRL_ERR_ARGUMENT && !context->result->resumed)
+        way = ": give what the earlier build was given, or leave --resume out to begin anew";
+    snprintf(sentence, sizeof sentence, "%.380s%s", err->message, way);
+    return strl__fail(err, status, "%s", sentence);
+}
+
+static strl_status run_in_scratch(strl_build_context *context, strl_scratch *scratch, strl_error *err)
+{
+    const strl_build_desc *desc = context->desc;
+    strl_status status = strl_pool_create(count_workers(desc, context->memory_bytes) - 1, &context->pool, err);
+    if (!status)
+        status = strl_spill_set_create(context->scratch_dir, 0, &context->spills, err);
+    if (!status && desc->resume)
+        status = resume(context, scratch, err);
+    if (!status)
+        status = strl__clusters_run(context, err);
+    if (context->spills)
+        context->result->scratch_bytes = strl_spill_set_peak_bytes(context->spills);
+    strl_spill_set_destroy(context->spills);
+    strl_pool_destroy(context->pool);
+    strl__free(context->resumed.data);
+    return status;
+}
+
 /* Everything between a checked request and its end. */
 static strl_status run(strl_build_context *context, const char *target, strl_error *err)
 {
-    const strl_build_desc *desc = context->desc;
     strl_scratch *scratch = NULL;
-    strl_status status = open_scratch(desc, target, &scratch, err);
-    if (!status)
-        status = strl_pool_create(count_workers(desc, context->memory_bytes) - 1, &context->pool, err);
-    if (!status)
-        status = strl_spill_set_create(strl_scratch_path(scratch), 0, &context->spills, err);
-    if (!status) {
-        context->scratch_dir = strl_scratch_path(scratch);
-        status = strl__clusters_run(context, err);
-        context->result->scratch_bytes = strl_spill_set_peak_bytes(context->spills);
-    }
-    strl_spill_set_destroy(context->spills);
-    strl_pool_destroy(context->pool);
-    strl_scratch_destroy(scratch);
-    return status;
+    strl_status status = open_scratch(context->desc, target, &scratch, err);
+    if (status)
+        return status;
+    context->scratch_dir = strl_scratch_path(scratch);
+    bool resumes = context->desc->resume && strl__checkpoint_exists(context->scratch_dir);
+    context->has_checkpoint = resumes;
+    status = run_in_scratch(context, scratch, err);
+    context->result->scratch_kept = status && context->has_checkpoint && (resumes || is_stopped(context, resumes, status));
+    if (context->result->scratch_kept)
+        strl_scratch_leave(scratch);
+    else
+        strl_scratch_destroy(scratch);
+    return status ? tell_way_on(context, resumes, status, err) : STRL_OK;
 }
 
 strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err)
 {
     char *target = NULL;
     uint64_t started = strl_clock_ns(), cpu_started = strl_clock_cpu_ns();
-    strl_build_context context = {.desc = desc, .result = result,
+    strl_build_context context = {.desc = desc, .result = result, .keep = desc->keep || desc->resume,
                                   .memory_bytes = desc->memory_bytes ? desc->memory_bytes : 1ull << 30};
     *result = (strl_build_result){.inputs = desc->input_count};
+    strl__estimate_start(&context.estimate, started);
+    context.progress.memory_bytes = context.memory_bytes;
     strl_status status = check_request(desc, &target, err);
     if (!status)
         status = run(&context, target, err);

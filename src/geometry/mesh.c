@@ -1,23 +1,5 @@
 #include "geometry/mesh.h"
 
-#include <math.h>
-
-float strl_drift_length(const strl_drift *drift)
-{
-    float sum = 0;
-    for (int k = 0; k < 3; k++) {
-        float far = -drift->least[k] > drift->most[k] ? -drift->least[k] : drift->most[k];
-        sum += far * far;
-    }
-    return sqrtf(sum) * (1 + 1e-6f); /* whatever the rounding, the length is a bound */
-}
-
-float strl_mesh_error(const strl_mesh *mesh, float longest_drift)
-{
-    float error = longest_drift + mesh->start_error;
-    return mesh->most_error > 0 && error > mesh->most_error ? mesh->most_error : error;
-}
-
 bool strl_mesh_create(strl_mesh *mesh, uint32_t points, uint32_t wedges, uint32_t triangles, strl_arena *arena)
 {
     *mesh = (strl_mesh){.point_count = points, .wedge_count = wedges, .triangle_count = triangles};

@@ -3,6 +3,7 @@
 #ifndef STRL_GEOMETRY_MESH_H
 #define STRL_GEOMETRY_MESH_H
 
+#include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 
@@ -23,7 +24,15 @@ typedef struct strl_drift {
 } strl_drift;
 
 /* The longest way in the box. */
-float strl_drift_length(const strl_drift *drift);
+static inline float strl_drift_length(const strl_drift *drift)
+{
+    float sum = 0;
+    for (int k = 0; k < 3; k++) {
+        float far = -drift->least[k] > drift->most[k] ? -drift->least[k] : drift->most[k];
+        sum += far * far;
+    }
+    return sqrtf(sum) * (1 + 1e-6f); /* whatever the rounding, the length is a bound */
+}
 
 /* A sum of two floats times this is not below the true sum, whatever the rounding. */
 #define STRL_ROUND_UP (1 + 2.4e-7f)
@@ -48,7 +57,11 @@ typedef struct strl_mesh {
 } strl_mesh;
 
 /* The geometric error of a surface that has drifted so far at most: lattice units. */
-float strl_mesh_error(const strl_mesh *mesh, float longest_drift);
+static inline float strl_mesh_error(const strl_mesh *mesh, float longest_drift)
+{
+    float error = longest_drift + mesh->start_error;
+    return mesh->most_error > 0 && error > mesh->most_error ? mesh->most_error : error;
+}
 
 /* Allocates all arrays for the given counts (contents undefined, flags zero). False without memory. */
 bool strl_mesh_create(strl_mesh *mesh, uint32_t points, uint32_t wedges, uint32_t triangles, strl_arena *arena);

@@ -147,7 +147,10 @@ strl_status strl_pm_record(const strl_mesh *mesh, const strl_simplified *simplif
                            uint32_t palette_count, strl_arena *arena, strl_pm *pm, strl_error *err)
 {
     ordering order;
-    (void)palette_count;
+    for (uint32_t w = 0; w < mesh->wedge_count; w++)
+        if (mesh->wedge[w].palette >= palette_count)
+            return strl__fail(err, STRL_ERR_FORMAT, "a wedge has entry %u of a palette of %u", mesh->wedge[w].palette,
+                              palette_count);
     if (mesh->wedge_count > STRL_PM_MAX_VERTICES || mesh->triangle_count > STRL_PM_MAX_TRIANGLES)
         return strl__fail(err, STRL_ERR_LIMIT, "a node has %u vertices and %u triangles; the limits are %u and %u",
                           mesh->wedge_count, mesh->triangle_count, STRL_PM_MAX_VERTICES, STRL_PM_MAX_TRIANGLES);

@@ -1,6 +1,7 @@
 #include "geometry/simplify.h"
 
 #include <math.h>
+#include <string.h>
 
 #include "base/fail.h"
 #include "geometry/simplify_plan.h"
@@ -12,59 +13,52 @@
 #define LARGE_SHARE 0.01 /* of a piece's diagonal: errors above are out of proportion where not even half of what is wanted is done */
 #define LEAST_ERROR 1.f  /* lattice units: below, all errors count as equal */
 
-static void heap_place(simplifier *s, uint32_t at, candidate c)
+static candidate candidate_of(uint32_t point, float key)
 {
-    s->heap[at] = c;
-    s->sites[c.point].heap_at = at;
+    uint32_t bits;
+    key = key > 0 ? key : 0; /* not -0 */
+    memcpy(&bits, &key, sizeof bits);
+    return (candidate)bits << 32 | point;
 }
 
-/* Ties are broken by index, so that the order does not depend on the heap's history. */
-static bool before(candidate a, candidate b)
+static float key_of(candidate c)
 {
-    return a.key < b.key || (a.key == b.key && a.point < b.point);
-}
-
-static void heap_up(simplifier *s, uint32_t at)
-{
-    candidate c = s->heap[at];
-    while (at > 0 && before(c, s->heap[(at - 1) / 2])) {
-        heap_place(s, at, s->heap[(at - 1) / 2]);
-        at = (at - 1) / 2;
-    }
-    heap_place(s, at, c);
-}
-
-static void heap_down(simplifier *s, uint32_t at)
-{
-    candidate c = s->heap[at];
-    for (;;) {
-        uint32_t child = 2 * at + 1;
-        if (child >= s->heap_count)
-            break;
-        if (child + 1 < s->heap_count && before(s->heap[child + 1], s->heap[child]))
-            child++;
-        if (!before(s->heap[child], c))
-            break;
-        heap_place(s, at, s->heap[child]);
-        at = child;
-    }
-    heap_place(s, at, c);
+    uint32_t bits = (uint32_t)(c >> 32);
+    float key;
+    memcpy(&key, &bits, sizeof key);
+    return key;
 }
 
 static void heap_push(simplifier *s, uint32_t point, float key)
 {
-    s->heap[s->heap_count] = (candidate){key, point};
-    heap_up(s, s->heap_count++);
+    candidate c = candidate_of(point, key), *heap = s->heap;
+    uint32_t at = s->heap_count++;
+    s->sites[point].in_heap = true;
+    for (uint32_t parent; at > 0 && c < heap[parent = (at - 1) / HEAP_WAYS]; at = parent)
+        heap[at] = heap[parent];
+    heap[at] = c;
 }
 
-static candidate heap_pop(simplifier *s)
+static uint32_t heap_pop(simplifier *s)
 {
-    candidate first = s->heap[0];
-    s->sites[first.point].heap_at = NO_INDEX;
-    if (--s->heap_count > 0) {
-        heap_place(s, 0, s->heap[s->heap_count]);
-        heap_down(s, 0);
+    candidate *heap = s->heap, c = heap[--s->heap_count];
+    uint32_t at = 0, first = (uint32_t)heap[0];
+    s->sites[first].in_heap = false;
+    heap[s->heap_count] = NO_CANDIDATE;
+    for (uint32_t child; (child = HEAP_WAYS * at + 1) < s->heap_count;) {
+        candidate least = heap[child];
+        uint32_t best = child;
+        for (uint32_t other = child + 1; other < child + HEAP_WAYS; other++) {
+            best = heap[other] < least ? other : best;
+            least = heap[other] < least ? heap[other] : least;
+        }
+        if (c < least)
+            break;
+        heap[at] = least;
+        at = best;
     }
+    if (s->heap_count)
+        heap[at] = c;
     return first;
 }
 
@@ -124,8 +118,8 @@ static void mark_stale(simplifier *s, uint32_t point, float key)
     site *p = &s->sites[point];
     if (p->flags & STRL_POINT_KEPT)
         return;
-    p->stale = true;
-    if (p->heap_at == NO_INDEX)
+    p->state = STATE_STALE;
+    if (!p->in_heap)
         heap_push(s, point, key);
 }
 
@@ -158,9 +152,9 @@ static void push_all(simplifier *s)
 {
     for (uint32_t p = 0; p < s->mesh->point_count; p++) {
         site *own = &s->sites[p];
-        if ((own->flags & STRL_POINT_KEPT) || own->head == NO_INDEX || own->heap_at != NO_INDEX)
+        if ((own->flags & STRL_POINT_KEPT) || own->head == NO_INDEX || own->in_heap)
             continue;
-        own->stale = true;
+        own->state = STATE_ESTIMATED;
         heap_push(s, p, estimate_key(s, p));
     }
 }
@@ -201,11 +195,10 @@ static double diagonal_of(const strl_mesh *mesh)
 static bool plan_again(simplifier *s, uint32_t point)
 {
     collapse_plan *plan = &s->plan[point];
-    s->sites[point].stale = false;
+    s->sites[point].state = STATE_PLANNED;
     if (!strl__plan_best(s, point, plan))
         return false;
-    candidate planned = {plan->key, point};
-    if (s->heap_count == 0 || before(planned, s->heap[0]))
+    if (candidate_of(point, plan->key) < s->heap[0])
         return true;
     heap_push(s, point, plan->key);
     return false;
@@ -226,14 +219,17 @@ static bool recall_plan(simplifier *s, uint32_t point)
 /* Takes the best candidate and makes sure that its plan holds; NO_INDEX where it had to be put back. */
 static uint32_t next_point(simplifier *s)
 {
-    uint32_t point = heap_pop(s).point;
-    if (!s->sites[point].stale && recall_plan(s, point))
+    uint32_t point = heap_pop(s);
+    site *own = &s->sites[point];
+    if (own->state == STATE_PLANNED && recall_plan(s, point))
         return point;
-    candidate estimated = {estimate_key(s, point), point};
-    if (s->heap_count > 0 && before(s->heap[0], estimated)) { /* others are likely to be better: no plan yet */
-        s->sites[point].stale = true;
-        heap_push(s, point, estimated.key);
-        return NO_INDEX;
+    if (own->state != STATE_ESTIMATED) {
+        float estimate = estimate_key(s, point);
+        if (s->heap[0] < candidate_of(point, estimate)) { /* others are likely to be better: no plan yet */
+            own->state = STATE_ESTIMATED;
+            heap_push(s, point, estimate);
+            return NO_INDEX;
+        }
     }
     return plan_again(s, point) ? point : NO_INDEX;
 }
@@ -254,7 +250,7 @@ static float run_rung(simplifier *s, float limit, bool adaptive, strl_simplified
     uint32_t half = all - (all > target ? all - target : 0) / 2;
     float reached = 0;
     push_all(s);
-    while (s->heap_count && s->heap[0].key <= limit && wants_more(s, s->heap[0].key)) {
+    while (s->heap_count && key_of(s->heap[0]) <= limit && wants_more(s, key_of(s->heap[0]))) {
         uint32_t point = next_point(s);
         if (point == NO_INDEX)
             continue;
@@ -271,8 +267,11 @@ static float run_rung(simplifier *s, float limit, bool adaptive, strl_simplified
         for (uint32_t i = 0; i < s->star.neighbour_count; i++)
             mark_stale(s, s->star.neighbour[i], key);
     }
-    while (s->heap_count)
-        s->sites[s->heap[--s->heap_count].point].heap_at = NO_INDEX;
+    while (s->heap_count) {
+        candidate *last = &s->heap[--s->heap_count];
+        s->sites[(uint32_t)*last].in_heap = false;
+        *last = NO_CANDIDATE;
+    }
     return reached;
 }
 

@@ -18,11 +18,12 @@ typedef struct view {
     uint32_t n;                  /* points */
     uint32_t v_at;               /* in the fan */
     uint32_t first, end;         /* old triangles that there are */
-    double s_of[RING_MAX], t_of[RING_MAX], h_of[RING_MAX]; /* two coordinates across the normal, one along it */
+    double s_of[RING_ROOM], t_of[RING_ROOM], h_of[RING_ROOM]; /* two coordinates across the normal, one along it */
     double us, ut, uh;           /* u, or its nearest point on the new boundary edge */
     double moved[3];             /* from u to that point; 0 for a closed fan */
+    double side[RING_ROOM];      /* of u seen along the new spoke to each point: > 0 = at its left */
     uint32_t image;              /* the new triangle that holds u */
-    double least[RING_MAX], most[RING_MAX]; /* per new triangle: how far the new surface lies above the old one; the patches agree on the rim */
+    double least[RING_ROOM], most[RING_ROOM]; /* per new triangle: how far the new surface lies above the old one; the patches agree on the rim */
 } view;
 
 /* u slides to the new boundary edge first. */
@@ -51,14 +52,14 @@ static bool look(const simplifier *s, const strl_star *star, uint32_t to, view *
 {
     const strl_fan *fan = &star->fan;
     bool is_flat = star->manifold && fan->has_axes;
-    uint32_t n = is_flat ? fan->n : 0, v = is_flat ? strl__fan_at(fan, to) : NO_INDEX;
+    uint32_t n = is_flat ? fan->n : 0, v = is_flat ? strl__neighbour_at(s, star, to) : NO_INDEX;
     w->s = s, w->star = star, w->n = n, w->v_at = v;
     w->first = star->closed || v == 0 ? 0 : 1;
     w->end = star->closed || v != 0 ? n : n - 1;
     w->us = w->ut = w->uh = 0;
     if (v == NO_INDEX || (!star->closed && v != 0 && v != n - 1))
         return false;
-    for (uint32_t i = 0; i < n; i++) {
+    for (uint32_t i = 0, lanes = strl__lanes(n + 1); i < lanes; i++) { /* point n is v again */
         w->s_of[i] = fan->flat[0][v + i] - fan->flat[0][v];
         w->t_of[i] = fan->flat[1][v + i] - fan->flat[1][v];
         w->h_of[i] = fan->flat[2][v + i] - fan->flat[2][v];
@@ -68,22 +69,31 @@ static bool look(const simplifier *s, const strl_star *star, uint32_t to, view *
         w->moved[k] = 0;
     if (!star->closed)
         slide_to_edge(w);
+    for (uint32_t i = 0, lanes = strl__lanes(n); i < lanes; i++) {
+        w->side[i] = cross2(w->s_of[i], w->t_of[i], w->us, w->ut);
+        w->least[i] = w->most[i] = 0;
+    }
     return true;
 }
 
 /* Both fans must be unfolded over the polygon: every triangle turns the same way, and the ring goes round u once. */
 static bool is_height_field(const view *w)
 {
+    double above_u[RING_ROOM], old_area[RING_ROOM], new_area[RING_ROOM];
     unsigned crossings = 0, folded = 0;
+    for (uint32_t m = 0, lanes = strl__lanes(w->n); m < lanes; m++) {
+        double as = w->s_of[m] - w->us, at = w->t_of[m] - w->ut, bs = w->s_of[m + 1] - w->us, bt = w->t_of[m + 1] - w->ut;
+        above_u[m] = at;
+        old_area[m] = cross2(as, at, bs, bt);
+        new_area[m] = cross2(w->s_of[m], w->t_of[m], w->s_of[m + 1], w->t_of[m + 1]);
+    }
+    above_u[w->n] = above_u[0];
     for (uint32_t m = w->first; m < w->end; m++) {
-        uint32_t next = m + 1 == w->n ? 0 : m + 1;
-        double as = w->s_of[m] - w->us, at = w->t_of[m] - w->ut, bs = w->s_of[next] - w->us, bt = w->t_of[next] - w->ut;
-        double old_area = cross2(as, at, bs, bt);
-        folded |= w->star->closed ? old_area <= 0 : old_area < 0;
-        crossings += at < 0 && bt >= 0;
+        folded |= w->star->closed ? old_area[m] <= 0 : old_area[m] < 0;
+        crossings += above_u[m] < 0 && above_u[m + 1] >= 0;
     }
     for (uint32_t m = 1; m + 1 < w->n; m++)
-        folded |= cross2(w->s_of[m], w->t_of[m], w->s_of[m + 1], w->t_of[m + 1]) <= 0;
+        folded |= new_area[m] <= 0;
     return !folded && (!w->star->closed || crossings == 1);
 }
 
@@ -92,8 +102,7 @@ static void find_image(view *w)
 {
     w->image = 1;
     for (uint32_t m = 1; m + 1 < w->n; m++)
-        if (cross2(w->s_of[m], w->t_of[m], w->us, w->ut) >= 0)
-            w->image = m;
+        w->image = w->side[m] >= 0 ? m : w->image;
 }
 
 static void note_gap(view *w, uint32_t triangle, double gap)
@@ -151,7 +160,7 @@ static void watch_crossing(const view *w, watch *seen, uint32_t old, uint32_t ne
 static void note_crossings(view *w, watch *seen, collapse_effect *effect)
 {
     for (uint32_t j = 2; j + 2 <= w->n; j++) {
-        double ds = w->s_of[j], dt = w->t_of[j], side_u = cross2(ds, dt, w->us, w->ut), inverse = 1 / (ds * ds + dt * dt);
+        double ds = w->s_of[j], dt = w->t_of[j], side_u = w->side[j], inverse = 1 / (ds * ds + dt * dt);
         uint32_t begin = side_u >= 0 ? 1 : j + 1, end = side_u >= 0 ? j : w->n;
         for (uint32_t i = begin; i < end; i++) {
             double side_x = cross2(ds, dt, w->s_of[i], w->t_of[i]), span = side_u - side_x;
@@ -182,41 +191,48 @@ static void add_box(float to[6], const float box[6])
         to[k] = (to[k] + box[k]) * STRL_ROUND_UP;
 }
 
+/* What a gap of one below and above adds to a drift: the normal's positive and negative parts, of which one of each two is 0. */
+static void list_gap_reaches(const double normal[3], float below[8], float above[8])
+{
+    for (unsigned k = 0; k < 3; k++) {
+        float n = (float)normal[k] * (1 + 1e-6f), up = n > 0 ? n : 0, down = n > 0 ? 0 : -n;
+        below[k] = above[3 + k] = up;
+        below[3 + k] = above[k] = down;
+    }
+    below[6] = below[7] = above[6] = above[7] = 0;
+}
+
 /* A new triangle overlaps the old triangles between v and itself on its side of u; the one that holds u may overlap all.
  * (An old triangle whose base lies beyond a new spoke has its apex, u, on this side of it, or both on the other.) */
 static void drift_by_height(const view *w, collapse_effect *effect)
 {
     const strl_star *star = w->star;
     const uint8_t *triangle = &star->fan.triangle[w->v_at];
-    double up[3], down[3]; /* the normal's positive and negative part: one of each two is 0 */
-    for (unsigned k = 0; k < 3; k++) {
-        double n = star->fan.axis[2][k];
-        up[k] = n > 0 ? n : 0;
-        down[k] = n > 0 ? 0 : -n;
-    }
-    float moved[6];
-    box_of_way(w->moved, moved);
+    const face *faces = w->s->faces;
+    float moved[6], below[8], above[8], longest = 0;
     reach sum = {{0}};
+    list_gap_reaches(star->fan.axis[2], below, above);
+    box_of_way(w->moved, moved);
     for (uint32_t m = w->first; m < w->image; m++) {
-        strl__unite(&sum, &w->s->faces[star->triangle[triangle[m]]].reach);
+        strl__unite(&sum, &faces[star->triangle[triangle[m]]].reach);
         effect->of[triangle[m]] = sum;
     }
     sum = (reach){{0}};
     for (uint32_t m = w->end - 1; m > w->image; m--) {
-        strl__unite(&sum, &w->s->faces[star->triangle[triangle[m]]].reach);
+        strl__unite(&sum, &faces[star->triangle[triangle[m]]].reach);
         effect->of[triangle[m]] = sum;
     }
     effect->of[triangle[w->image]] = effect->all;
     for (uint32_t m = 1; m + 1 < w->n; m++) {
         reach *own = &effect->of[triangle[m]];
+        float lower = (float)-w->least[m], higher = (float)w->most[m]; /* neither is negative */
         if (!star->closed)
             add_box(own->of, moved);
-        double below = -w->least[m], above = w->most[m]; /* neither is negative */
-        for (unsigned k = 0; k < 3; k++) {
-            own->of[k] = (own->of[k] + (float)(below * up[k] + above * down[k])) * STRL_ROUND_UP;
-            own->of[3 + k] = (own->of[3 + k] + (float)(above * up[k] + below * down[k])) * STRL_ROUND_UP;
-        }
+        for (unsigned k = 0; k < 8; k++)
+            own->of[k] = (own->of[k] + (lower * below[k] + higher * above[k])) * STRL_ROUND_UP;
+        longest = strl__larger(longest, strl__drift_squared(own));
     }
+    effect->longest = sqrtf(longest) * (1 + 1e-6f); /* whatever the rounding, a bound */
 }
 
 /* The wedge of each point of the ring, as the star's triangles use it. */
@@ -224,7 +240,7 @@ static void list_ring_wedges(const simplifier *s, const strl_star *star, uint32_
 {
     const strl_fan *fan = &star->fan;
     for (uint32_t i = 0; i < fan->n; i++) {
-        wedge[i] = s->sites[fan->point[i]].only_wedge;
+        wedge[i] = s->sites[star->neighbour[i]].only_wedge;
         if (wedge[i] == NO_INDEX) {
             bool begins = i < star->count;
             uint32_t t = fan->triangle[begins ? i : i - 1];
@@ -339,6 +355,20 @@ static void pulled_drift(const simplifier *s, uint32_t triangle, unsigned c, con
     add_box(drift, most);
 }
 
+static float longest_straight(const simplifier *s, const strl_star *star, uint32_t to, const collapse_effect *effect)
+{
+    float longest = 0;
+    for (uint32_t i = 0; i < star->count; i++)
+        if (star->next[i] != to && star->previous[i] != to)
+            longest = strl__larger(longest, strl__drift_squared(&effect->of[i]));
+    for (uint32_t i = 0; i < effect->receivers; i++) {
+        reach both = effect->orphan;
+        strl__unite(&both, &s->faces[effect->receiver[i]].reach);
+        longest = strl__larger(longest, strl__drift_squared(&both));
+    }
+    return sqrtf(longest) * (1 + 1e-6f); /* whatever the rounding, a bound */
+}
+
 /* Every point of the star goes towards v by a share of the way from u. A vanishing triangle (u, v, x) falls onto the edge v-x. Where
  * no triangle of the star keeps that edge, another one at v takes its drift over; where none keeps the edge at all, its points
  * are still within |v - x| of v, which the caller knows to stay. */
@@ -379,20 +409,7 @@ static void drift_straight(const simplifier *s, const strl_star *star, uint32_t 
                 effect->is_mixed[k] = true;
             }
     }
-}
-
-static float find_longest(const simplifier *s, const strl_star *star, uint32_t to, const collapse_effect *effect)
-{
-    float longest = 0;
-    for (uint32_t i = 0; i < star->count; i++)
-        if (star->next[i] != to && star->previous[i] != to)
-            longest = strl__larger(longest, strl__drift_squared(&effect->of[i]));
-    for (uint32_t i = 0; i < effect->receivers; i++) {
-        reach both = effect->orphan;
-        strl__unite(&both, &s->faces[effect->receiver[i]].reach);
-        longest = strl__larger(longest, strl__drift_squared(&both));
-    }
-    return sqrtf(longest) * (1 + 1e-6f); /* whatever the rounding, a bound */
+    effect->longest = longest_straight(s, star, to, effect);
 }
 
 void strl__collapse_effect(const simplifier *s, const strl_star *star, uint32_t to, collapse_effect *effect)
@@ -410,8 +427,6 @@ void strl__collapse_effect(const simplifier *s, const strl_star *star, uint32_t 
         strl__unite(&effect->all, &s->faces[star->triangle[i]].reach);
     begin_watch(s, star, to, has_view, &seen, effect);
     if (has_view) {
-        for (uint32_t m = 0; m < w.n; m++)
-            w.least[m] = w.most[m] = 0;
         note_crossings(&w, &seen, effect);
         effect->spoke_normal = sqrtf(seen.normal_squared);
     }
@@ -422,7 +437,6 @@ void strl__collapse_effect(const simplifier *s, const strl_star *star, uint32_t 
         effect->image = star->fan.triangle[w.v_at + w.image];
     } else
         drift_straight(s, star, to, effect);
-    effect->longest = find_longest(s, star, to, effect);
 }
 
 /* The pull of a triangle, begun where it has none. */

@@ -26,9 +26,11 @@ static void add_triangle_quadrics(simplifier *s, uint32_t t)
         return;
     for (unsigned k = 0; k < 3; k++)
         n[k] /= length;
+    quadric plane = {0};
+    strl__quadric_add_plane(&plane, n, s->sites[point[0]].position, length * 0.5);
     for (unsigned c = 0; c < 3; c++) {
         uint32_t wedge = s->corner[t][c];
-        strl__quadric_add_plane(&s->quadrics[point[c]], n, s->sites[point[c]].position, length * 0.5);
+        strl__quadric_add(&s->quadrics[point[c]], &plane);
         for (unsigned k = 0; k < 3; k++)
             s->normal_sum[wedge][k] += (float)length * s->normal[wedge][k];
     }
@@ -96,7 +98,7 @@ static bool allocate(simplifier *s, strl_arena *arena)
     s->normal = strl_arena_alloc(arena, wedges, sizeof *s->normal);
     s->colour = strl_arena_alloc(arena, wedges, sizeof *s->colour);
     s->normal_sum = strl_arena_alloc_zero(arena, wedges, sizeof *s->normal_sum);
-    s->heap = strl_arena_alloc(arena, points, sizeof *s->heap);
+    s->heap = strl_arena_alloc(arena, points + HEAP_WAYS, sizeof *s->heap);
     s->plan = strl_arena_alloc_zero(arena, points, sizeof *s->plan);
     return s->sites && s->faces && s->pulls && s->quadrics && s->normal && s->colour && s->normal_sum && s->heap && s->plan;
 }
@@ -133,7 +135,7 @@ static void load_points(simplifier *s)
 {
     const strl_mesh *mesh = s->mesh;
     for (uint32_t p = 0; p < mesh->point_count; p++) {
-        s->sites[p] = (site){.head = NO_INDEX, .tail = NO_INDEX, .heap_at = NO_INDEX, .only_wedge = NO_INDEX,
+        s->sites[p] = (site){.head = NO_INDEX, .tail = NO_INDEX, .only_wedge = NO_INDEX,
                              .flags = mesh->flags[p], .holders = mesh->holders ? mesh->holders[p] : 0};
         for (unsigned k = 0; k < 3; k++)
             s->sites[p].position[k] = mesh->position[p][k];
@@ -185,6 +187,7 @@ bool strl__simplify_load(simplifier *s, strl_arena *arena, strl_simplified *resu
     if (!allocate_result(s, result, arena) || !allocate(s, arena))
         return false;
     s->corner = result->corner;
+    memset(s->heap, 0xff, (s->mesh->point_count + HEAP_WAYS) * sizeof *s->heap); /* NO_CANDIDATE */
     load_points(s);
     load_wedges(s, result);
     for (uint32_t t = 0; t < s->mesh->triangle_count; t++)

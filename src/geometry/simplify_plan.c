@@ -65,7 +65,7 @@ static bool fan_keeps_orientation(const strl_fan *fan, uint32_t v_at, uint32_t f
 static bool keeps_orientation(const simplifier *s, const strl_star *star, uint32_t to)
 {
     if (star->manifold) {
-        uint32_t n = star->fan.n, v_at = strl__fan_at(&star->fan, to);
+        uint32_t n = star->fan.n, v_at = strl__neighbour_at(s, star, to);
         if (star->closed)
             return fan_keeps_orientation(&star->fan, v_at, 1, n - 1);
         return v_at == 0 || v_at == n - 1 ? fan_keeps_orientation(&star->fan, v_at, 1, n - 1) : false;
@@ -86,8 +86,7 @@ static bool keeps_orientation(const simplifier *s, const strl_star *star, uint32
 /* The link condition: u and v share exactly the neighbours that the triangles of their edge name. The star's stamps must be in force. */
 static bool link_is_disk(const simplifier *s, const strl_star *star, uint32_t to)
 {
-    bool seen[2 * STAR_MAX] = {false};
-    unsigned common = 0;
+    uint64_t seen[2] = {0, 0}; /* of 2 * STAR_MAX neighbours */
     for (uint32_t corner = s->sites[to].head, next; corner != NO_INDEX; corner = next) {
         const face *f = &s->faces[corner >> 2];
         unsigned c = corner & 3;
@@ -95,21 +94,18 @@ static bool link_is_disk(const simplifier *s, const strl_star *star, uint32_t to
         if (f->gone)
             continue;
         for (unsigned k = 1; k < 3; k++) {
-            uint32_t stamp = s->sites[f->point[(c + k) % 3]].stamp;
-            if (stamp > star->stamp && !seen[stamp - star->stamp - 1]) {
-                seen[stamp - star->stamp - 1] = true;
-                common++;
-            }
+            uint32_t at = strl__neighbour_at(s, star, f->point[(c + k) % 3]);
+            if (at != NO_INDEX)
+                seen[at / 64] |= UINT64_C(1) << at % 64;
         }
     }
-    return common == strl__star_uses(s, star, to);
+    return (unsigned)__builtin_popcountll(seen[0]) + (unsigned)__builtin_popcountll(seen[1]) == strl__star_uses(s, star, to);
 }
 
 bool strl__leaves_surface_at(const simplifier *s, const strl_star *star, uint32_t to)
 {
-    for (uint32_t i = 0; i < star->count; i++)
-        if (star->next[i] != to && star->previous[i] != to)
-            return true;
+    if (strl__star_uses(s, star, to) < star->count)
+        return true;
     for (uint32_t corner = s->sites[to].head, next; corner != NO_INDEX; corner = next) {
         const face *f = &s->faces[corner >> 2];
         next = f->next[corner & 3];

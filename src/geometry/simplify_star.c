@@ -1,16 +1,25 @@
 #include "geometry/simplify_star.h"
 
 #include <math.h>
+#include <string.h>
 
 /* Larger than any difference of attributes. */
 #define OTHER_PALETTE 1e6f
 
-/* Which neighbour each triangle's next and previous points are. */
-typedef struct sides {
-    uint8_t next[STAR_MAX], previous[STAR_MAX];
-} sides;
+/* Stamps for `count` neighbours, and one more; all begin anew where numbers end. */
+static uint32_t take_stamps(simplifier *s, uint32_t count)
+{
+    if (s->tick > UINT32_MAX - count - 1) {
+        for (uint32_t p = 0; p < s->mesh->point_count; p++)
+            s->sites[p].stamp = 0;
+        s->tick = 0;
+    }
+    uint32_t first = s->tick;
+    s->tick += count + 1;
+    return first;
+}
 
-static uint8_t count_use(simplifier *s, strl_star *star, uint32_t point)
+static void count_use(simplifier *s, strl_star *star, uint32_t point)
 {
     uint32_t *stamp = &s->sites[point].stamp;
     if (*stamp <= star->stamp) {
@@ -18,65 +27,73 @@ static uint8_t count_use(simplifier *s, strl_star *star, uint32_t point)
         star->uses[star->neighbour_count++] = 0;
         *stamp = star->stamp + star->neighbour_count;
     }
-    uint32_t i = *stamp - star->stamp - 1;
-    star->uses[i]++;
-    return (uint8_t)i;
+    star->uses[*stamp - star->stamp - 1]++;
 }
 
 /* Counts the triangles at each neighbour; an odd count makes the edge a boundary edge. */
-static void count_uses(simplifier *s, strl_star *star, sides *at)
+static void count_uses(simplifier *s, strl_star *star)
 {
     star->neighbour_count = 0;
-    if (s->tick > UINT32_MAX - 2 * STAR_MAX - 1) {
-        for (uint32_t p = 0; p < s->mesh->point_count; p++)
-            s->sites[p].stamp = 0;
-        s->tick = 0;
-    }
-    star->stamp = s->tick;
+    star->stamp = take_stamps(s, 2 * STAR_MAX);
     for (uint32_t i = 0; i < star->count; i++) {
-        at->next[i] = count_use(s, star, star->next[i]);
-        at->previous[i] = count_use(s, star, star->previous[i]);
+        count_use(s, star, star->next[i]);
+        count_use(s, star, star->previous[i]);
     }
-    s->tick += star->neighbour_count + 1;
     star->on_boundary = false;
     for (uint32_t i = 0; i < star->neighbour_count; i++)
         star->on_boundary |= star->uses[i] & 1;
 }
 
-/* Chains the triangles into one fan, if they are one: order[i + 1] follows order[i] counter-clockwise. */
-static bool order_fan(strl_star *star, const sides *at, uint8_t *order)
+static uint32_t find_point(const uint32_t *points, uint32_t count, uint32_t point)
 {
-    uint8_t by_next[2 * STAR_MAX]; /* triangle whose `next` is the neighbour; STAR_MAX = none */
-    uint32_t start = 0, open_ends = 0, done = 0;
-    star->closed = false;
-    for (uint32_t i = 0; i < star->neighbour_count; i++) {
-        if (star->uses[i] > 2)
-            return false;
-        by_next[i] = STAR_MAX;
-    }
-    for (uint32_t i = 0; i < star->count; i++) {
-        if (by_next[at->next[i]] != STAR_MAX)
-            return false; /* two triangles leave the same neighbour: not oriented alike */
-        by_next[at->next[i]] = (uint8_t)i;
-    }
-    bool followed[STAR_MAX] = {false};
-    for (uint32_t i = 0; i < star->count; i++)
-        if (by_next[at->previous[i]] != STAR_MAX)
-            followed[by_next[at->previous[i]]] = true;
-    for (uint32_t i = 0; i < star->count; i++)
-        if (!followed[i]) {
-            start = i;
-            open_ends++;
-        }
-    if (open_ends > 1)
+    uint32_t i = 0;
+    while (i < count && points[i] != point)
+        i++;
+    return i;
+}
+
+/* Chains the triangles into one fan, if they are one: order[i + 1] follows order[i] counter-clockwise. */
+static bool order_fan(strl_star *star, uint8_t *order)
+{
+    uint32_t count = star->count, done = 1, at = find_point(star->next, count, star->previous[0]);
+    order[0] = 0;
+    for (; at != 0 && at < count && done < count; at = find_point(star->next, count, star->previous[at]))
+        order[done++] = (uint8_t)at;
+    star->closed = at == 0;
+    if (star->closed)
+        return done == count && count >= 3;
+    if (at < count)
+        return false; /* it goes round, but not back to the first */
+    uint8_t before[STAR_MAX];
+    uint32_t more = 0;
+    for (at = 0; (at = find_point(star->previous, count, star->next[at])) < count && done + more < count;)
+        before[more++] = (uint8_t)at;
+    if (at < count || done + more < count)
         return false;
-    uint32_t i = start;
-    do {
-        order[done++] = (uint8_t)i;
-        i = by_next[at->previous[i]];
-    } while (i != STAR_MAX && i != start && done < star->count);
-    star->closed = i == start && open_ends == 0;
-    return done == star->count && (!star->closed || star->count >= 3);
+    memmove(order + more, order, done);
+    for (uint32_t i = 0; i < more; i++)
+        order[more - 1 - i] = before[i];
+    return true;
+}
+
+/* Lists the ring's points as neighbours, in fan order. False where one comes twice: then it is no fan. */
+static bool list_ring(simplifier *s, strl_star *star, const uint8_t *order)
+{
+    uint32_t n = star->closed ? star->count : star->count + 1;
+    star->stamp = take_stamps(s, n);
+    star->neighbour_count = n;
+    star->on_boundary = !star->closed;
+    for (uint32_t i = 0; i < n; i++) {
+        uint32_t p = i < star->count ? star->next[order[i]] : star->previous[order[i - 1]];
+        if (s->sites[p].stamp > star->stamp)
+            return false;
+        s->sites[p].stamp = star->stamp + 1 + i;
+        star->neighbour[i] = p;
+        star->uses[i] = 2;
+    }
+    if (!star->closed)
+        star->uses[0] = star->uses[n - 1] = 1;
+    return true;
 }
 
 /* Axes with the last one along the normal of the ring's polygon. */
@@ -111,27 +128,30 @@ static bool find_axes(strl_fan *fan)
 }
 
 /* Stores a ring's second round. */
-static void repeat(double *values, uint32_t n)
+static inline void repeat(double *values, uint32_t n)
 {
-    for (uint32_t i = 0; i < n; i++)
-        values[n + i] = values[i];
+    if (n <= LANES) {
+        double ring[LANES];
+        memcpy(ring, values, sizeof ring);
+        memcpy(values + n, ring, sizeof ring);
+    } else
+        memcpy(values + n, values, n * sizeof *values);
 }
 
 static void flatten(const simplifier *s, strl_star *star, const uint8_t *order)
 {
     strl_fan *fan = &star->fan;
-    uint32_t n = fan->n = star->closed ? star->count : star->count + 1;
+    uint32_t n = fan->n = star->neighbour_count, lanes = strl__lanes(n);
     const double *u = s->sites[star->point].position;
     for (uint32_t i = 0; i < n; i++) {
-        uint32_t p = i < star->count ? star->next[order[i]] : star->previous[order[i - 1]];
-        fan->point[i] = fan->point[n + i] = p;
+        const double *p = s->sites[star->neighbour[i]].position;
         fan->triangle[i] = fan->triangle[n + i] = i < star->count ? order[i] : 0;
         for (unsigned k = 0; k < 3; k++)
-            fan->x[k][i] = s->sites[p].position[k] - u[k];
+            fan->x[k][i] = p[k] - u[k];
     }
     for (unsigned k = 0; k < 3; k++)
         repeat(fan->x[k], n);
-    for (uint32_t i = 0; i < n; i++) {
+    for (uint32_t i = 0; i < lanes; i++) {
         fan->cross[0][i] = fan->x[1][i] * fan->x[2][i + 1] - fan->x[2][i] * fan->x[1][i + 1];
         fan->cross[1][i] = fan->x[2][i] * fan->x[0][i + 1] - fan->x[0][i] * fan->x[2][i + 1];
         fan->cross[2][i] = fan->x[0][i] * fan->x[1][i + 1] - fan->x[1][i] * fan->x[0][i + 1];
@@ -140,7 +160,7 @@ static void flatten(const simplifier *s, strl_star *star, const uint8_t *order)
         repeat(fan->cross[k], n);
     fan->has_axes = find_axes(fan);
     for (unsigned k = 0; k < 3 && fan->has_axes; k++) {
-        for (uint32_t i = 0; i < n; i++)
+        for (uint32_t i = 0; i < lanes; i++)
             fan->flat[k][i] = fan->x[0][i] * fan->axis[k][0] + fan->x[1][i] * fan->axis[k][1] + fan->x[2][i] * fan->axis[k][2];
         repeat(fan->flat[k], n);
     }
@@ -173,21 +193,13 @@ bool strl__star_gather(simplifier *s, uint32_t point, strl_star *star)
         star->previous[count++] = f->point[c == 0 ? 2 : c - 1];
     }
     star->count = count;
-    sides at;
     uint8_t order[STAR_MAX];
-    count_uses(s, star, &at);
-    star->manifold = count > 0 && order_fan(star, &at, order);
+    star->manifold = count > 0 && order_fan(star, order) && list_ring(s, star, order);
     if (star->manifold)
         flatten(s, star, order);
+    else
+        count_uses(s, star);
     return true;
-}
-
-uint32_t strl__fan_at(const strl_fan *fan, uint32_t point)
-{
-    for (uint32_t i = 0; i < fan->n; i++)
-        if (fan->point[i] == point)
-            return i;
-    return NO_INDEX;
 }
 
 static float attribute_difference(const simplifier *s, uint32_t a, uint32_t b)

@@ -43,6 +43,13 @@ typedef struct pull {
     float corner[3][6];
 } pull;
 
+/* What a candidate's key says. */
+enum {
+    STATE_STALE,     /* the neighbourhood has changed since */
+    STATE_ESTIMATED, /* about what a plan will cost */
+    STATE_PLANNED    /* what its plan costs */
+};
+
 typedef struct site {
     double position[3];
     double own_cost;     /* its quadric at its own position */
@@ -51,23 +58,33 @@ typedef struct site {
     uint32_t only_wedge; /* its wedge where it has just one; else NO_INDEX */
     uint32_t palette;    /* of that wedge */
     uint32_t stamp;      /* against `tick` */
-    uint32_t heap_at;    /* NO_INDEX = not in the heap */
     uint8_t flags;       /* STRL_POINT_... */
     uint8_t holders;     /* follows the collapses; 0 where the mesh has none */
-    bool stale;          /* the neighbourhood has changed since its plan was made */
+    uint8_t state;       /* STATE_... */
+    bool in_heap;
 } site;
 
-/* The fan of a manifold star, flattened; fan order throughout. Rings are stored twice over, so that ring + v_at begins anywhere:
- * a closed fan has n points and triangles, an open one n points and n - 1 triangles; triangle i lies between points i and i + 1. */
+/* Loops over a ring run in steps of so many, whatever its length, so that vector registers do them; what lies beyond the ring's end is
+ * finite and not looked at. */
+#define LANES 8u
+#define RING_ROOM (2 * RING_MAX + 14)
+
+static inline uint32_t strl__lanes(uint32_t n)
+{
+    return (n + LANES - 1) / LANES * LANES;
+}
+
+/* The fan of a manifold star, flattened; fan order throughout, which is that of the star's neighbours. Rings are stored twice over, so
+ * that ring + v_at begins anywhere: a closed fan has n points and triangles, an open one n points and n - 1 triangles; triangle i lies
+ * between points i and i + 1. */
 typedef struct strl_fan {
     uint32_t n;
-    uint32_t point[2 * RING_MAX];
-    uint8_t triangle[2 * RING_MAX]; /* index in the star; meaningless for an open fan's last */
-    double x[3][2 * RING_MAX];      /* relative to the star's point */
-    double cross[3][2 * RING_MAX];  /* x[i] times x[i + 1]: twice the area of triangle i */
+    uint8_t triangle[RING_ROOM];    /* index in the star; meaningless for an open fan's last */
+    double x[3][RING_ROOM];         /* relative to the star's point */
+    double cross[3][RING_ROOM];     /* x[i] times x[i + 1]: twice the area of triangle i */
     double axis[3][3];              /* the last one is the unit normal of the ring's polygon */
     bool has_axes;
-    double flat[3][2 * RING_MAX];   /* along the axes */
+    double flat[3][RING_ROOM];      /* along the axes */
 } strl_fan;
 
 /* The live triangles round one point. */
@@ -79,7 +96,7 @@ typedef struct strl_star {
     uint32_t next[STAR_MAX];      /* the other two points, counter-clockwise: point, next, previous */
     uint32_t previous[STAR_MAX];
     uint32_t neighbour_count;
-    uint32_t neighbour[2 * STAR_MAX]; /* different ones, in order of first appearance */
+    uint32_t neighbour[2 * STAR_MAX]; /* different ones; in fan order where manifold, else in order of first appearance */
     uint8_t uses[2 * STAR_MAX];   /* triangles that hold the edge to that neighbour */
     uint32_t stamp;               /* neighbour i is stamped stamp + 1 + i until the next star is gathered */
     bool on_boundary;             /* some edge is used by an odd number of triangles */
@@ -115,10 +132,10 @@ typedef struct collapse_effect {
     float spoke_reach;       /* how far from v a point of the patch can be */
 } collapse_effect;
 
-typedef struct candidate {
-    float key;
-    uint32_t point;
-} candidate;
+/* A point below the bits of its key: keys are not negative, so their bits are ordered as they are, and ties go by point. */
+typedef uint64_t candidate;
+#define NO_CANDIDATE UINT64_MAX
+#define HEAP_WAYS 4u /* children of a candidate: half a cache line */
 
 typedef struct simplifier {
     const strl_mesh *mesh;
@@ -138,8 +155,7 @@ typedef struct simplifier {
     double diagonal;        /* of the points' box */
     float free_key;         /* the largest key that was claimed before anything collapsed */
     strl_simplify_rung rung;
-    /* candidates: a binary heap of points by key */
-    candidate *heap;
+    candidate *heap;        /* the least first; NO_CANDIDATE after the last */
     uint32_t heap_count;
     collapse_plan *plan;    /* per point: the best collapse, valid where not stale */
     /* the star that was planned last, with the effect of its plan: most plans are carried out at once */
@@ -192,8 +208,12 @@ static inline unsigned strl__star_uses(const simplifier *s, const strl_star *sta
     uint32_t stamp = s->sites[point].stamp;
     return stamp > star->stamp ? star->uses[stamp - star->stamp - 1] : 0;
 }
-/* Where `point` stands in the fan of a manifold star; NO_INDEX where it does not. */
-uint32_t strl__fan_at(const strl_fan *fan, uint32_t point);
+/* Which neighbour of the star the point is; NO_INDEX where it is none. Same condition. */
+static inline uint32_t strl__neighbour_at(const simplifier *s, const strl_star *star, uint32_t point)
+{
+    uint32_t stamp = s->sites[point].stamp;
+    return stamp > star->stamp ? stamp - star->stamp - 1 : NO_INDEX;
+}
 /* The wedge of v that a wedge of u falls onto. *exact: a triangle of the edge says so; else it is the one of v's that looks most
  * like it, of the same palette where the rung does not allow others. NO_INDEX = none. */
 uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32_t to, uint32_t wedge, bool *exact);

@@ -21,6 +21,8 @@ typedef struct strl_file_info {
 
 strl_status strl_file_open(const char *path, strl_file **file, strl_error *err);   /* read only; a regular file */
 strl_status strl_file_create(const char *path, strl_file **file, strl_error *err); /* read and write; truncates */
+/* Read and write; a regular file that is there and has at least `bytes` bytes, to which it is cut. */
+strl_status strl_file_reopen(const char *path, uint64_t bytes, strl_file **file, strl_error *err);
 /* Read and write; without a name in `folder`, so that nothing of it is left when it is closed or the process ends. */
 strl_status strl_file_create_nameless(const char *folder, strl_file **file, strl_error *err);
 strl_status strl_file_close(strl_file *file, strl_error *err); /* NULL is legal; reports a late write error */

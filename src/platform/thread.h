@@ -30,6 +30,10 @@ uint64_t strl_clock_ns(void);     /* monotonic */
 uint64_t strl_clock_cpu_ns(void); /* processor time of this process, all threads */
 void strl_sleep_ns(uint64_t ns);
 unsigned strl_cpu_count(void);              /* processors this process may use, at least 1 */
+/* What this thread has made the system fetch from a disk so far and waited for: blocks of 512 bytes and pages, as the system
+ * counts them. It does not grow where a thread never waits for a disk. */
+uint64_t strl_thread_disk_waits(void);
+uint64_t strl_process_rss_bytes(void);      /* the operating system's resident set now; 0 where it does not tell */
 uint64_t strl_process_peak_rss_bytes(void); /* the operating system's peak resident set, children included */
 void strl_process_forget_peak(void);        /* counts the peak anew from here on, where the system can */
 void strl_cpu_model(char *model, size_t size); /* as the system names it; "unknown" where it does not */

@@ -47,7 +47,7 @@ static inline void strl__pack_learn(strl_pack_model *model, unsigned length)
     model->length = (uint16_t)(model->length + ((int)(length << 8) - (int)model->length) / 8);
 }
 
-static inline void strl__pack_bits(strl_packer *packer, unsigned count, uint32_t bits)
+static inline void strl__pack_bits(strl_packer *packer, unsigned count, uint32_t bits) /* at most 32 */
 {
     packer->pending |= (uint64_t)bits << packer->count;
     packer->count += count;
@@ -62,12 +62,16 @@ static inline void strl__pack_bits(strl_packer *packer, unsigned count, uint32_t
 static inline void strl_pack(strl_packer *packer, strl_pack_model *model, uint32_t value)
 {
     unsigned length = strl_pack_length(value);
-    unsigned distance = strl_pack_zigzag(length - strl__pack_expected(model));
-    for (; distance >= 31; distance -= 31)
-        strl__pack_bits(packer, 31, 0);
-    strl__pack_bits(packer, distance + 1, 1u << distance);
-    if (length > 1)
-        strl__pack_bits(packer, length - 1, value & ((1u << (length - 1)) - 1));
+    unsigned distance = strl_pack_zigzag(length - strl__pack_expected(model)), rest = length > 1 ? length - 1 : 0;
+    uint32_t low = value & (uint32_t)((UINT64_C(1) << rest) - 1);
+    if (distance + 1 + rest <= 32) /* nearly always */
+        strl__pack_bits(packer, distance + 1 + rest, (uint32_t)((uint64_t)low << (distance + 1)) | 1u << distance);
+    else {
+        for (; distance >= 31; distance -= 31)
+            strl__pack_bits(packer, 31, 0);
+        strl__pack_bits(packer, distance + 1, 1u << distance);
+        strl__pack_bits(packer, rest, low);
+    }
     strl__pack_learn(model, length);
 }
 
@@ -102,7 +106,8 @@ static inline uint32_t strl__unpack_bits(strl_unpacker *unpacker, unsigned count
     return bits;
 }
 
-static inline uint32_t strl_unpack(strl_unpacker *unpacker, strl_pack_model *model)
+/* The distance of a length from the expected one; 64 or more in damaged data only. */
+static inline unsigned strl__unpack_distance(strl_unpacker *unpacker)
 {
     unsigned distance = 0;
     for (bool more = true; more && distance <= 64 && !unpacker->failed;) {
@@ -112,7 +117,21 @@ static inline uint32_t strl_unpack(strl_unpacker *unpacker, strl_pack_model *mod
         strl__unpack_bits(unpacker, more ? zeros : zeros + 1);
         distance += zeros;
     }
-    unsigned length = strl__pack_expected(model) + strl_unpack_zigzag(distance);
+    return distance;
+}
+
+static inline uint32_t strl_unpack(strl_unpacker *unpacker, strl_pack_model *model)
+{
+    uint64_t bits = unpacker->end - unpacker->at >= 64 ? strl__unpack_peek(unpacker) : 0; /* 57 of them at least */
+    unsigned zeros = (uint32_t)bits ? (unsigned)__builtin_ctz((uint32_t)bits) : 32;
+    unsigned length = strl__pack_expected(model) + strl_unpack_zigzag(zeros), rest = length > 1 ? length - 1 : 0;
+    if (zeros < 24 && length <= 32) { /* nearly always: both parts are in these bits */
+        uint32_t low = (uint32_t)(bits >> (zeros + 1) & ((UINT64_C(1) << rest) - 1));
+        unpacker->at += zeros + 1 + rest;
+        strl__pack_learn(model, length);
+        return length > 1 ? 1u << rest | low : length;
+    }
+    length = strl__pack_expected(model) + strl_unpack_zigzag(strl__unpack_distance(unpacker));
     if (unpacker->failed || length > 32) {
         unpacker->failed = true;
         return 0;

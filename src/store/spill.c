@@ -1,46 +1,14 @@
 #include "store/spill.h"
 
 #include <inttypes.h>
-#include <stdatomic.h>
-#include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
-#include "platform/file.h"
-#include "platform/thread.h"
+#include "store/spill_internal.h"
 
 #define DEFAULT_BUFFER_BYTES ((size_t)256 << 10)
-/* A multiple of every common block size, and large enough to keep punching off the profile. */
-#define DROP_STEP_BYTES ((uint64_t)16 << 10)
-#define MOST_NAME_BYTES 200
-
-struct strl_spill_set {
-    char *directory; /* owned */
-    uint64_t limit_bytes;
-
-    strl_mutex mutex; /* guards all below */
-    strl_spill *open; /* list of open streams; owned */
-    uint64_t bytes;
-    uint64_t peak_bytes;
-};
-
-struct strl_spill {
-    strl_spill_set *set;
-    strl_spill *next; /* in the set's list, under its mutex */
-    char *name;       /* owned */
-    strl_file *file;  /* owned; NULL until created */
-    bool kept;        /* from an earlier run: not appended to */
-    uint8_t *buffer;  /* owned; NULL between flush and append */
-    size_t buffer_bytes;
-    size_t buffered;
-    _Atomic uint64_t flushed; /* bytes that may be read */
-    /* under the set's mutex: */
-    uint16_t *dropped; /* [dropped_capacity] of each step, bytes that will not be read any more; owned */
-    size_t dropped_capacity;
-    uint64_t given_back; /* of the dropped bytes, those off the count */
-};
 
 strl_status strl_spill_set_create(const char *directory, uint64_t limit_bytes, strl_spill_set **set, strl_error *err)
 {
@@ -65,24 +33,32 @@ strl_status strl_spill_set_create(const char *directory, uint64_t limit_bytes, s
     return STRL_OK;
 }
 
-static void release(strl_spill *spill)
+void strl__spill_release(strl_spill *spill)
 {
     strl_file_close(spill->file, NULL); /* a late write error concerns bytes nobody will read */
     strl__free(spill->buffer);
     strl__free(spill->dropped);
+    strl__free(spill->sums);
+    strl__free(spill->tail);
     strl__free(spill->name);
     strl__free(spill);
+}
+
+static void release_list(strl_spill *first)
+{
+    while (first) {
+        strl_spill *next = first->next;
+        strl__spill_release(first);
+        first = next;
+    }
 }
 
 void strl_spill_set_destroy(strl_spill_set *set)
 {
     if (!set)
         return;
-    while (set->open) {
-        strl_spill *next = set->open->next;
-        release(set->open);
-        set->open = next;
-    }
+    release_list(set->open);
+    release_list(set->retired); /* the last save may need their files */
     strl_mutex_deinit(&set->mutex);
     strl__free(set->directory);
     strl__free(set);
@@ -105,7 +81,7 @@ uint64_t strl_spill_set_peak_bytes(strl_spill_set *set)
 }
 
 /* Before the bytes are written, so that streams of several threads cannot pass the limit together. */
-static strl_status reserve(strl_spill_set *set, uint64_t size, strl_error *err)
+strl_status strl__spill_reserve(strl_spill_set *set, uint64_t size, strl_error *err)
 {
     strl_status status = STRL_OK;
     strl_mutex_lock(&set->mutex);
@@ -120,7 +96,7 @@ static strl_status reserve(strl_spill_set *set, uint64_t size, strl_error *err)
     return status;
 }
 
-static void settle(strl_spill_set *set, uint64_t size, bool written)
+void strl__spill_count(strl_spill_set *set, uint64_t size, bool written)
 {
     strl_mutex_lock(&set->mutex);
     if (!written)
@@ -130,12 +106,17 @@ static void settle(strl_spill_set *set, uint64_t size, bool written)
     strl_mutex_unlock(&set->mutex);
 }
 
+static bool is_listed(const strl_spill *list, const char *name)
+{
+    while (list && strcmp(list->name, name) != 0)
+        list = list->next;
+    return list != NULL;
+}
+
 static bool link_stream(strl_spill_set *set, strl_spill *spill)
 {
     strl_mutex_lock(&set->mutex);
-    const strl_spill *same = set->open;
-    while (same && strcmp(same->name, spill->name) != 0)
-        same = same->next;
+    bool same = is_listed(set->open, spill->name) || is_listed(set->retired, spill->name);
     if (!same) {
         spill->next = set->open;
         set->open = spill;
@@ -144,7 +125,7 @@ static bool link_stream(strl_spill_set *set, strl_spill *spill)
     return !same;
 }
 
-static void unlink_stream(strl_spill_set *set, const strl_spill *spill)
+void strl__spill_unlink(strl_spill_set *set, const strl_spill *spill)
 {
     strl_mutex_lock(&set->mutex);
     strl_spill **at = &set->open;
@@ -155,9 +136,9 @@ static void unlink_stream(strl_spill_set *set, const strl_spill *spill)
 }
 
 /* A linked stream without a file yet; its name is taken from then on. */
-static strl_status new_stream(strl_spill_set *set, const char *name, strl_spill **spill, strl_error *err)
+strl_status strl__spill_new(strl_spill_set *set, const char *name, strl_spill **spill, strl_error *err)
 {
-    if (!*name || strchr(name, '/') || name[0] == '.' || strlen(name) > MOST_NAME_BYTES)
+    if (!*name || strchr(name, '/') || name[0] == '.' || strlen(name) > STRL__SPILL_NAME_BYTES)
         return strl__fail(err, STRL_ERR_ARGUMENT, "\"%.300s\" is no name for a scratch file", name);
     strl_spill *made = strl__alloc_zero(1, sizeof *made);
     char *copy = strl__strdup(name);
@@ -179,10 +160,11 @@ static strl_status new_stream(strl_spill_set *set, const char *name, strl_spill 
     return STRL_OK;
 }
 
-static strl_status with_path(strl_spill *spill,
-                             strl_status (*call)(strl_spill *spill, const char *path, strl_error *err), strl_error *err)
+strl_status strl__spill_with_path(strl_spill *spill,
+                                  strl_status (*call)(strl_spill *spill, const char *path, strl_error *err),
+                                  strl_error *err)
 {
-    char file[MOST_NAME_BYTES + sizeof STRL_SPILL_SUFFIX];
+    char file[STRL__SPILL_NAME_BYTES + sizeof STRL_SPILL_SUFFIX];
     snprintf(file, sizeof file, "%s" STRL_SPILL_SUFFIX, spill->name);
     char *path = strl_path_join(spill->set->directory, file);
     strl_status status = path ? call(spill, path, err)
@@ -196,74 +178,50 @@ static strl_status create_file(strl_spill *spill, const char *path, strl_error *
     return strl_file_create(path, &spill->file, err);
 }
 
-static strl_status open_file(strl_spill *spill, const char *path, strl_error *err)
+static strl_status open_stream(strl_spill_set *set, const char *name, size_t buffer_bytes, bool kept,
+                               strl_spill **spill, strl_error *err)
 {
-    return strl_file_open(path, &spill->file, err);
+    *spill = NULL;
+    strl_spill *made = NULL;
+    strl_status status = strl__spill_new(set, name, &made, err);
+    if (status != STRL_OK)
+        return status;
+    made->kept = kept;
+    made->buffer_bytes = buffer_bytes ? buffer_bytes : DEFAULT_BUFFER_BYTES;
+    status = strl__spill_with_path(made, create_file, err);
+    if (status != STRL_OK) {
+        strl__spill_unlink(set, made);
+        strl__spill_release(made);
+        return status;
+    }
+    *spill = made;
+    return STRL_OK;
 }
 
 strl_status strl_spill_open(strl_spill_set *set, const char *name, size_t buffer_bytes, strl_spill **spill,
                             strl_error *err)
 {
-    *spill = NULL;
-    strl_spill *made = NULL;
-    strl_status status = new_stream(set, name, &made, err);
-    if (status != STRL_OK)
-        return status;
-    made->buffer_bytes = buffer_bytes ? buffer_bytes : DEFAULT_BUFFER_BYTES;
-    status = with_path(made, create_file, err);
-    if (status != STRL_OK) {
-        unlink_stream(set, made);
-        release(made);
-        return status;
-    }
-    *spill = made;
-    return STRL_OK;
+    return open_stream(set, name, buffer_bytes, false, spill, err);
 }
 
-static strl_status adopt(strl_spill *spill, uint64_t bytes, strl_error *err)
-{
-    strl_status status = with_path(spill, open_file, err);
-    if (status != STRL_OK)
-        return status;
-    uint64_t found = strl_file_bytes(spill->file);
-    if (found != bytes)
-        return strl__fail(err, STRL_ERR_FORMAT, "the scratch file %.300s has %" PRIu64 " bytes, expected %" PRIu64,
-                          strl_file_path(spill->file), found, bytes);
-    status = reserve(spill->set, bytes, err);
-    if (status == STRL_OK) {
-        settle(spill->set, bytes, true);
-        atomic_store(&spill->flushed, bytes);
-    }
-    return status;
-}
-
-strl_status strl_spill_open_kept(strl_spill_set *set, const char *name, uint64_t bytes, strl_spill **spill,
+strl_status strl_spill_open_kept(strl_spill_set *set, const char *name, size_t buffer_bytes, strl_spill **spill,
                                  strl_error *err)
 {
-    *spill = NULL;
-    strl_spill *made = NULL;
-    strl_status status = new_stream(set, name, &made, err);
-    if (status != STRL_OK)
-        return status;
-    made->kept = true;
-    status = adopt(made, bytes, err);
-    if (status != STRL_OK) {
-        unlink_stream(set, made);
-        release(made);
-        return status;
-    }
-    *spill = made;
-    return STRL_OK;
+    return open_stream(set, name, buffer_bytes, true, spill, err);
 }
 
 static strl_status write_at_end(strl_spill *spill, const void *data, size_t size, strl_error *err)
 {
     uint64_t end = atomic_load(&spill->flushed);
-    strl_status status = reserve(spill->set, size, err);
+    if (spill->kept && !strl__spill_reach_sums(spill, end + size))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for the checksums of the scratch file %.300s", spill->name);
+    strl_status status = strl__spill_reserve(spill->set, size, err);
     if (status != STRL_OK)
         return status;
     status = strl_file_write(spill->file, end, data, size, err);
-    settle(spill->set, size, status == STRL_OK);
+    strl__spill_count(spill->set, size, status == STRL_OK);
+    if (status == STRL_OK && spill->kept)
+        strl__spill_add_sums(spill, data, size);
     if (status == STRL_OK)
         atomic_store(&spill->flushed, end + size);
     return status;
@@ -281,9 +239,6 @@ static strl_status write_buffer(strl_spill *spill, strl_error *err)
 
 strl_status strl_spill_append(strl_spill *spill, const void *data, size_t size, strl_error *err)
 {
-    if (spill->kept)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "the scratch file %.300s was kept to be read, not written",
-                          spill->name);
     if (size == 0)
         return STRL_OK;
     if (size > spill->buffer_bytes - spill->buffered) {
@@ -321,8 +276,8 @@ static bool is_gone(strl_spill *spill, uint64_t offset, size_t size)
 {
     bool gone = false;
     strl_mutex_lock(&spill->set->mutex);
-    for (uint64_t step = offset / DROP_STEP_BYTES; size > 0 && step <= (offset + size - 1) / DROP_STEP_BYTES; step++)
-        gone |= step < spill->dropped_capacity && spill->dropped[step] == DROP_STEP_BYTES;
+    for (uint64_t step = offset / STRL__SPILL_STEP; size > 0 && step <= (offset + size - 1) / STRL__SPILL_STEP; step++)
+        gone |= step < spill->dropped_capacity && spill->dropped[step] >= STRL__SPILL_STEP;
     strl_mutex_unlock(&spill->set->mutex);
     return gone;
 }
@@ -341,8 +296,17 @@ strl_status strl_spill_read(strl_spill *spill, uint64_t offset, void *data, size
     return strl_file_read(spill->file, offset, data, size, err);
 }
 
+void strl__spill_punch(strl_spill *spill, uint64_t step)
+{
+    spill->dropped[step] = STRL__SPILL_GONE;
+    if (strl_file_punch(spill->file, step * STRL__SPILL_STEP, STRL__SPILL_STEP)) {
+        spill->given_back += STRL__SPILL_STEP;
+        spill->set->bytes -= STRL__SPILL_STEP;
+    }
+}
+
 /* Zeros up to `steps` items of the table. Without memory nothing more is given back, which costs disk alone. */
-static bool reach_step(strl_spill *spill, uint64_t steps)
+bool strl__spill_reach_step(strl_spill *spill, uint64_t steps)
 {
     size_t before = spill->dropped_capacity;
     if (steps <= before)
@@ -358,15 +322,16 @@ static bool reach_step(strl_spill *spill, uint64_t steps)
 void strl_spill_drop(strl_spill *spill, uint64_t offset, uint64_t size)
 {
     strl_mutex_lock(&spill->set->mutex);
-    bool good = size > 0 && reach_step(spill, (offset + size - 1) / DROP_STEP_BYTES + 1);
+    bool good = size > 0 && strl__spill_reach_step(spill, (offset + size - 1) / STRL__SPILL_STEP + 1);
     while (good && size > 0) {
-        uint64_t step = offset / DROP_STEP_BYTES, here = DROP_STEP_BYTES - offset % DROP_STEP_BYTES;
+        uint64_t step = offset / STRL__SPILL_STEP, here = STRL__SPILL_STEP - offset % STRL__SPILL_STEP;
         here = here < size ? here : size;
         spill->dropped[step] = (uint16_t)(spill->dropped[step] + here);
-        if (spill->dropped[step] == DROP_STEP_BYTES &&
-            strl_file_punch(spill->file, step * DROP_STEP_BYTES, DROP_STEP_BYTES)) {
-            spill->given_back += DROP_STEP_BYTES;
-            spill->set->bytes -= DROP_STEP_BYTES;
+        if (spill->dropped[step] == STRL__SPILL_STEP) {
+            if (spill->kept)
+                strl__spill_postpone(spill, step);
+            else
+                strl__spill_punch(spill, step);
         }
         offset += here;
         size -= here;
@@ -380,15 +345,37 @@ static strl_status remove_file(strl_spill *spill, const char *path, strl_error *
     return strl_path_remove(path, err);
 }
 
+strl_status strl__spill_delete(strl_spill *spill, strl_error *err)
+{
+    strl_spill_set *set = spill->set;
+    strl_status status = strl__spill_with_path(spill, remove_file, err);
+    if (status == STRL_OK)
+        strl__spill_count(set, atomic_load(&spill->flushed) - spill->given_back, false);
+    strl__spill_release(spill);
+    return status;
+}
+
 strl_status strl_spill_close_and_delete(strl_spill *spill, strl_error *err)
 {
     if (!spill)
         return STRL_OK;
     strl_spill_set *set = spill->set;
-    strl_status status = with_path(spill, remove_file, err);
-    if (status == STRL_OK)
-        settle(set, atomic_load(&spill->flushed) - spill->given_back, false);
-    unlink_stream(set, spill);
-    release(spill);
-    return status;
+    strl__spill_unlink(set, spill);
+    if (!spill->kept)
+        return strl__spill_delete(spill, err);
+    strl_mutex_lock(&set->mutex);
+    spill->next = set->retired;
+    set->retired = spill;
+    strl_mutex_unlock(&set->mutex);
+    return STRL_OK;
+}
+
+void strl_spill_close(strl_spill *spill)
+{
+    if (spill && spill->kept) {
+        strl__spill_unlink(spill->set, spill);
+        strl__spill_release(spill);
+    } else {
+        strl_spill_close_and_delete(spill, NULL);
+    }
 }

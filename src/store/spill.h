@@ -6,9 +6,11 @@
 #ifndef STRL_STORE_SPILL_H
 #define STRL_STORE_SPILL_H
 
+#include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 
+#include "base/cursor.h"
 #include "stroll/error.h"
 
 typedef struct strl_spill_set strl_spill_set;
@@ -29,10 +31,6 @@ uint64_t strl_spill_set_peak_bytes(strl_spill_set *set); /* the most there ever 
  * flush. */
 strl_status strl_spill_open(strl_spill_set *set, const char *name, size_t buffer_bytes, strl_spill **spill,
                             strl_error *err);
-/* A stream that an earlier run flushed and left with exactly `bytes` bytes: to be read and deleted, not appended to. */
-strl_status strl_spill_open_kept(strl_spill_set *set, const char *name, uint64_t bytes, strl_spill **spill,
-                                 strl_error *err);
-
 /* On failure nothing has been appended, and the stream can be used on: STRL_ERR_DISK_FULL where the disk is full,
  * STRL_ERR_LIMIT where the set's limit would be passed. A failure of bytes still in the buffer shows at a later
  * call. */
@@ -52,5 +50,33 @@ void strl_spill_drop(strl_spill *spill, uint64_t offset, uint64_t size);
 
 /* The stream is closed in any case; failure means that its file is still there, and counted. NULL is legal. */
 strl_status strl_spill_close_and_delete(strl_spill *spill, strl_error *err);
+
+/* ---- streams that a later run of the program can go on with ----
+ *
+ * open_kept, append, drop -> set_save -> (the saved words are put where the later run finds them) -> set_settle -> append ...
+ * later run: set_restore -> set_check -> take -> read, append ...
+ *
+ * What is dropped or deleted of a kept stream stays on disk until a save that does not need it is in place; what was
+ * appended since the last save is lost with the run. Of each 16 KiB step there is a checksum, 8 bytes in memory and in
+ * the save. All of it on the thread that appends. */
+strl_status strl_spill_open_kept(strl_spill_set *set, const char *name, size_t buffer_bytes, strl_spill **spill,
+                                 strl_error *err);
+/* Flushes all open kept streams and appends to writer what restore needs of them. */
+strl_status strl_spill_set_save(strl_spill_set *set, strl_writer *writer, strl_error *err);
+/* The last save is in place: gives back to the disk what it does not need. */
+void strl_spill_set_settle(strl_spill_set *set);
+/* Opens the streams of a save, each cut to what it had then, and passes over the save's words. The set is new. */
+strl_status strl_spill_set_restore(strl_spill_set *set, strl_cursor *saved, strl_error *err);
+/* Reads all bytes that restored streams may be asked for and compares their checksums. report: called every few
+ * MiB; its failure ends the check; may be NULL. */
+strl_status strl_spill_set_check(strl_spill_set *set,
+                                 strl_status (*report)(void *context, uint64_t done, uint64_t total, strl_error *err),
+                                 void *context, strl_error *err);
+/* The restored stream of that name, once. */
+strl_status strl_spill_take(strl_spill_set *set, const char *name, strl_spill **spill, strl_error *err);
+/* Whether a file of this name in the folder is that of an open stream. */
+bool strl_spill_set_uses(strl_spill_set *set, const char *file);
+/* The file of a kept stream stays, that of another is deleted. NULL is legal. */
+void strl_spill_close(strl_spill *spill);
 
 #endif

@@ -39,7 +39,7 @@ class Done:
                 f"{self.peak_bytes / MIB:.0f} MiB\n  {self.error}")
 
 
-def run(*words, timeout=300, prefix=()):
+def run(*words, timeout=1200, prefix=()):
     """Runs to the end. peak_bytes: the operating system's peak resident set of this child alone."""
     with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
         start = time.monotonic()

@@ -132,9 +132,10 @@ def a_full_disk_is_one_sentence(folder):
                 with open(os.path.join(disk, "filler"), "wb") as file:
                     file.write(bytes(900 << 10))
             out = older_output(disk) if megabytes == 6 else os.path.join(disk, "out.stroll")
-            refused(disk, source, "-o", out, *(["--scratch", elsewhere] if scratch_elsewhere else []))
+            done = refused(disk, source, "-o", out, *(["--scratch", elsewhere] if scratch_elsewhere else []))
+            assert ("--resume" in done.error) == scratch_elsewhere, done # the others have finished nothing
             if scratch_elsewhere:
-                assert not os.path.exists(elsewhere)  # the build made it
+                assert os.listdir(elsewhere) == ["out.stroll.tmp"]
         finally:
             subprocess.run(["umount", disk], check=True)
 
@@ -190,7 +191,8 @@ def signals_stop_a_build_cleanly(folder):
             continue
         assert child.returncode == 1, (child.returncode, error)
         assert error.count("\n") == 1 and "interrupted" in error, error
-        assert sorted(os.listdir(folder)) == ["long.ply", "out.stroll"], os.listdir(folder)
+        left = ["long.ply", "out.stroll"] + (["out.stroll.tmp"] if "--resume" in error else [])
+        assert sorted(os.listdir(folder)) == left, os.listdir(folder)
         assert read(out) == OLDER
 
 

@@ -1,3 +1,4 @@
+#include <fcntl.h>
 #include <setjmp.h>
 #include <signal.h>
 #include <stdarg.h>
@@ -16,37 +17,13 @@
 #include "base/memory.h"
 #include "platform/file.h"
 #include "platform/thread.h"
-
-static char folder[64];
-
-static int set_up(void **state)
-{
-    (void)state;
-    snprintf(folder, sizeof folder, "/tmp/strl-file-XXXXXX");
-    return mkdtemp(folder) ? 0 : -1;
-}
-
-static int tear_down(void **state)
-{
-    (void)state;
-    return strl_path_remove_directory(folder, NULL) == STRL_OK && !strl_path_exists(folder) ? 0 : -1;
-}
-
-/* A path in the test's folder, good until the 8th call after. */
-static const char *in_folder(const char *name)
-{
-    static char paths[8][128];
-    static unsigned turn;
-    char *path = paths[turn++ % 8];
-    snprintf(path, sizeof paths[0], "%s/%s", folder, name);
-    return path;
-}
+#include "support/folder.h"
 
 static strl_file *must_create(const char *name)
 {
     strl_file *file = NULL;
     strl_error err = {0};
-    if (strl_file_create(in_folder(name), &file, &err) != STRL_OK)
+    if (strl_file_create(strl_test_path(name), &file, &err) != STRL_OK)
         fail_msg("%s", err.message);
     return file;
 }
@@ -70,9 +47,9 @@ static void what_was_written_is_read_back_at_any_offset(void **state)
     assert_int_equal(strl_file_read(file, 5000000000u, text, 3, NULL), STRL_OK);
     assert_string_equal(text, "end");
     assert_int_equal(strl_file_close(file, NULL), STRL_OK);
-    assert_int_equal(strl_file_open(in_folder("a"), &file, NULL), STRL_OK);
+    assert_int_equal(strl_file_open(strl_test_path("a"), &file, NULL), STRL_OK);
     assert_true(strl_file_bytes(file) == 5000000003u);
-    assert_string_equal(strl_file_path(file), in_folder("a"));
+    assert_string_equal(strl_file_path(file), strl_test_path("a"));
     assert_int_equal(strl_file_read(file, 1, text, 4, NULL), STRL_OK);
     assert_memory_equal(text, "egin", 4);
     assert_int_equal(strl_file_write(file, 0, "x", 1, NULL), STRL_ERR_IO); /* opened to read */
@@ -88,7 +65,7 @@ static void a_short_read_says_where_the_file_ends(void **state)
     strl_error err = {0};
     char text[16];
     size_t got = 99;
-    assert_int_equal(strl_file_open(in_folder("short"), &file, NULL), STRL_OK);
+    assert_int_equal(strl_file_open(strl_test_path("short"), &file, NULL), STRL_OK);
     assert_int_equal(strl_file_read(file, 8, text, 5, &err), STRL_ERR_FORMAT);
     assert_non_null(strstr(err.message, "ends at byte 10, expected 5 bytes from byte 8"));
     assert_int_equal(strl_file_read(file, 50, text, 1, &err), STRL_ERR_FORMAT);
@@ -107,15 +84,15 @@ static void what_is_no_regular_file_is_not_opened(void **state)
     (void)state;
     strl_file *file = NULL;
     strl_error err = {0};
-    assert_int_equal(strl_file_open(in_folder("missing"), &file, &err), STRL_ERR_IO);
+    assert_int_equal(strl_file_open(strl_test_path("missing"), &file, &err), STRL_ERR_IO);
     assert_non_null(strstr(err.message, "missing"));
-    assert_int_equal(strl_file_open(folder, &file, &err), STRL_ERR_IO);
+    assert_int_equal(strl_file_open(strl_test_folder, &file, &err), STRL_ERR_IO);
     assert_non_null(strstr(err.message, "folder"));
     assert_int_equal(strl_file_open("/dev/null", &file, &err), STRL_ERR_IO);
-    assert_int_equal(mkfifo(in_folder("pipe"), 0600), 0);
-    assert_int_equal(strl_file_open(in_folder("pipe"), &file, &err), STRL_ERR_IO); /* and does not wait for a writer */
+    assert_int_equal(mkfifo(strl_test_path("pipe"), 0600), 0);
+    assert_int_equal(strl_file_open(strl_test_path("pipe"), &file, &err), STRL_ERR_IO); /* does not wait */
     assert_null(file);
-    assert_int_equal(strl_file_create(in_folder("no/such/folder"), &file, &err), STRL_ERR_IO);
+    assert_int_equal(strl_file_create(strl_test_path("no/such/folder"), &file, &err), STRL_ERR_IO);
     assert_null(file);
 }
 
@@ -182,9 +159,9 @@ static void a_punched_range_reads_as_zeros_and_takes_no_blocks(void **state)
     assert_int_equal(strl_file_write(file, 0, data, SIZE, NULL), STRL_OK);
     assert_int_equal(strl_file_sync(file, NULL), STRL_OK);
     struct stat before, after;
-    stat(in_folder("holes"), &before);
+    stat(strl_test_path("holes"), &before);
     if (strl_file_punch(file, 65536, SIZE - 65536)) {
-        stat(in_folder("holes"), &after);
+        stat(strl_test_path("holes"), &after);
         assert_true(after.st_blocks < before.st_blocks);
         assert_int_equal(after.st_size, SIZE);
         assert_int_equal(strl_file_read(file, 65535, data, 2, NULL), STRL_OK);
@@ -200,24 +177,24 @@ static void one_file_has_one_identity_under_any_name(void **state)
     (void)state;
     make_file("one", "12345");
     make_file("two", "12345");
-    assert_int_equal(link(in_folder("one"), in_folder("alias")), 0);
+    assert_int_equal(link(strl_test_path("one"), strl_test_path("alias")), 0);
     strl_file_info one, alias, two, opened;
-    assert_int_equal(strl_path_stat(in_folder("one"), &one, NULL), STRL_OK);
-    assert_int_equal(strl_path_stat(in_folder("alias"), &alias, NULL), STRL_OK);
-    assert_int_equal(strl_path_stat(in_folder("two"), &two, NULL), STRL_OK);
+    assert_int_equal(strl_path_stat(strl_test_path("one"), &one, NULL), STRL_OK);
+    assert_int_equal(strl_path_stat(strl_test_path("alias"), &alias, NULL), STRL_OK);
+    assert_int_equal(strl_path_stat(strl_test_path("two"), &two, NULL), STRL_OK);
     assert_true(one.device == alias.device && one.inode == alias.inode);
     assert_true(one.inode != two.inode);
     assert_int_equal(one.bytes, 5);
     assert_false(one.is_directory);
     assert_true(one.modified_ns > 1500000000ull * 1000000000u);
     strl_file *file = NULL;
-    assert_int_equal(strl_file_open(in_folder("alias"), &file, NULL), STRL_OK);
+    assert_int_equal(strl_file_open(strl_test_path("alias"), &file, NULL), STRL_OK);
     assert_int_equal(strl_file_stat(file, &opened, NULL), STRL_OK);
     assert_true(opened.inode == one.inode);
     strl_file_close(file, NULL);
-    assert_int_equal(strl_path_stat(folder, &opened, NULL), STRL_OK);
+    assert_int_equal(strl_path_stat(strl_test_folder, &opened, NULL), STRL_OK);
     assert_true(opened.is_directory);
-    assert_int_equal(strl_path_stat(in_folder("none"), &opened, NULL), STRL_ERR_IO);
+    assert_int_equal(strl_path_stat(strl_test_path("none"), &opened, NULL), STRL_ERR_IO);
 }
 
 static void a_rename_replaces_and_a_failed_one_changes_nothing(void **state)
@@ -225,43 +202,43 @@ static void a_rename_replaces_and_a_failed_one_changes_nothing(void **state)
     (void)state;
     make_file("from", "new");
     make_file("to", "older");
-    assert_int_equal(strl_path_rename(in_folder("from"), in_folder("to"), NULL), STRL_OK);
-    assert_false(strl_path_exists(in_folder("from")));
+    assert_int_equal(strl_path_rename(strl_test_path("from"), strl_test_path("to"), NULL), STRL_OK);
+    assert_false(strl_path_exists(strl_test_path("from")));
     strl_file_info info;
-    assert_int_equal(strl_path_stat(in_folder("to"), &info, NULL), STRL_OK);
+    assert_int_equal(strl_path_stat(strl_test_path("to"), &info, NULL), STRL_OK);
     assert_int_equal(info.bytes, 3);
     strl_error err = {0};
-    assert_int_equal(strl_path_rename(in_folder("from"), in_folder("to"), &err), STRL_ERR_IO);
+    assert_int_equal(strl_path_rename(strl_test_path("from"), strl_test_path("to"), &err), STRL_ERR_IO);
     assert_non_null(strstr(err.message, "/to"));
-    assert_true(strl_path_exists(in_folder("to")));
+    assert_true(strl_path_exists(strl_test_path("to")));
     strl__alloc_fail_after(1);
-    strl_status status = strl_path_rename(in_folder("to"), in_folder("from"), NULL);
+    strl_status status = strl_path_rename(strl_test_path("to"), strl_test_path("from"), NULL);
     strl__alloc_fail_after(0);
     assert_int_equal(status, STRL_ERR_MEMORY);
-    assert_true(strl_path_exists(in_folder("to")));
+    assert_true(strl_path_exists(strl_test_path("to")));
 }
 
 static void folders_are_made_and_removed_with_their_files_but_never_through_a_link(void **state)
 {
     (void)state;
-    assert_int_equal(strl_path_make_directory(in_folder("sub"), NULL), STRL_OK);
-    assert_int_equal(strl_path_make_directory(in_folder("sub"), NULL), STRL_OK);
+    assert_int_equal(strl_path_make_directory(strl_test_path("sub"), NULL), STRL_OK);
+    assert_int_equal(strl_path_make_directory(strl_test_path("sub"), NULL), STRL_OK);
     make_file("sub/a", "a");
     make_file("sub/b", "b");
     make_file("plain", "p");
-    assert_int_equal(strl_path_make_directory(in_folder("plain"), NULL), STRL_ERR_IO);
-    assert_int_equal(symlink(in_folder("sub"), in_folder("link")), 0);
-    assert_int_equal(strl_path_remove_directory(in_folder("link"), NULL), STRL_ERR_IO);
-    assert_true(strl_path_exists(in_folder("sub/a")));
-    assert_int_equal(strl_path_make_directory(in_folder("sub/inner"), NULL), STRL_OK);
-    assert_int_equal(strl_path_remove_directory(in_folder("sub"), NULL), STRL_ERR_IO);
-    assert_int_equal(strl_path_remove_directory(in_folder("sub/inner"), NULL), STRL_OK);
+    assert_int_equal(strl_path_make_directory(strl_test_path("plain"), NULL), STRL_ERR_IO);
+    assert_int_equal(symlink(strl_test_path("sub"), strl_test_path("link")), 0);
+    assert_int_equal(strl_path_remove_directory(strl_test_path("link"), NULL), STRL_ERR_IO);
+    assert_true(strl_path_exists(strl_test_path("sub/a")));
+    assert_int_equal(strl_path_make_directory(strl_test_path("sub/inner"), NULL), STRL_OK);
+    assert_int_equal(strl_path_remove_directory(strl_test_path("sub"), NULL), STRL_ERR_IO);
+    assert_int_equal(strl_path_remove_directory(strl_test_path("sub/inner"), NULL), STRL_OK);
     make_file("sub/c", "c");
-    assert_int_equal(strl_path_remove_directory(in_folder("sub"), NULL), STRL_OK);
-    assert_false(strl_path_exists(in_folder("sub")));
-    assert_int_equal(strl_path_remove_directory(in_folder("sub"), NULL), STRL_OK);
-    assert_int_equal(strl_path_remove(in_folder("link"), NULL), STRL_OK);
-    assert_int_equal(strl_path_remove(in_folder("link"), NULL), STRL_OK);
+    assert_int_equal(strl_path_remove_directory(strl_test_path("sub"), NULL), STRL_OK);
+    assert_false(strl_path_exists(strl_test_path("sub")));
+    assert_int_equal(strl_path_remove_directory(strl_test_path("sub"), NULL), STRL_OK);
+    assert_int_equal(strl_path_remove(strl_test_path("link"), NULL), STRL_OK);
+    assert_int_equal(strl_path_remove(strl_test_path("link"), NULL), STRL_OK);
 }
 
 static void joining_puts_one_slash_between(void **state)
@@ -279,9 +256,9 @@ static void free_space_is_told(void **state)
 {
     (void)state;
     uint64_t bytes = 0;
-    assert_int_equal(strl_path_free_bytes(folder, &bytes, NULL), STRL_OK);
+    assert_int_equal(strl_path_free_bytes(strl_test_folder, &bytes, NULL), STRL_OK);
     assert_true(bytes > 0);
-    assert_int_equal(strl_path_free_bytes(in_folder("none"), &bytes, NULL), STRL_ERR_IO);
+    assert_int_equal(strl_path_free_bytes(strl_test_path("none"), &bytes, NULL), STRL_ERR_IO);
 }
 
 static void a_lock_has_one_holder_until_it_is_released(void **state)
@@ -289,15 +266,15 @@ static void a_lock_has_one_holder_until_it_is_released(void **state)
     (void)state;
     strl_lock *first = NULL, *second = NULL;
     strl_error err = {0};
-    assert_int_equal(strl_lock_acquire(in_folder("lock"), &first, NULL), STRL_OK);
-    assert_int_equal(strl_lock_acquire(in_folder("lock"), &second, &err), STRL_ERR_IO);
+    assert_int_equal(strl_lock_acquire(strl_test_path("lock"), &first, NULL), STRL_OK);
+    assert_int_equal(strl_lock_acquire(strl_test_path("lock"), &second, &err), STRL_ERR_IO);
     assert_null(second);
     assert_non_null(strstr(err.message, "locked"));
     strl_lock_release(first);
-    assert_int_equal(strl_lock_acquire(in_folder("lock"), &second, NULL), STRL_OK);
+    assert_int_equal(strl_lock_acquire(strl_test_path("lock"), &second, NULL), STRL_OK);
     strl_lock_release(second);
     strl_lock_release(NULL);
-    assert_int_equal(strl_lock_acquire(in_folder("no/lock"), &first, NULL), STRL_ERR_IO);
+    assert_int_equal(strl_lock_acquire(strl_test_path("no/lock"), &first, NULL), STRL_ERR_IO);
 }
 
 static void a_lock_ends_with_its_process(void **state)
@@ -309,17 +286,17 @@ static void a_lock_ends_with_its_process(void **state)
     if (child == 0) {
         close(stop[1]); /* or the child would keep its own end open and never hear of ours closing */
         strl_lock *lock = NULL;
-        char byte = strl_lock_acquire(in_folder("child"), &lock, NULL) == STRL_OK ? 'y' : 'n';
+        char byte = strl_lock_acquire(strl_test_path("child"), &lock, NULL) == STRL_OK ? 'y' : 'n';
         _exit(write(ready[1], &byte, 1) == 1 && read(stop[0], &byte, 1) == 0 ? 0 : 1);
     }
     char byte = 0;
     assert_int_equal(read(ready[0], &byte, 1), 1);
     assert_int_equal(byte, 'y');
     strl_lock *lock = NULL;
-    assert_int_equal(strl_lock_acquire(in_folder("child"), &lock, NULL), STRL_ERR_IO);
+    assert_int_equal(strl_lock_acquire(strl_test_path("child"), &lock, NULL), STRL_ERR_IO);
     close(stop[1]);
     waitpid(child, NULL, 0);
-    assert_int_equal(strl_lock_acquire(in_folder("child"), &lock, NULL), STRL_OK);
+    assert_int_equal(strl_lock_acquire(strl_test_path("child"), &lock, NULL), STRL_OK);
     strl_lock_release(lock);
     close(stop[0]);
     close(ready[0]);
@@ -332,9 +309,9 @@ static strl_status write_and_publish(strl_error *err)
     strl_file *file = NULL;
     strl_lock *lock = NULL;
     char text[30];
-    strl_status status = strl_lock_acquire(in_folder("f.lock"), &lock, err);
+    strl_status status = strl_lock_acquire(strl_test_path("f.lock"), &lock, err);
     if (status == STRL_OK)
-        status = strl_file_create(in_folder("f.tmp"), &file, err);
+        status = strl_file_create(strl_test_path("f.tmp"), &file, err);
     for (uint64_t i = 0; status == STRL_OK && i < 3; i++)
         status = strl_file_write(file, i * 10, "0123456789", 10, err);
     for (uint64_t i = 0; status == STRL_OK && i < 3; i++)
@@ -342,7 +319,7 @@ static strl_status write_and_publish(strl_error *err)
     strl_status closed = strl_file_close(file, status == STRL_OK ? err : NULL);
     status = status == STRL_OK ? closed : status;
     if (status == STRL_OK)
-        status = strl_path_rename(in_folder("f.tmp"), in_folder("f"), err);
+        status = strl_path_rename(strl_test_path("f.tmp"), strl_test_path("f"), err);
     strl_lock_release(lock);
     return status;
 }
@@ -359,12 +336,12 @@ static void every_injected_failure_is_reported_and_publishes_nothing(void **stat
         strl_status status;
         do {
             strl_error err = {0};
-            assert_int_equal(strl_path_remove(in_folder("f"), NULL), STRL_OK);
+            assert_int_equal(strl_path_remove(strl_test_path("f"), NULL), STRL_OK);
             hooks[i](++budget);
             status = write_and_publish(&err);
             hooks[i](0);
             assert_true(status == STRL_OK || status == expected[i]);
-            assert_true((status == STRL_OK) == strl_path_exists(in_folder("f")));
+            assert_true((status == STRL_OK) == strl_path_exists(strl_test_path("f")));
             assert_int_equal(err.status, status);
         } while (status != STRL_OK);
         assert_int_equal(budget, budgets[i]);
@@ -426,6 +403,27 @@ static void clocks_advance_and_processors_are_counted(void **state)
     assert_in_range(strl_cpu_count(), 1, 65536);
 }
 
+static void a_reopened_file_is_cut_and_goes_on(void **state)
+{
+    (void)state;
+    strl_file *file = NULL;
+    strl_error err = {0};
+    char text[8] = "";
+    make_file("again", "abcdef");
+    assert_int_equal(strl_file_reopen(strl_test_path("again"), 7, &file, &err), STRL_ERR_FORMAT);
+    assert_null(file);
+    assert_non_null(strstr(err.message, "ends at byte 6, expected 7"));
+    assert_int_equal(strl_file_reopen(strl_test_path("again"), 4, &file, NULL), STRL_OK);
+    assert_int_equal(strl_file_bytes(file), 4);
+    assert_int_equal(strl_file_write(file, 4, "XY", 2, NULL), STRL_OK);
+    assert_int_equal(strl_file_read(file, 0, text, 6, NULL), STRL_OK);
+    assert_string_equal(text, "abcdXY");
+    assert_int_equal(strl_file_close(file, NULL), STRL_OK);
+    assert_int_equal(strl_path_remove(strl_test_path("again"), NULL), STRL_OK);
+    assert_int_equal(strl_file_reopen(strl_test_path("again"), 0, &file, NULL), STRL_ERR_IO);
+    assert_int_equal(strl_file_reopen(strl_test_path("."), 0, &file, NULL), STRL_ERR_IO);
+}
+
 static void touch_pages(size_t bytes)
 {
     void *pages = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -453,12 +451,41 @@ static void the_peak_resident_set_counts_what_was_freed_and_what_children_held(v
     assert_true(strl_process_peak_rss_bytes() >= own + step);
 }
 
+static void a_thread_waits_for_the_disk_only_where_it_reads_from_it(void **state)
+{
+    (void)state;
+    const size_t size = (size_t)4 << 20;
+    uint8_t *bytes = calloc(size, 1);
+    strl_file *file = NULL;
+    assert_non_null(bytes);
+    assert_int_equal(strl_file_create("test_file_waits", &file, NULL), STRL_OK);
+    assert_int_equal(strl_file_write(file, 0, bytes, size, NULL), STRL_OK);
+    assert_int_equal(strl_file_sync(file, NULL), STRL_OK);
+    uint64_t before = strl_thread_disk_waits();
+    assert_int_equal(strl_file_read(file, 0, bytes, size, NULL), STRL_OK);
+    uint64_t kept = strl_thread_disk_waits() - before;
+    int descriptor = open("test_file_waits", O_RDONLY);
+    assert_true(descriptor >= 0);
+    bool forgotten = posix_fadvise(descriptor, 0, 0, POSIX_FADV_DONTNEED) == 0;
+    close(descriptor);
+    before = strl_thread_disk_waits();
+    assert_int_equal(strl_file_read(file, 0, bytes, size, NULL), STRL_OK);
+    uint64_t fetched = strl_thread_disk_waits() - before;
+    assert_true(kept <= 16); /* pages of the program itself */
+    /* A file system in memory forgets nothing. */
+    assert_true(!forgotten || fetched == 0 || fetched >= size / 512 / 2);
+    strl_file_close(file, NULL);
+    remove("test_file_waits");
+    free(bytes);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_was_written_is_read_back_at_any_offset),
         cmocka_unit_test(a_short_read_says_where_the_file_ends),
         cmocka_unit_test(what_is_no_regular_file_is_not_opened),
+        cmocka_unit_test(a_reopened_file_is_cut_and_goes_on),
         cmocka_unit_test(a_long_path_does_not_hide_the_reason),
         cmocka_unit_test(a_full_device_is_a_full_disk),
         cmocka_unit_test(a_write_past_the_largest_file_is_refused),
@@ -473,8 +500,9 @@ int main(void)
         cmocka_unit_test(a_lock_ends_with_its_process),
         cmocka_unit_test(every_injected_failure_is_reported_and_publishes_nothing),
         cmocka_unit_test(threads_run_wait_and_leave_signals_to_the_host),
+        cmocka_unit_test(a_thread_waits_for_the_disk_only_where_it_reads_from_it),
         cmocka_unit_test(clocks_advance_and_processors_are_counted),
         cmocka_unit_test(the_peak_resident_set_counts_what_was_freed_and_what_children_held),
     };
-    return cmocka_run_group_tests(tests, set_up, tear_down);
+    return cmocka_run_group_tests(tests, strl_test_folder_make, strl_test_folder_remove);
 }

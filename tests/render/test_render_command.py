@@ -88,7 +88,7 @@ class Test:
         with open(stats) as file:
             lines = [json.loads(line) for line in file]
         needed = ("frame frame_ms select_ms cull_ms draw_ms triangles splats nodes nodes_culled draws requests bytes_read "
-                  "resident_bytes gpu_bytes covered_pixels max_error_px missing_nodes").split()
+                  "resident_bytes gpu_bytes covered_pixels max_error_px missing_nodes disk_waits").split()
         self.check("statistics have a line a frame with every field", len(lines) == 4 and all(n in l for l in lines for n in needed), lines)
         self.check("all triangles are drawn", all(l["triangles"] == 2 * SIDE * SIDE for l in lines), lines)
         depth = read_pfm(self.root + "/orbit/frame_00000.pfm")

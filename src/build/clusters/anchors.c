@@ -18,14 +18,14 @@
 
 /* ---- plan ---- */
 
-void strl_anchor_plan_begin(strl_anchor_plan *plan, uint32_t depth, bool certify)
+static strl_anchor_plan begin_plan(uint32_t depth, bool certify)
 {
     uint32_t early = depth / 4 < LATEST_FIRST ? depth / 4 : LATEST_FIRST;
     uint32_t late = depth > FEW_LEVELS ? depth - FEW_LEVELS : depth / 2;
-    *plan = (strl_anchor_plan){.first = certify && early < late ? early : late};
+    return (strl_anchor_plan){.first = certify && early < late ? early : late};
 }
 
-void strl_anchor_plan_level(strl_anchor_plan *plan, uint32_t level, uint32_t depth)
+static void plan_level(strl_anchor_plan *plan, uint32_t level, uint32_t depth)
 {
     plan->has_young = plan->has_young || plan->bears; /* of the level before */
     plan->promotes = plan->has_young && plan->born + 2 <= level;
@@ -36,6 +36,15 @@ void strl_anchor_plan_level(strl_anchor_plan *plan, uint32_t level, uint32_t dep
     if (plan->bears)
         plan->born = level;
     plan->is_on = plan->has_used || plan->has_young || plan->bears;
+}
+
+/* A level's plan follows from those below. */
+strl_anchor_plan strl_anchor_plan_of(uint32_t level, uint32_t depth, bool certify)
+{
+    strl_anchor_plan plan = begin_plan(depth, certify);
+    for (uint32_t i = 0; i <= level; i++)
+        plan_level(&plan, i, depth);
+    return plan;
 }
 
 /* ---- pieces ---- */

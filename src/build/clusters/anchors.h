@@ -35,10 +35,8 @@ typedef struct strl_anchor_plan {
     bool bears;         /* the base meshes of this level become young anchors */
 } strl_anchor_plan;
 
-/* certify: from as low a level as pays; else near the root only. */
-void strl_anchor_plan_begin(strl_anchor_plan *plan, uint32_t depth, bool certify);
-/* For a level of so many nodes, made after the one before. */
-void strl_anchor_plan_level(strl_anchor_plan *plan, uint32_t level, uint32_t depth);
+/* Of a level. certify: from as low a level as pays; else near the root only. */
+strl_anchor_plan strl_anchor_plan_of(uint32_t level, uint32_t depth, bool certify);
 
 void strl_anchors_deinit(strl_anchors *anchors);
 /* Scratch format. Pieces are relative to their node's anchor. */

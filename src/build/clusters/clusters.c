@@ -12,25 +12,6 @@
 /* Errors grow by about this factor where triangles are halved for the first time. */
 #define FIRST_GROWTH 2.4f
 
-static strl_status open_level(strl_hierarchy *hierarchy, uint32_t index, strl_error *err)
-{
-    strl_level *level = &hierarchy->levels[index];
-    char name[32];
-    level->count = 1u << (hierarchy->partition->depth - index);
-    level->nodes = strl__alloc_zero(level->count, sizeof *level->nodes);
-    if (!level->nodes)
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %u nodes", level->count);
-    snprintf(name, sizeof name, "payload-%02u", index);
-    strl_status status = strl_spill_open(hierarchy->context->spills, name, 0, &level->payloads, err);
-    snprintf(name, sizeof name, "mesh-%02u", index);
-    if (!status)
-        status = strl_spill_open(hierarchy->context->spills, name, 0, &level->meshes, err);
-    snprintf(name, sizeof name, "anchors-%02u", index);
-    return status || !hierarchy->anchor_plan.is_on
-               ? status
-               : strl_spill_open(hierarchy->context->spills, name, 0, &level->anchors, err);
-}
-
 static strl_status close_meshes(strl_level *level, strl_error *err)
 {
     strl_status status = strl_spill_close_and_delete(level->meshes, err);
@@ -40,48 +21,72 @@ static strl_status close_meshes(strl_level *level, strl_error *err)
     return status ? status : other;
 }
 
-static strl_status simplify_levels(strl_hierarchy *hierarchy, strl_error *err)
+static strl_status flush_level(strl_level *level, strl_error *err)
+{
+    strl_status status = strl_spill_flush(level->meshes, err);
+    if (!status && level->anchors)
+        status = strl_spill_flush(level->anchors, err);
+    if (!status)
+        status = strl_spill_flush(level->payloads, err);
+    return status || !level->states ? status : strl_spill_flush(level->states, err);
+}
+
+/* What comes after the last node of a level: the words and meshes of those below are used up. */
+static strl_status end_level(strl_hierarchy *hierarchy, uint32_t level, strl_error *err)
+{
+    strl_status status = flush_level(&hierarchy->levels[level], err);
+    if (!status && level > 0)
+        status = close_meshes(&hierarchy->levels[level - 1], err);
+    if (!status && level == hierarchy->partition->depth)
+        status = close_meshes(&hierarchy->levels[level], err);
+    if (!status && !strl_choose_even_error(hierarchy, &hierarchy->levels[level]))
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the errors of a level");
+    strl_adjacency_deinit(&hierarchy->current);
+    hierarchy->current = hierarchy->next;
+    hierarchy->next = (strl_adjacency){0};
+    const strl_position position = {.finished = STRL_STAGE_PARTITION, .level = level + 1};
+    return status ? status : strl_clusters_save(hierarchy, &position, err);
+}
+
+static strl_status check_root(const strl_hierarchy *hierarchy, strl_error *err)
+{
+    const strl_node *root = &hierarchy->levels[hierarchy->partition->depth].nodes[0].record;
+    return root->base_triangle_count <= STRL_ROOT_MAX_TRIANGLES
+               ? STRL_OK
+               : strl__fail(err, STRL_ERR_INTERNAL, "the root has %" PRIu32 " triangles; the bound is %u",
+                            root->base_triangle_count, STRL_ROOT_MAX_TRIANGLES);
+}
+
+static strl_status simplify_levels(strl_hierarchy *hierarchy, const strl_position *from, strl_error *err)
 {
     static const char *const names[] = {"level 0", "level 1", "level 2", "level 3", "level 4", "level 5", "level 6",
                                         "level 7", "level 8", "level 9", "higher levels"};
     strl_status status = STRL_OK;
-    for (uint32_t level = 0; level <= hierarchy->partition->depth && !status; level++) {
+    for (uint32_t level = from->level; level <= hierarchy->partition->depth && !status; level++) {
+        uint32_t first = level == from->level ? from->done : 0;
         strl__build_stage(hierarchy->context, names[level < 10 ? level : 10]);
-        strl_anchor_plan_level(&hierarchy->anchor_plan, level, hierarchy->partition->depth);
-        status = open_level(hierarchy, level, err);
+        hierarchy->anchor_plan = strl_anchor_plan_of(level, hierarchy->partition->depth, hierarchy->context->desc->certify);
+        if (first == 0)
+            status = strl_level_open(hierarchy, level, err);
         if (!status)
-            status = level == 0 ? strl_make_leaves(hierarchy, err) : strl_make_level(hierarchy, level, err);
+            status = level == 0 ? strl_make_leaves(hierarchy, first, err) : strl_make_level(hierarchy, level, first, err);
         if (!status)
-            status = strl_spill_flush(hierarchy->levels[level].meshes, err);
-        if (!status && hierarchy->levels[level].anchors)
-            status = strl_spill_flush(hierarchy->levels[level].anchors, err);
-        if (!status)
-            status = strl_spill_flush(hierarchy->levels[level].payloads, err);
-        if (!status && level > 0)
-            status = close_meshes(&hierarchy->levels[level - 1], err);
-        if (!status && !strl_choose_even_error(hierarchy, &hierarchy->levels[level]))
-            status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the errors of a level");
+            status = end_level(hierarchy, level, err);
     }
-    if (!status)
-        status = close_meshes(&hierarchy->levels[hierarchy->partition->depth], err);
-    if (!status) {
-        const strl_node *root = &hierarchy->levels[hierarchy->partition->depth].nodes[0].record;
-        if (root->base_triangle_count > STRL_ROOT_MAX_TRIANGLES)
-            status = strl__fail(err, STRL_ERR_INTERNAL, "the root has %" PRIu32 " triangles; the bound is %u",
-                                root->base_triangle_count, STRL_ROOT_MAX_TRIANGLES);
-    }
-    return status;
+    return status ? status : check_root(hierarchy, err);
 }
 
 static void hierarchy_deinit(strl_hierarchy *hierarchy)
 {
     for (uint32_t i = 0; hierarchy->levels && i <= hierarchy->partition->depth; i++) {
-        strl_spill_close_and_delete(hierarchy->levels[i].payloads, NULL);
-        strl_spill_close_and_delete(hierarchy->levels[i].meshes, NULL);
-        strl_spill_close_and_delete(hierarchy->levels[i].anchors, NULL);
+        strl_spill_close(hierarchy->levels[i].payloads);
+        strl_spill_close(hierarchy->levels[i].meshes);
+        strl_spill_close(hierarchy->levels[i].anchors);
+        strl_spill_close(hierarchy->levels[i].states);
         strl__free(hierarchy->levels[i].nodes);
     }
     strl__free(hierarchy->levels);
+    strl_adjacency_deinit(&hierarchy->current);
     strl_adjacency_deinit(&hierarchy->next);
 }
 
@@ -203,21 +208,57 @@ static void fill_result(const strl_hierarchy *hierarchy, strl_build_result *resu
     result->placements = 1;
 }
 
+static strl_status run_ingest(strl_hierarchy *hierarchy, strl_position *position, strl_spill **graph, strl_error *err)
+{
+    strl_build_context *context = hierarchy->context;
+    strl_status status = strl_ingest_run(context, hierarchy->ingest, err);
+    if (!status && context->keep)
+        status = strl_ingest_save(context, hierarchy->ingest, graph, err);
+    *position = (strl_position){.finished = STRL_STAGE_INGEST};
+    return status ? status : strl_clusters_save(hierarchy, position, err);
+}
+
+static strl_status run_partition(strl_hierarchy *hierarchy, strl_partition *partition, strl_position *position,
+                                 strl_spill **graph, strl_error *err)
+{
+    strl_build_context *context = hierarchy->context;
+    strl__build_stage(context, "partition");
+    strl_status status = strl__build_report(context, 0, 0, err);
+    if (!status)
+        status = strl_partition_create(hierarchy->ingest, partition, err);
+    if (!status)
+        hierarchy->levels = strl__alloc_zero((size_t)partition->depth + 1, sizeof *hierarchy->levels);
+    if (!status && !hierarchy->levels)
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory");
+    if (!status && context->keep)
+        status = strl_partition_save(context, hierarchy->ingest, partition, err);
+    if (!status)
+        status = strl_ingest_drop(graph, err);
+    *position = (strl_position){.finished = STRL_STAGE_PARTITION};
+    return status ? status : strl_clusters_save(hierarchy, position, err);
+}
+
+/* From wherever the checkpoint is, or from the beginning. */
+static strl_status run_stages(strl_hierarchy *hierarchy, strl_partition *partition, strl_error *err)
+{
+    strl_build_context *context = hierarchy->context;
+    strl_position position = {.finished = STRL_STAGE_NONE};
+    strl_spill *graph = NULL;
+    strl_status status = context->resumed.size
+                             ? strl_clusters_restore(hierarchy, hierarchy->ingest, partition, &position, &graph, err)
+                             : run_ingest(hierarchy, &position, &graph, err);
+    if (!status && position.finished == STRL_STAGE_INGEST)
+        status = run_partition(hierarchy, partition, &position, &graph, err);
+    strl_spill_close(graph);
+    return status ? status : simplify_levels(hierarchy, &position, err);
+}
+
 strl_status strl__clusters_run(strl_build_context *context, strl_error *err)
 {
-    strl_ingest ingest;
+    strl_ingest ingest = {0};
     strl_partition partition = {0};
     strl_hierarchy hierarchy = {.context = context, .ingest = &ingest, .partition = &partition, .growth = FIRST_GROWTH};
-    strl_status status = strl_ingest_run(context, &ingest, err);
-    if (!status) {
-        strl__build_stage(context, "partition");
-        status = strl_partition_create(&ingest, &partition, err);
-    }
-    if (!status) {
-        hierarchy.levels = strl__alloc_zero((size_t)partition.depth + 1, sizeof *hierarchy.levels);
-        strl_anchor_plan_begin(&hierarchy.anchor_plan, partition.depth, context->desc->certify);
-        status = hierarchy.levels ? simplify_levels(&hierarchy, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory");
-    }
+    strl_status status = run_stages(&hierarchy, &partition, err);
     if (!status) {
         fill_result(&hierarchy, context->result);
         status = write_container(&hierarchy, err);

@@ -48,6 +48,7 @@ typedef struct strl_level {
     strl_spill *payloads;
     strl_spill *meshes;     /* base meshes; deleted when the next level is done */
     strl_spill *anchors;    /* the same of anchors; NULL where there are none */
+    strl_spill *states;     /* of the nodes as they were taken, for checkpoints; NULL where none are made */
 } strl_level;
 
 /* How many points two nodes of the next level share: counted while a level is made. */
@@ -65,10 +66,13 @@ typedef struct strl_hierarchy {
     strl_ingest *ingest; /* gives up its streams when they are used up */
     const strl_partition *partition;
     strl_level *levels;     /* [partition->depth + 1] */
-    strl_adjacency next;    /* of the level above the one being made */
+    strl_adjacency current; /* of the level being made, until its groups are chosen */
+    strl_adjacency next;    /* of the level above it */
     float even_error;       /* lattice units: where the nodes of the level being made are to end; 0 = at half their triangles */
     strl_anchor_plan anchor_plan; /* of the level being made */
     float growth;           /* by which even_error grows from level to level, so that about half the triangles go */
+    uint32_t saved_done;    /* groups of the level being made that the last checkpoint has */
+    uint64_t saved_at_ns;   /* when it was made */
 } strl_hierarchy;
 
 /* One node as a worker has made it, before its bytes are put into the spills in order. */
@@ -101,8 +105,35 @@ float strl_median(float *values, uint32_t count);
 /* Sets even_error for the level above `level`, which is done. */
 bool strl_choose_even_error(strl_hierarchy *hierarchy, const strl_level *level);
 
-strl_status strl_make_leaves(strl_hierarchy *hierarchy, strl_error *err);
-strl_status strl_make_level(strl_hierarchy *hierarchy, uint32_t level, strl_error *err);
+/* From the group `first` on: those before are restored. */
+strl_status strl_make_leaves(strl_hierarchy *hierarchy, uint32_t first, strl_error *err);
+strl_status strl_make_level(strl_hierarchy *hierarchy, uint32_t level, uint32_t first, strl_error *err);
+
+/* ---- checkpoints (build/checkpoint.h; clusters_save.c, node_save.c) ---- */
+
+/* How far a build has come. */
+typedef enum strl_stage { STRL_STAGE_NONE, STRL_STAGE_INGEST, STRL_STAGE_PARTITION } strl_stage;
+typedef struct strl_position {
+    strl_stage finished;  /* the last of the stages before the levels */
+    uint32_t level, done; /* all levels below are finished, and so many groups of this one; level depth + 1 = all are */
+} strl_position;
+
+strl_status strl_clusters_save(strl_hierarchy *hierarchy, const strl_position *position, strl_error *err);
+/* After every group: saves where it is time to. */
+strl_status strl_clusters_note(strl_hierarchy *hierarchy, uint32_t level, uint32_t done, strl_error *err);
+/* Opens the streams of a level. */
+strl_status strl_level_open(strl_hierarchy *hierarchy, uint32_t index, strl_error *err);
+/* What an earlier build has finished: ingest, partition (with STRL_STAGE_PARTITION, levels too) and where to go on.
+ * *graph: a stream that is to be deleted when the partition is made. */
+strl_status strl_clusters_restore(strl_hierarchy *hierarchy, strl_ingest *ingest, strl_partition *partition,
+                                  strl_position *position, strl_spill **graph, strl_error *err);
+
+/* Appends a node that was taken to its level's states. */
+strl_status strl_node_state_save(strl_level *level, uint32_t self, const strl_made_node *made, strl_error *err);
+/* Reads all states of a level: its nodes, and to `next` (may be NULL) the neighbours that they counted. *count: how
+ * many. */
+strl_status strl_node_states_restore(strl_level *level, uint32_t groups, strl_adjacency *next, uint32_t *count,
+                                     strl_error *err);
 
 /* Removes faces of which there are more than two identical ones, in pairs, from a group's merged mesh. *dropped: how many. False
  * without memory. */

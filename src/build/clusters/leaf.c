@@ -19,7 +19,7 @@ typedef struct leaf_stage {
     uint32_t *words;       /* the bucket of shares at hand */
     shared_ref *refs;      /* sorted by (cluster, at) */
     size_t ref_count;
-    uint32_t first_cluster;
+    uint32_t first_cluster; /* of the item 0 of the pipeline at hand */
     uint32_t *last_reader; /* [cell_count] as in strl_leaf_shares; NO_READER = dropped */
     strl_made_node *slots;
     strl_arena *arenas;    /* per worker */
@@ -323,6 +323,8 @@ static strl_status take_leaf(void *context, uint64_t index, unsigned slot, unsig
     drop_what_was_read(stage, cluster);
     strl_status status = strl_take_node(stage->hierarchy, stage->level, cluster, &stage->slots[slot], err);
     strl_made_node_deinit(&stage->slots[slot]);
+    if (!status)
+        status = strl_clusters_note(stage->hierarchy, 0, cluster + 1, err);
     return status ? status : strl__build_report(stage->hierarchy->context, cluster + 1, stage->level->count, err);
 }
 
@@ -376,7 +378,26 @@ static strl_status load_bucket(leaf_stage *stage, strl_spill *spill, strl_error 
     return status;
 }
 
-strl_status strl_make_leaves(strl_hierarchy *hierarchy, strl_error *err)
+/* The clusters of a bucket from `first` on. */
+static strl_status make_bucket(leaf_stage *stage, const strl_leaf_shares *shares, uint32_t bucket, uint32_t first,
+                               strl_error *err)
+{
+    uint32_t begin = shares->bucket_first[bucket], end = shares->bucket_first[bucket + 1];
+    if (first >= end)
+        return STRL_OK;
+    strl_status status = load_bucket(stage, shares->spill[bucket], err);
+    stage->first_cluster = begin > first ? begin : first;
+    if (!status && stage->first_cluster == 0)
+        status = sample_error(stage, end - begin, err);
+    if (!status)
+        status = strl_pool_ordered(stage->hierarchy->context->pool, end - stage->first_cluster, 0, make_leaf, take_leaf, stage,
+                                   NULL, err);
+    strl__free(stage->words);
+    strl__free(stage->refs);
+    return status;
+}
+
+strl_status strl_make_leaves(strl_hierarchy *hierarchy, uint32_t first, strl_error *err)
 {
     strl_pool *pool = hierarchy->context->pool;
     leaf_stage stage = {.hierarchy = hierarchy, .level = &hierarchy->levels[0]};
@@ -384,24 +405,13 @@ strl_status strl_make_leaves(strl_hierarchy *hierarchy, strl_error *err)
     stage.level->group_count = stage.level->count; /* every leaf is a group of its own */
     unsigned workers = strl_pool_workers(pool);
     strl_status status = strl_leaf_shares_create(hierarchy, &shares, err);
-    if (!status)
-        status = strl_ingest_drop(&hierarchy->ingest->shared, err);
     stage.last_reader = shares.last_reader;
     stage.slots = strl__alloc_zero(strl_pool_window(pool, 0), sizeof *stage.slots);
     stage.arenas = strl__alloc_zero(workers, sizeof *stage.arenas);
     if (!status && (!stage.slots || !stage.arenas))
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for %u workers", workers);
-    for (uint32_t b = 0; b < shares.bucket_count && !status; b++) {
-        status = load_bucket(&stage, shares.spill[b], err);
-        stage.first_cluster = shares.bucket_first[b];
-        if (!status && b == 0)
-            status = sample_error(&stage, shares.bucket_first[1] - shares.bucket_first[0], err);
-        if (!status)
-            status = strl_pool_ordered(pool, shares.bucket_first[b + 1] - shares.bucket_first[b], 0, make_leaf,
-                                       take_leaf, &stage, NULL, err);
-        strl__free(stage.words);
-        strl__free(stage.refs);
-    }
+    for (uint32_t b = 0; b < shares.bucket_count && !status; b++)
+        status = make_bucket(&stage, &shares, b, first, err);
     for (unsigned i = 0; stage.slots && i < strl_pool_window(pool, 0); i++)
         strl_made_node_deinit(&stage.slots[i]);
     for (unsigned i = 0; stage.arenas && i < workers; i++)
@@ -409,5 +419,7 @@ strl_status strl_make_leaves(strl_hierarchy *hierarchy, strl_error *err)
     strl__free(stage.slots);
     strl__free(stage.arenas);
     strl_leaf_shares_deinit(&shares);
+    if (!status)
+        status = strl_ingest_drop(&hierarchy->ingest->shared, err);
     return status ? status : strl_ingest_drop(&hierarchy->ingest->soup, err);
 }

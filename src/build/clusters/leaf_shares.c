@@ -1,4 +1,5 @@
 /* Positions that several clusters have, handed to each of them. */
+#include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -30,6 +31,14 @@ static strl_status next_word(word_reader *reader, uint32_t *word, strl_error *er
     }
     *word = reader->buffer[reader->used++];
     return STRL_OK;
+}
+
+static strl_status next_cell(word_reader *reader, uint32_t cells, uint32_t *cell, strl_error *err)
+{
+    strl_status status = next_word(reader, cell, err);
+    return status || *cell < cells ? status
+                                   : strl__fail(err, STRL_ERR_INTERNAL, "a shared position is in cell %" PRIu32 " of %" PRIu32,
+                                                *cell, cells);
 }
 
 typedef struct distributor {
@@ -160,7 +169,7 @@ strl_status strl_leaf_shares_create(const strl_hierarchy *hierarchy, strl_leaf_s
         if (!status && !strl__grow(&d.cells, &d.cell_capacity, head[3], sizeof *d.cells))
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a position in %u cells", head[3]);
         for (uint32_t i = 0; i < head[3] && !status; i++)
-            status = next_word(&reader, &d.cells[i], err);
+            status = next_cell(&reader, hierarchy->ingest->cell_count, &d.cells[i], err);
         if (!status && !list_clusters(&d, head[3]))
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a position in %u cells", head[3]);
         if (!status && d.cluster_count > 1) {

@@ -5,6 +5,7 @@
 
 #include "base/fail.h"
 #include "build/clusters/hierarchy.h"
+#include "build/saved.h"
 #include "geometry/payload.h"
 #include "geometry/record.h"
 #include "geometry/simplify.h"
@@ -30,6 +31,8 @@ typedef struct level_stage {
     strl_level *level;          /* being made */
     const strl_level *children;
     strl_groups groups;
+    uint32_t level_index;
+    uint32_t first_group;       /* that is made: those before are restored */
     made_group *slots;
     strl_arena *arenas;         /* per worker */
 } level_stage;
@@ -286,6 +289,7 @@ static uint32_t half_of_children(const group_work *work, uint32_t which)
 static strl_status make_group(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
 {
     level_stage *stage = context;
+    index += stage->first_group;
     strl_arena *arena = &stage->arenas[worker];
     made_group *made = &stage->slots[slot];
     strl_arena_mark mark = strl_arena_get_mark(arena);
@@ -377,6 +381,7 @@ static strl_status take_group(void *context, uint64_t index, unsigned slot, unsi
 {
     level_stage *stage = context;
     made_group *made = &stage->slots[slot];
+    index += stage->first_group;
     const uint32_t *member = stage->groups.member + stage->groups.first[index];
     strl_status status = STRL_OK;
     (void)worker;
@@ -391,6 +396,8 @@ static strl_status take_group(void *context, uint64_t index, unsigned slot, unsi
     for (uint32_t m = 0; m < made->count && !status; m++)
         status = strl_take_node(stage->hierarchy, stage->level, member[m], &made->node[m], err);
     made_group_deinit(made);
+    if (!status)
+        status = strl_clusters_note(stage->hierarchy, stage->level_index, (uint32_t)index + 1, err);
     return status ? status
                   : strl__build_report(stage->hierarchy->context, stage->groups.first[index + 1], stage->level->count, err);
 }
@@ -433,25 +440,45 @@ bool strl_choose_even_error(strl_hierarchy *hierarchy, const strl_level *level)
     return true;
 }
 
-strl_status strl_make_level(strl_hierarchy *hierarchy, uint32_t level, strl_error *err)
+/* The groups are chosen anew: those that are restored must be the first of them. */
+static bool fits_restored(const level_stage *stage)
+{
+    for (uint32_t g = 0; g < stage->first_group; g++)
+        for (uint32_t i = stage->groups.first[g]; i < stage->groups.first[g + 1]; i++) {
+            const strl_node_state *state = &stage->level->nodes[stage->groups.member[i]];
+            if (state->group != g || !state->payload_bytes)
+                return false;
+        }
+    return true;
+}
+
+static strl_status choose_groups(level_stage *stage, strl_error *err)
+{
+    strl_hierarchy *hierarchy = stage->hierarchy;
+    strl_status status = strl_groups_choose(stage->children, &hierarchy->current, stage->level->count,
+                                            hierarchy->partition->depth - stage->level_index,
+                                            hierarchy->context->desc->no_dependencies, &stage->groups, err);
+    strl_adjacency_deinit(&hierarchy->current);
+    if (status)
+        return status;
+    stage->level->group_count = stage->groups.count;
+    return stage->first_group <= stage->groups.count && fits_restored(stage) ? STRL_OK
+                                                                             : strl_saved_fail("the groups of a level", err);
+}
+
+strl_status strl_make_level(strl_hierarchy *hierarchy, uint32_t level, uint32_t first, strl_error *err)
 {
     strl_pool *pool = hierarchy->context->pool;
     level_stage stage = {.hierarchy = hierarchy, .level = &hierarchy->levels[level],
-                         .children = &hierarchy->levels[level - 1]};
+                         .children = &hierarchy->levels[level - 1], .level_index = level, .first_group = first};
     unsigned workers = strl_pool_workers(pool);
-    strl_adjacency adjacency = hierarchy->next;
-    hierarchy->next = (strl_adjacency){0};
-    strl_status status =
-        strl_groups_choose(stage.children, &adjacency, stage.level->count, hierarchy->partition->depth - level,
-                           hierarchy->context->desc->no_dependencies, &stage.groups, err);
-    strl_adjacency_deinit(&adjacency);
-    stage.level->group_count = stage.groups.count;
+    strl_status status = choose_groups(&stage, err);
     stage.slots = strl__alloc_zero(strl_pool_window(pool, 0), sizeof *stage.slots);
     stage.arenas = strl__alloc_zero(workers, sizeof *stage.arenas);
     if (!status && (!stage.slots || !stage.arenas))
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for %u workers", workers);
     if (!status)
-        status = strl_pool_ordered(pool, stage.groups.count, 0, make_group, take_group, &stage, NULL, err);
+        status = strl_pool_ordered(pool, stage.groups.count - first, 0, make_group, take_group, &stage, NULL, err);
     for (unsigned i = 0; stage.slots && i < strl_pool_window(pool, 0); i++)
         made_group_deinit(&stage.slots[i]);
     for (unsigned i = 0; stage.arenas && i < workers; i++)

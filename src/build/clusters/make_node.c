@@ -227,7 +227,9 @@ strl_status strl_take_node(strl_hierarchy *hierarchy, strl_level *level, uint32_
     if (!status && level->anchors)
         status = strl_spill_append(level->anchors, made->anchors.data, made->anchors.size, err);
     for (size_t i = 0; i < made->neighbour_count && !status; i++)
-        if (!strl_adjacency_add(&hierarchy->next, self >> 1, made->next_neighbour[2 * i], made->next_neighbour[2 * i + 1]))
+        if (made->next_neighbour[2 * i] >= (level->count + 1) / 2)
+            status = strl__fail(err, STRL_ERR_INTERNAL, "node %u shares points with one that is not there", self);
+        else if (!strl_adjacency_add(&hierarchy->next, self >> 1, made->next_neighbour[2 * i], made->next_neighbour[2 * i + 1]))
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the neighbours of a level");
-    return status;
+    return status || !level->states ? status : strl_node_state_save(level, self, made, err);
 }

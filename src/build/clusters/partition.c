@@ -139,13 +139,20 @@ static int compare_words(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
+uint32_t strl_partition_depth(const strl_ingest *ingest)
+{
+    uint32_t depth = 0;
+    while (ingest->triangle_count >> depth > STRL_CLUSTER_TRIANGLES && ingest->cell_count >> (depth + 1) >= 4)
+        depth++;
+    return depth;
+}
+
 strl_status strl_partition_create(const strl_ingest *ingest, strl_partition *partition, strl_error *err)
 {
     splitter s = {.ingest = ingest};
     uint32_t cells = ingest->cell_count;
     *partition = (strl_partition){0};
-    while (ingest->triangle_count >> partition->depth > STRL_CLUSTER_TRIANGLES && cells >> (partition->depth + 1) >= 4)
-        partition->depth++;
+    partition->depth = strl_partition_depth(ingest);
     uint32_t clusters = 1u << partition->depth;
     partition->cluster = strl__alloc(cells, sizeof *partition->cluster);
     partition->cluster_first = strl__alloc((size_t)clusters + 1, sizeof *partition->cluster_first);

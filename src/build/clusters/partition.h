@@ -14,7 +14,14 @@ typedef struct strl_partition {
     uint32_t *cluster_first; /* [clusters + 1] into cell */
 } strl_partition;
 
+/* What strl_partition_create chooses. */
+uint32_t strl_partition_depth(const strl_ingest *ingest);
 strl_status strl_partition_create(const strl_ingest *ingest, strl_partition *partition, strl_error *err);
+/* Into the stream `partition` of a checkpoint, and from it. */
+strl_status strl_partition_save(strl_build_context *context, const strl_ingest *ingest, const strl_partition *partition,
+                                strl_error *err);
+strl_status strl_partition_restore(strl_build_context *context, const strl_ingest *ingest, strl_partition *partition,
+                                   strl_error *err);
 void strl_partition_deinit(strl_partition *partition);
 
 /* Bisects a weighted graph by METIS. side: [count] receives 0 or 1. METIS keeps global state, so this takes a process-wide

@@ -28,33 +28,85 @@ typedef struct connecting {
     size_t size, used;
 } connecting;
 
-static int compare_pairs(const void *a, const void *b)
+/* Which pairs of a spill have one position: chains through them, begun at the first. */
+typedef struct chains {
+    uint32_t *slots; /* by hash of position: first pair + 1; 0 = free */
+    uint32_t mask;
+    uint32_t *next;  /* [count] the next pair of the position; NO_PAIR = none */
+    uint32_t *last;  /* [count] of a first pair: the last one of its position; NO_PAIR = it is no first pair */
+    uint32_t *cells; /* [count] of one chain */
+} chains;
+
+#define NO_PAIR UINT32_MAX
+
+static void release_chains(chains *c)
 {
-    const pair *x = a, *y = b;
-    for (int k = 0; k < 3; k++)
-        if (x->position[k] != y->position[k])
-            return x->position[k] < y->position[k] ? -1 : 1;
-    return x->cell < y->cell ? -1 : x->cell > y->cell;
+    strl__free(c->slots);
+    strl__free(c->next);
+    strl__free(c->last);
+    strl__free(c->cells);
+}
+
+static bool make_chains(chains *c, const pair *pairs, uint32_t count)
+{
+    uint32_t size = 16;
+    while (size / 2 < count)
+        size *= 2;
+    *c = (chains){.slots = strl__alloc_zero(size, sizeof *c->slots), .mask = size - 1,
+                  .next = strl__alloc(count, sizeof *c->next), .last = strl__alloc(count, sizeof *c->last),
+                  .cells = strl__alloc(count, sizeof *c->cells)};
+    if (!c->slots || !c->next || !c->last || !c->cells)
+        return false;
+    for (uint32_t i = 0; i < count; i++) {
+        const uint32_t *p = pairs[i].position;
+        uint32_t at = (uint32_t)strl__mix64(p[0] ^ strl__mix64((uint64_t)p[1] << 32 | p[2])) & c->mask;
+        while (c->slots[at] && memcmp(pairs[c->slots[at] - 1].position, p, sizeof pairs[i].position))
+            at = (at + 1) & c->mask;
+        c->next[i] = c->last[i] = NO_PAIR;
+        if (!c->slots[at]) {
+            c->slots[at] = i + 1;
+            c->last[i] = i;
+        } else {
+            uint32_t first = c->slots[at] - 1;
+            c->next[c->last[first]] = i;
+            c->last[first] = i;
+        }
+    }
+    return true;
 }
 
 /* A position of n cells adds n - 1 edges along the curve's order and, where n is small, all others too. */
-static bool add_position(connected *out, const pair *pairs, size_t count)
+static bool add_position(connected *out, const uint32_t position[3], const uint32_t *cells, size_t count)
 {
     if (!strl__grow(&out->shared, &out->shared_capacity, out->shared_count + 4 + count, sizeof *out->shared))
         return false;
-    memcpy(out->shared + out->shared_count, pairs[0].position, 12);
+    memcpy(out->shared + out->shared_count, position, 12);
     out->shared[out->shared_count + 3] = (uint32_t)count;
-    for (size_t i = 0; i < count; i++)
-        out->shared[out->shared_count + 4 + i] = pairs[i].cell;
+    memcpy(out->shared + out->shared_count + 4, cells, count * sizeof *cells);
     out->shared_count += 4 + count;
     for (size_t i = 0; i + 1 < count; i++) {
         size_t end = count <= 8 ? count : i + 2;
         if (!strl__grow(&out->edges, &out->edge_capacity, out->edge_count + (end - i), sizeof *out->edges))
             return false;
         for (size_t k = i + 1; k < end; k++)
-            out->edges[out->edge_count++] = (uint64_t)pairs[i].cell << 32 | pairs[k].cell;
+            out->edges[out->edge_count++] = (uint64_t)cells[i] << 32 | cells[k];
     }
     return true;
+}
+
+/* Cells ascend along a chain, as they do in the spill. */
+static bool add_positions(connected *out, const pair *pairs, uint32_t count)
+{
+    chains c;
+    bool good = make_chains(&c, pairs, count);
+    for (uint32_t i = 0; i < count && good; i++) {
+        size_t cells = 0;
+        for (uint32_t k = c.last[i] == NO_PAIR || c.next[i] == NO_PAIR ? NO_PAIR : i; k != NO_PAIR; k = c.next[k])
+            c.cells[cells++] = pairs[k].cell;
+        good = cells == 0 || add_position(out, pairs[i].position, c.cells, cells);
+    }
+    release_chains(&c);
+    return good;
 }
 
 static strl_status connect_spill(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
@@ -63,21 +115,17 @@ static strl_status connect_spill(void *context, uint64_t index, unsigned slot, u
     connected *out = &c->slots[slot];
     pair *pairs;
     size_t count;
-    bool good = true;
     (void)worker;
     *out = (connected){0};
     strl_status status = strl__pair_spills_read(c->pairs, (uint32_t)index, &pairs, &count, err);
     if (status)
         return status;
-    qsort(pairs, count, sizeof *pairs, compare_pairs);
-    for (size_t i = 0, end; i < count && good; i = end) {
-        for (end = i + 1; end < count && !memcmp(pairs[i].position, pairs[end].position, 12);)
-            end++;
-        if (end - i > 1)
-            good = add_position(out, pairs + i, end - i);
-    }
+    if (count > UINT32_MAX / 4)
+        status = strl__fail(err, STRL_ERR_INTERNAL, "%zu positions are too many to connect at once", count);
+    else if (!add_positions(out, pairs, (uint32_t)count))
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory to connect %zu positions", count);
     strl__free(pairs);
-    return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory to connect %zu positions", count);
+    return status;
 }
 
 static bool count_edge(connecting *c, uint64_t key, uint32_t weight)
@@ -170,7 +218,7 @@ strl_status strl__connect_cells(strl_build_context *context, strl_ingest *ingest
     connecting c = {.context = context, .ingest = ingest, .pairs = pairs};
     unsigned window = strl_pool_workers(context->pool);
     c.slots = strl__alloc_zero(strl_pool_window(context->pool, window), sizeof *c.slots);
-    strl_status status = c.slots ? strl_spill_open(context->spills, "shared", 0, &ingest->shared, err)
+    strl_status status = c.slots ? strl__build_open_stream(context, "shared", &ingest->shared, err)
                                  : strl__fail(err, STRL_ERR_MEMORY, "no memory to connect cells");
     if (!status)
         status = strl_pool_ordered(context->pool, pairs->count, window, connect_spill, take_connected, &c, NULL, err);

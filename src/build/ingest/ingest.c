@@ -8,6 +8,8 @@
 #include "platform/file.h"
 
 #define LEAST_READER_BYTES (8u << 20)
+/* Of a few nodes a level, what is used up and waits for a checkpoint is a large share of all. */
+#define KEEP_TRIANGLES 65536u
 
 static strl_status open_readers(strl_build_context *context, strl_reader **readers, strl_ingest *ingest, strl_error *err)
 {
@@ -60,6 +62,37 @@ static strl_status check_disk(const strl_build_context *context, uint64_t triang
     return status;
 }
 
+/* Cells are bounded by the budget (sort.c), and a leaf is some cells: with fewer bytes a triangle leaves have more triangles
+ * than STRL_CLUSTER_TRIANGLES. */
+#define MEMORY_BYTES_OF_TRIANGLE 2u
+
+strl_status strl__ingest_check_memory(const strl_build_context *context, uint64_t triangles, strl_error *err)
+{
+    uint64_t least = triangles * MEMORY_BYTES_OF_TRIANGLE;
+    if (least <= context->memory_bytes)
+        return STRL_OK;
+    return strl__fail(err, STRL_ERR_ARGUMENT, "--memory %" PRIu64 "M is below the least that a build of %" PRIu64
+                      " triangles needs, %" PRIu64 "M", context->memory_bytes >> 20, triangles, (least >> 20) + 1);
+}
+
+static strl_status tell_estimate(strl_build_context *context, strl_reader *const *readers, strl_error *err)
+{
+    strl_build_estimate estimate = {0};
+    for (uint32_t i = 0; i < context->desc->input_count; i++) {
+        strl_reader_info info;
+        strl_reader_info_get(readers[i], &info);
+        /* A file may announce more than it has room for: nothing tells of a triangle in less than a byte. */
+        estimate.triangles += info.triangles_hint < info.file_bytes ? info.triangles_hint : info.file_bytes;
+    }
+    strl__build_expect(context, estimate.triangles);
+    estimate.seconds = context->estimate.seconds_left;
+    estimate.scratch_bytes = estimate.triangles * SCRATCH_BYTES_OF_TRIANGLE;
+    strl_status status = strl_path_free_bytes(context->scratch_dir, &estimate.scratch_free_bytes, err);
+    if (!status && context->desc->estimate)
+        context->desc->estimate(context->desc->context, &estimate);
+    return status;
+}
+
 strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, strl_error *err)
 {
     model_survey survey = {0};
@@ -72,14 +105,20 @@ strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, st
     if (status)
         goto done;
     strl__build_stage(context, "survey");
+    status = tell_estimate(context, readers, err);
+    if (status)
+        goto done;
     status = strl__survey_run(context, readers, &survey, err);
     if (status)
         goto done;
     context->result->triangles_in = survey.triangles;
     note_drops(context, readers);
-    context->progress.triangles_in = survey.triangles;
+    strl__build_expect(context, survey.triangles);
+    context->keep &= survey.triangles >= (context->desc->keep_triangles ? context->desc->keep_triangles : KEEP_TRIANGLES);
     status = survey.triangles ? check_disk(context, survey.triangles, err)
                               : strl__ingest_refuse_empty(context, readers, err);
+    if (!status)
+        status = strl__ingest_check_memory(context, survey.triangles, err);
     if (status)
         goto done;
     ingest->has_normals = survey.any_normal;
@@ -130,8 +169,8 @@ static void names_deinit(strl_names *names)
 
 void strl_ingest_deinit(strl_ingest *ingest)
 {
-    strl_spill_close_and_delete(ingest->soup, NULL);
-    strl_spill_close_and_delete(ingest->shared, NULL);
+    strl_spill_close(ingest->soup);
+    strl_spill_close(ingest->shared);
     strl__free(ingest->cells);
     strl__free(ingest->edges);
     strl__free(ingest->palette);

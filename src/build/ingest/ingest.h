@@ -69,6 +69,13 @@ typedef struct strl_ingest {
 
 strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, strl_error *err);
 void strl_ingest_deinit(strl_ingest *ingest);
+/* Puts all of it but what is in soup and shared into two streams of a checkpoint: `graph`, which has the edges and ends
+ * when it is deleted, and `ingest`, which has the rest. */
+strl_status strl_ingest_save(strl_build_context *context, const strl_ingest *ingest, strl_spill **graph, strl_error *err);
+/* What was saved, from the streams of a checkpoint. with_edges: they are in it. with_soup: soup and shared are. *graph: as above,
+ * NULL without edges. */
+strl_status strl_ingest_restore(strl_build_context *context, bool with_edges, bool with_soup, strl_ingest *ingest,
+                                strl_spill **graph, strl_error *err);
 /* Deletes one of the streams when it is used up. */
 strl_status strl_ingest_drop(strl_spill **stream, strl_error *err);
 

@@ -28,6 +28,8 @@ strl_status strl__survey_choose_lattice(const strl_build_context *context, const
 #define STRL_INPUTS_NAME_BYTES 200u
 /* "a.ply", or "a.ply and 2 more". */
 void strl__ingest_name_inputs(const strl_build_desc *desc, char *text, size_t size);
+/* Refuses more triangles than the budget has room for nodes and cells of: their leaves would outgrow what a worker may hold. */
+strl_status strl__ingest_check_memory(const strl_build_context *context, uint64_t triangles, strl_error *err);
 /* No triangle was read: what was, by kind. The result has the drops. */
 strl_status strl__ingest_refuse_empty(const strl_build_context *context, strl_reader *const *readers, strl_error *err);
 /* All `collapsed` triangles that were read have two corners in one lattice cell. */

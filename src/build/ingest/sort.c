@@ -310,7 +310,7 @@ strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest,
     s.cell_triangles = least < CELL_TRIANGLES ? CELL_TRIANGLES : (uint32_t)least;
     unsigned window = strl_pool_workers(context->pool);
     s.slots = strl__alloc_zero(strl_pool_window(context->pool, window), sizeof *s.slots);
-    strl_status status = s.slots ? strl_spill_open(context->spills, "soup", 0, &ingest->soup, err)
+    strl_status status = s.slots ? strl__build_open_stream(context, "soup", &ingest->soup, err)
                                  : strl__fail(err, STRL_ERR_MEMORY, "no memory to sort");
     if (!status)
         status = strl__pair_spills_open(context, ingest->triangle_count, pairs, err);

@@ -1,6 +1,8 @@
 /* Packed triangle records and their order along the curve. */
+#include <inttypes.h>
 #include <string.h>
 
+#include "base/fail.h"
 #include "build/ingest/internal.h"
 
 /* Positions 36 bytes, normals 8, colours 12, the palette last: the sorted soup goes without it where there is but one. */
@@ -85,6 +87,9 @@ strl_status strl_ingest_read(const strl_ingest *ingest, uint64_t first, uint32_t
         triangles[i].palette = 0;
         if (ingest->palette_count > 1)
             memcpy(&triangles[i].palette, palette, 4);
+        if (triangles[i].palette >= ingest->palette_count)
+            status = strl__fail(err, STRL_ERR_INTERNAL, "triangle %" PRIu64 " has the part and material %" PRIu32 " of %zu",
+                                first + i, triangles[i].palette, ingest->palette_count);
     }
     return status;
 }

@@ -74,25 +74,53 @@ static strl_status wrap(int descriptor, uint64_t bytes, const char *path, strl_f
     return STRL_OK;
 }
 
+/* A regular file that is there; its facts. */
+static strl_status open_regular(const char *path, int flags, int *descriptor, struct stat *facts, strl_error *err)
+{
+    /* Without O_NONBLOCK a named pipe would wait for its writer before it could be refused. */
+    *descriptor = open_retrying(path, flags | O_NONBLOCK | O_NOCTTY);
+    if (*descriptor < 0)
+        return strl__fail_system(err, errno, "open", path);
+    if (fstat(*descriptor, facts) != 0) {
+        int code = errno;
+        close(*descriptor);
+        return strl__fail_system(err, code, "examine", path);
+    }
+    if (!S_ISREG(facts->st_mode)) {
+        close(*descriptor);
+        return strl__fail(err, STRL_ERR_IO, "cannot open %s: expected a file, found a %s", strl__path_shown(path),
+                          S_ISDIR(facts->st_mode) ? "folder" : "device or pipe");
+    }
+    return STRL_OK;
+}
+
 strl_status strl_file_open(const char *path, strl_file **file, strl_error *err)
 {
     *file = NULL;
-    /* Without O_NONBLOCK a named pipe would wait for its writer before it could be refused. */
-    int descriptor = open_retrying(path, O_RDONLY | O_NONBLOCK | O_NOCTTY);
-    if (descriptor < 0)
-        return strl__fail_system(err, errno, "open", path);
+    int descriptor;
     struct stat facts;
-    if (fstat(descriptor, &facts) != 0) {
-        int code = errno;
+    strl_status status = open_regular(path, O_RDONLY, &descriptor, &facts, err);
+    return status != STRL_OK ? status : wrap(descriptor, (uint64_t)facts.st_size, path, file, err);
+}
+
+strl_status strl_file_reopen(const char *path, uint64_t bytes, strl_file **file, strl_error *err)
+{
+    *file = NULL;
+    int descriptor;
+    struct stat facts;
+    strl_status status = open_regular(path, O_RDWR | O_NOFOLLOW, &descriptor, &facts, err);
+    if (status != STRL_OK)
+        return status;
+    if ((uint64_t)facts.st_size < bytes)
+        status = strl__fail(err, STRL_ERR_FORMAT, "%s ends at byte %" PRIu64 ", expected %" PRIu64 " bytes",
+                            strl__path_shown(path), (uint64_t)facts.st_size, bytes);
+    else if ((uint64_t)facts.st_size > bytes && ftruncate(descriptor, (off_t)bytes) != 0)
+        status = strl__fail_system(err, errno, "cut", path);
+    if (status != STRL_OK) {
         close(descriptor);
-        return strl__fail_system(err, code, "examine", path);
+        return status;
     }
-    if (!S_ISREG(facts.st_mode)) {
-        close(descriptor);
-        return strl__fail(err, STRL_ERR_IO, "cannot open %s: expected a file, found a %s", strl__path_shown(path),
-                          S_ISDIR(facts.st_mode) ? "folder" : "device or pipe");
-    }
-    return wrap(descriptor, (uint64_t)facts.st_size, path, file, err);
+    return wrap(descriptor, bytes, path, file, err);
 }
 
 strl_status strl_file_create(const char *path, strl_file **file, strl_error *err)

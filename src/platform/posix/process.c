@@ -47,9 +47,8 @@ unsigned strl_cpu_count(void)
     return online > 0 ? (unsigned)online : 1;
 }
 
-/* The resident peak ("high water mark") of this program's own image; 0 where the system does not tell. ru_maxrss would
- * also count what a parent held before it became this program. */
-static uint64_t high_water_mark_bytes(void)
+/* A line of the system's account of this process, in bytes; 0 where there is none. */
+static uint64_t status_bytes(const char *name)
 {
     char text[4096];
     int descriptor = open("/proc/self/status", O_RDONLY | O_CLOEXEC);
@@ -60,8 +59,8 @@ static uint64_t high_water_mark_bytes(void)
     if (got <= 0)
         return 0;
     text[got] = 0;
-    const char *line = strstr(text, "\nVmHWM:");
-    return line ? (uint64_t)strtoull(line + strlen("\nVmHWM:"), NULL, 10) << 10 : 0;
+    const char *line = strstr(text, name);
+    return line ? (uint64_t)strtoull(line + strlen(name), NULL, 10) << 10 : 0;
 }
 
 static uint64_t usage_peak_bytes(int who)
@@ -70,9 +69,22 @@ static uint64_t usage_peak_bytes(int who)
     return getrusage(who, &usage) == 0 && usage.ru_maxrss > 0 ? (uint64_t)usage.ru_maxrss << 10 : 0;
 }
 
+uint64_t strl_thread_disk_waits(void)
+{
+    struct rusage usage;
+    return getrusage(RUSAGE_THREAD, &usage) == 0 ? (uint64_t)usage.ru_inblock + (uint64_t)usage.ru_majflt : 0;
+}
+
+uint64_t strl_process_rss_bytes(void)
+{
+    return status_bytes("\nVmRSS:");
+}
+
 uint64_t strl_process_peak_rss_bytes(void)
 {
-    uint64_t own = high_water_mark_bytes();
+    /* The high water mark of this program's own image: ru_maxrss would also count what a parent held before it became
+     * this program. */
+    uint64_t own = status_bytes("\nVmHWM:");
     if (own == 0)
         own = usage_peak_bytes(RUSAGE_SELF);
     uint64_t children = usage_peak_bytes(RUSAGE_CHILDREN);

@@ -13,8 +13,9 @@
 #include "platform/posix/facts.h"
 
 #define LOCK_NAME "lock"
-/* What the lock file says: the folder is ours to clear. */
-#define SIGNATURE "stroll scratch folder: the next run of the same output clears it\n"
+/* What the lock file says: the folder is ours to clear, and perhaps the one it is in. */
+#define SIGNATURE "stroll scratch folder: the next build of the same output resumes or clears it\n"
+#define PARENT_SIGNATURE SIGNATURE "made with the folder that it is in\n"
 #define NOT_OURS "there is one, and it was not made by a build"
 #define MOST_ATTEMPTS 20
 
@@ -22,8 +23,11 @@ struct strl_scratch {
     char *path, *lock_path; /* owned */
     char *made_parent;      /* owned; NULL = it was there before */
     const char *const *names;
+    bool keep;
     strl_lock *lock; /* NULL until the folder is ours */
     bool held;       /* by another process */
+    bool (*needed)(void *context, const char *name); /* of a sweep; NULL = nothing is */
+    void *context;                                   /* its */
 };
 
 static bool is_ours(const strl_scratch *scratch, int folder, const char *name)
@@ -77,7 +81,8 @@ static bool must_be_ours(strl_scratch *scratch, int folder, const char *name, st
 
 static bool remove_ours(strl_scratch *scratch, int folder, const char *name, strl_error *err)
 {
-    if (is_ours(scratch, folder, name) && unlinkat(folder, name, 0) != 0 && errno != ENOENT) {
+    bool needed = scratch->needed && scratch->needed(scratch->context, name);
+    if (!needed && is_ours(scratch, folder, name) && unlinkat(folder, name, 0) != 0 && errno != ENOENT) {
         strl__fail_system(err, errno, "remove a scratch file in", scratch->path);
         return false;
     }
@@ -99,36 +104,57 @@ static bool can_be_locked(strl_scratch *scratch)
     return lstat(scratch->lock_path, &facts) == 0 ? S_ISREG(facts.st_mode) : empty && errno == ENOENT;
 }
 
+/* What the lock file says: that the folder is ours, and perhaps the one it is in. */
+typedef struct claim {
+    bool is_signed, with_parent;
+} claim;
+
 /* Asked under the lock: before, another process may be about to sign. What ended between making its folder and signing
  * it has left nothing but, perhaps, a lock file without a word. */
-static strl_status must_be_signed(strl_scratch *scratch, strl_error *err)
+static strl_status read_claim(strl_scratch *scratch, claim *found, strl_error *err)
 {
-    char text[sizeof SIGNATURE];
+    char text[sizeof PARENT_SIGNATURE + 1] = "";
     strl_file *file = NULL;
     size_t got = 0;
     strl_status status = strl_file_open(scratch->lock_path, &file, err);
     if (status == STRL_OK)
-        status = strl_file_read_some(file, 0, text, sizeof text, &got, err);
+        status = strl_file_read_some(file, 0, text, sizeof PARENT_SIGNATURE, &got, err);
     strl_file_close(file, NULL);
-    if (status != STRL_OK)
+    found->with_parent = strcmp(text, PARENT_SIGNATURE) == 0;
+    found->is_signed = found->with_parent || strcmp(text, SIGNATURE) == 0;
+    if (status != STRL_OK || found->is_signed || (got == 0 && each_file(scratch, must_be_absent, NULL)))
         return status;
-    bool ours = got == 0 ? each_file(scratch, must_be_absent, NULL)
-                         : got == sizeof SIGNATURE - 1 && memcmp(text, SIGNATURE, got) == 0;
-    return ours ? STRL_OK : refuse(scratch, err, NOT_OURS);
+    return refuse(scratch, err, NOT_OURS);
 }
 
-static strl_status sign(const strl_scratch *scratch, strl_error *err)
+static strl_status sign(const strl_scratch *scratch, const char *lock_path, strl_error *err)
 {
     strl_file *file = NULL;
-    strl_status status = strl_file_create(scratch->lock_path, &file, err);
+    const char *text = scratch->made_parent ? PARENT_SIGNATURE : SIGNATURE;
+    strl_status status = strl_file_create(lock_path, &file, err);
     if (status == STRL_OK)
-        status = strl_file_write(file, 0, SIGNATURE, sizeof SIGNATURE - 1, err);
+        status = strl_file_write(file, 0, text, strlen(text), err);
     strl_status closed = strl_file_close(file, status == STRL_OK ? err : NULL);
     return status != STRL_OK ? status : closed;
 }
 
 /* The folder is there. Nothing in it is touched before all of it is known to be ours. */
-static strl_status take_over(strl_scratch *scratch, strl_error *err)
+static strl_status clear_left_over(strl_scratch *scratch, const char *parent, strl_error *err)
+{
+    claim found;
+    strl_error inner = {.status = STRL_ERR_IO};
+    bool good = read_claim(scratch, &found, &inner) == STRL_OK && each_file(scratch, must_be_ours, &inner) &&
+                (scratch->keep || each_file(scratch, remove_ours, &inner));
+    if (!good)
+        return strl__fail(err, inner.status, "%s", inner.message);
+    if (parent && found.with_parent && !scratch->made_parent)
+        scratch->made_parent = strl__strdup(parent); /* without memory it stays */
+    /* Its last holder may have removed the lock file just before we made it again. What is signed is left as it is: a lock
+     * file without a word beside files would be nobody's. */
+    return found.is_signed ? STRL_OK : sign(scratch, scratch->lock_path, err);
+}
+
+static strl_status take_over(strl_scratch *scratch, const char *parent, strl_error *err)
 {
     struct stat facts;
     if (lstat(scratch->path, &facts) == 0 && !S_ISDIR(facts.st_mode))
@@ -138,15 +164,12 @@ static strl_status take_over(strl_scratch *scratch, strl_error *err)
     strl_status status = strl__lock_acquire(scratch->lock_path, &scratch->lock, &scratch->held, err);
     if (status != STRL_OK)
         return status;
-    strl_error inner = {.status = STRL_ERR_IO};
-    bool good = must_be_signed(scratch, &inner) == STRL_OK && each_file(scratch, must_be_ours, &inner) &&
-                each_file(scratch, remove_ours, &inner);
-    /* Signed anew: its last holder may have removed the lock file just before we made it again. */
-    if (good)
-        return sign(scratch, err);
-    strl_lock_release(scratch->lock);
-    scratch->lock = NULL;
-    return strl__fail(err, inner.status, "%s", inner.message);
+    status = clear_left_over(scratch, parent, err);
+    if (status != STRL_OK) { /* what is in it stays */
+        strl_lock_release(scratch->lock);
+        scratch->lock = NULL;
+    }
+    return status;
 }
 
 static strl_status lock_new(strl_scratch *scratch, strl_error *err)
@@ -154,17 +177,17 @@ static strl_status lock_new(strl_scratch *scratch, strl_error *err)
     strl_status status = strl__lock_acquire(scratch->lock_path, &scratch->lock, &scratch->held, err);
     if (status == STRL_ERR_MEMORY)
         rmdir(scratch->path); /* else it is another process's by now, or gone */
-    return status == STRL_OK ? sign(scratch, err) : status;
+    return status == STRL_OK ? sign(scratch, scratch->lock_path, err) : status;
 }
 
-static strl_status make(strl_scratch *scratch, strl_error *err)
+static strl_status make(strl_scratch *scratch, const char *parent, strl_error *err)
 {
     strl_status status = STRL_OK;
     for (int attempt = 0; attempt < MOST_ATTEMPTS; attempt++) {
         bool made = mkdir(scratch->path, 0777) == 0;
         if (!made && errno != EEXIST)
             return strl__fail_system(err, errno, "create folder", scratch->path);
-        status = made ? lock_new(scratch, err) : take_over(scratch, err);
+        status = made ? lock_new(scratch, err) : take_over(scratch, parent, err);
         /* Anything else may be the work of another process that begins or ends just now. */
         if (status == STRL_OK || status == STRL_ERR_MEMORY || scratch->lock || scratch->held)
             return status;
@@ -192,6 +215,7 @@ strl_status strl_scratch_create(const strl_scratch_desc *desc, strl_scratch **sc
     if (!made)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a scratch folder");
     made->names = desc->names;
+    made->keep = desc->keep;
     made->path = strl__strdup(desc->path);
     made->lock_path = strl_path_join(desc->path, LOCK_NAME);
     strl_status status = made->path && made->lock_path ? STRL_OK
@@ -199,7 +223,7 @@ strl_status strl_scratch_create(const strl_scratch_desc *desc, strl_scratch **sc
     if (status == STRL_OK && desc->parent)
         status = make_parent(made, desc->parent, err);
     if (status == STRL_OK)
-        status = make(made, err);
+        status = make(made, desc->parent, err);
     if (status != STRL_OK)
         strl_scratch_destroy(made);
     else
@@ -210,6 +234,33 @@ strl_status strl_scratch_create(const strl_scratch_desc *desc, strl_scratch **sc
 const char *strl_scratch_path(const strl_scratch *scratch)
 {
     return scratch->path;
+}
+
+strl_status strl_scratch_sweep(strl_scratch *scratch, bool (*needed)(void *context, const char *name), void *context,
+                               strl_error *err)
+{
+    strl_error inner = {.status = STRL_ERR_IO};
+    scratch->needed = needed;
+    scratch->context = context;
+    bool good = each_file(scratch, remove_ours, &inner);
+    scratch->needed = NULL;
+    return good ? STRL_OK : strl__fail(err, inner.status, "%s", inner.message);
+}
+
+static void release(strl_scratch *scratch)
+{
+    strl__free(scratch->made_parent);
+    strl__free(scratch->lock_path);
+    strl__free(scratch->path);
+    strl__free(scratch);
+}
+
+void strl_scratch_leave(strl_scratch *scratch)
+{
+    if (!scratch)
+        return;
+    strl_lock_release(scratch->lock);
+    release(scratch);
 }
 
 void strl_scratch_destroy(strl_scratch *scratch)
@@ -224,8 +275,5 @@ void strl_scratch_destroy(strl_scratch *scratch)
     }
     if (scratch->made_parent)
         rmdir(scratch->made_parent);
-    strl__free(scratch->made_parent);
-    strl__free(scratch->lock_path);
-    strl__free(scratch->path);
-    strl__free(scratch);
+    release(scratch);
 }

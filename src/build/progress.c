@@ -1,0 +1,101 @@
+/* See progress.h. */
+#include "build/progress.h"
+
+#include <math.h>
+#include <stddef.h>
+#include <string.h>
+
+/* Isosurfaces, scans and terrain on two cores. */
+#define TRIANGLES_PER_CORE_SECOND 2e5
+
+#define MEMORY_OF_WORK 0.1 /* share of the build after which what was counts 1/e */
+#define WORK_OF_GUESS 0.03 /* a guess counts as much as this share measured */
+
+typedef struct stage_share {
+    const char *name;
+    uint32_t index;
+    double share;
+} stage_share;
+
+/* Measured on isosurfaces, in order, shuffled and as STL. They sum to 1. */
+static const stage_share stages[] = {{"survey", 1, 0.015},
+                                     {"read", 2, 0.05},
+                                     {"sort", 3, 0.06},
+                                     {"connect", 4, 0.08},
+                                     {"partition", 5, 0.005},
+                                     {"level 0", 6, 0.41},
+                                     {"level 1", 6, 0.175},
+                                     {"level 2", 6, 0.11},
+                                     {"level 3", 6, 0.045},
+                                     {"level 4", 6, 0.02},
+                                     {"level 5", 6, 0.01},
+                                     {"level 6", 6, 0.005},
+                                     {"level 7", 6, 0.003},
+                                     {"level 8", 6, 0.002},
+                                     {"level 9", 6, 0.002},
+                                     {"higher levels", 6, 0.003},
+                                     {"write", STRL_STAGE_COUNT, 0.005}};
+
+double strl__estimate_seconds(uint64_t triangles, unsigned workers)
+{
+    return (double)triangles / (TRIANGLES_PER_CORE_SECOND * (workers ? workers : 1));
+}
+
+void strl__estimate_start(strl_estimate *estimate, uint64_t now_ns)
+{
+    *estimate = (strl_estimate){.started_ns = now_ns, .updated_ns = now_ns};
+}
+
+static void set_seconds_left(strl_estimate *estimate)
+{
+    estimate->seconds_left = estimate->work > 0 ? (1 - estimate->share) * estimate->seconds / estimate->work : 0;
+}
+
+void strl__estimate_guess(strl_estimate *estimate, double seconds)
+{
+    if (estimate->share - estimate->first_share > WORK_OF_GUESS)
+        return;
+    estimate->seconds = seconds * WORK_OF_GUESS;
+    estimate->work = WORK_OF_GUESS;
+    set_seconds_left(estimate);
+}
+
+void strl__estimate_stage(strl_estimate *estimate, const char *stage)
+{
+    double before = 0;
+    for (size_t i = 0; i < sizeof stages / sizeof stages[0]; before += stages[i++].share) {
+        if (strcmp(stages[i].name, stage) != 0)
+            continue;
+        if (estimate->stage_index == 0)
+            estimate->share = estimate->first_share = before;
+        estimate->stage_index = stages[i].index;
+        estimate->stage_first = before;
+        estimate->stage_share = stages[i].share;
+        return;
+    }
+    estimate->stage_first = estimate->share;
+    estimate->stage_share = 0;
+}
+
+void strl__estimate_update(strl_estimate *estimate, uint64_t done, uint64_t total, uint64_t now_ns)
+{
+    double part = total ? (done < total ? (double)done / (double)total : 1) : 0;
+    double reached = fmin(estimate->stage_first + part * estimate->stage_share, 1);
+    double grown = reached - estimate->share;
+    /* Without progress time only adds up, so that a stage that stands still is seen in the end. */
+    if (grown > 0) {
+        double kept = exp(-grown / MEMORY_OF_WORK);
+        estimate->seconds *= kept;
+        estimate->work = estimate->work * kept + grown;
+        estimate->share = reached;
+    }
+    estimate->seconds += (double)(now_ns - estimate->updated_ns) * 1e-9;
+    estimate->updated_ns = now_ns;
+    set_seconds_left(estimate);
+}
+
+double strl__estimate_rate(const strl_estimate *estimate, uint64_t triangles)
+{
+    double seconds = (double)(estimate->updated_ns - estimate->started_ns) * 1e-9;
+    return seconds > 0 ? (double)triangles * (estimate->share - estimate->first_share) / seconds : 0;
+}

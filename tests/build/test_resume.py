@@ -1,0 +1,198 @@
+#!/usr/bin/env python3
+"""A build that was killed, interrupted or met a full disk is resumed, and its bytes are those of one that was not."""
+import json
+import os
+import signal
+import subprocess
+from random import Random
+
+from building import assert_refused, must, run, run_tests, sanitizers
+from resuming import Build, Scene, read
+
+# Under a sanitizer, where a build takes ten times as long, fewer kills of a smaller model.
+KILLS, KILLED = (2, "72K") if sanitizers() else (8, "300K")
+SMALL = "72K"  # little more than what checkpoints are made of
+
+
+def killed_at_random_moments_it_resumes(folder):
+    """Each build several times, until it comes to its end; each time after a random share of the time that a whole one took."""
+    scene, random = Scene(folder, KILLED), Random(3)
+    kills = builds = resumed = 0
+    for attempt in range(20 * KILLS):
+        build = Build(*scene.words("--resume", "--json", "--jobs", str(random.randint(1, 3))))
+        if kills < KILLS:
+            build.wait(random.random() * 0.6 * scene.reference.seconds)
+            if build.stop(signal.SIGKILL) is not None:
+                assert not os.path.exists(scene.out)
+                kills += 1
+                continue
+        else:
+            build.output, error = build.child.communicate()
+            assert build.child.returncode == 0, error
+        resumed += json.loads(build.output)["resumed"]
+        builds += 1
+        scene.check(build.output)
+        if kills == KILLS:
+            break
+    assert kills == KILLS and resumed > 0, (kills, builds, resumed)
+
+
+def interrupted_it_keeps_what_is_finished(folder):
+    scene = Scene(folder, SMALL)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        said = scene.stopped(number)
+        assert said.count("\n") == 1 and "interrupted" in said and "--resume" in said, said
+        assert sorted(os.listdir(folder)) == ["in.ply", "out.stroll.tmp"]
+        scene.resume()
+
+
+def with_nothing_to_resume_it_begins(folder):
+    scene = Scene(folder, SMALL)
+    for quiet in ((), ("--quiet",)):
+        done = must("build", *scene.words("--resume", "--json", *quiet))
+        assert not json.loads(done.output)["resumed"]
+        scene.check(done.output)
+        assert done.error == "" if quiet else done.error.count("\n") == 1 and "from the beginning" in done.error, done
+
+
+def of_a_small_model_nothing_is_kept(folder):
+    source, out = os.path.join(folder, "in.ply"), os.path.join(folder, "out.stroll")
+    must("scene", "isosurface", "--triangles", "60K", "-o", source, "--quiet")
+    build = Build(source, "-o", out)
+    build.wait_for(os.path.join(out + ".tmp", "payload-01.spill"))
+    left = [] if build.stop(signal.SIGTERM) is not None else ["out.stroll"]
+    assert sorted(os.listdir(folder)) == ["in.ply", *left]
+
+
+def without_resume_it_begins_anew(folder):
+    scene = Scene(folder, SMALL)
+    scene.stopped()
+    older = os.path.join(scene.out + ".tmp", "older.spill")
+    open(older, "wb").close()
+    done = must("build", *scene.words("--json"))
+    assert not json.loads(done.output)["resumed"]
+    scene.check(done.output)
+
+
+def what_was_not_saved_is_cut_off_or_removed(folder):
+    scene = Scene(folder, SMALL)
+    scene.stopped()
+    scratch = scene.out + ".tmp"
+    with open(os.path.join(scratch, "payload-00.spill"), "ab") as file:
+        file.write(b"after the checkpoint" * 5000)
+    for name in ("pairs-000.spill", "out.stroll.abcd.part"):
+        with open(os.path.join(scratch, name), "wb") as file:
+            file.write(b"left over")
+    scene.resume()
+
+
+def assert_begins_anew(done, *parts):
+    """What cannot be used is not said to be kept."""
+    assert_refused(done, *parts, "leave --resume out to begin anew")
+    assert "goes on" not in done.error, done
+
+
+def damage_is_found(folder):
+    scene = Scene(folder, SMALL)
+    scene.stopped()
+    scratch = scene.out + ".tmp"
+    for name, offset in (("checkpoint", 300), ("checkpoint", 2), ("checkpoint", 9), ("ingest.spill", 100),
+                         ("partition.spill", 5), ("payload-00.spill", 20), ("nodes-00.spill", 60)):
+        path = os.path.join(scratch, name)
+        whole = bytearray(read(path))
+        for damaged in (whole[:offset] + bytes([whole[offset] ^ 1]) + whole[offset + 1:], whole[:offset]):
+            with open(path, "wb") as file:
+                file.write(damaged)
+            before = sorted(os.listdir(scratch))
+            assert_begins_anew(run("build", *scene.words("--resume")), scratch)
+            assert sorted(os.listdir(scratch)) == before and not os.path.exists(scene.out)
+        with open(path, "wb") as file:
+            file.write(whole)
+    os.rename(os.path.join(scratch, "partition.spill"), os.path.join(folder, "away"))
+    assert_begins_anew(run("build", *scene.words("--resume")), "partition.spill")
+    os.rename(os.path.join(folder, "away"), os.path.join(scratch, "partition.spill"))
+    scene.resume()
+
+
+def another_request_is_refused(folder):
+    scene = Scene(folder, SMALL)
+    scene.stopped()
+    other = os.path.join(folder, "other.ply")
+    os.link(scene.source, other)
+    for words, holds in ((scene.words("--grid", "0.5"), "--grid"), (scene.words("--up", "x"), "--up"),
+                         (scene.words("--unit", "mm"), "--unit is mm"),
+                         (scene.words("--no-dependencies"), "--no-dependencies"),
+                         (scene.words("--memory", "512M"), "--memory"),
+                         ((scene.source, *scene.words()), "the inputs are 2"),
+                         ((other, *scene.words()[1:]), "other.ply")):
+        assert_begins_anew(run("build", *words, "--resume"), holds)
+    facts = os.stat(scene.source)
+    os.utime(scene.source, ns=(facts.st_atime_ns, facts.st_mtime_ns + 10**9))
+    assert_begins_anew(run("build", *scene.words("--resume")), "in.ply was changed")
+    with open(scene.source, "ab") as file:
+        file.write(b"\n")
+    assert_begins_anew(run("build", *scene.words("--resume")), "in.ply has")
+    os.truncate(scene.source, facts.st_size)
+    os.utime(scene.source, ns=(facts.st_atime_ns, facts.st_mtime_ns))
+    os.remove(other)
+    scene.resume("--memory", "2G")
+
+
+def scratch_elsewhere_is_found_again_and_removed(folder):
+    scene = Scene(folder, SMALL)
+    elsewhere = os.path.join(folder, "elsewhere")
+    scene.stopped(folder=elsewhere, more=("--scratch", elsewhere))
+    assert os.listdir(elsewhere) == ["out.stroll.tmp"]
+    scene.resume("--scratch", elsewhere)
+
+
+def on_a_full_disk_it_waits_for_room(folder):
+    disk = os.path.join(folder, "disk")
+    os.mkdir(disk)
+    mounted = os.geteuid() == 0 and subprocess.run(["mount", "-t", "tmpfs", "-o", "size=24m", "tmpfs", disk],
+                                                   stderr=subprocess.DEVNULL).returncode == 0
+    if not mounted:
+        print("mount is not allowed: no small disk to fill")
+        return
+    try:
+        scene, filler = Scene(disk, SMALL), os.path.join(disk, "filler")
+        stops = 0
+        for attempt in range(40):
+            build = Build(*scene.words())
+            build.wait_for(os.path.join(scene.out + ".tmp", "nodes-00.spill" if attempt % 2 else "nodes-01.spill"))
+            fill(filler)
+            _, error = build.child.communicate()
+            os.remove(filler)
+            if build.child.returncode == 0:  # it was done before the disk was full
+                os.remove(scene.out)
+                continue
+            assert build.child.returncode == 1 and error.count("\n") == 1, error
+            assert "No space" in error and "make room" in error and "--resume" in error, error
+            assert sorted(os.listdir(disk)) == ["in.ply", "out.stroll.tmp"], os.listdir(disk)
+            scene.resume()
+            stops += 1
+            if stops == 2:
+                return
+        raise AssertionError("the disk was never full in time")
+    finally:
+        subprocess.run(["umount", disk], check=True)
+
+
+def fill(path):
+    with open(path, "wb", buffering=0) as file:
+        try:
+            while True:
+                file.write(bytes(1 << 20))
+        except OSError:
+            pass
+        try:
+            while True:
+                file.write(bytes(512))
+        except OSError:
+            pass
+
+
+run_tests(killed_at_random_moments_it_resumes, interrupted_it_keeps_what_is_finished, with_nothing_to_resume_it_begins,
+          of_a_small_model_nothing_is_kept, without_resume_it_begins_anew,
+          what_was_not_saved_is_cut_off_or_removed, damage_is_found, another_request_is_refused,
+          scratch_elsewhere_is_found_again_and_removed, on_a_full_disk_it_waits_for_room)
