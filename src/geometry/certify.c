@@ -18,6 +18,11 @@
 /* Of the largest coordinate: what doubles cannot tell apart in the points of fragments and their distances. */
 #define ROUNDING 0x1p-34
 
+/* A triangle is near enough where it is not much farther than a piece has been found to be: claims are the larger of both. */
+#define SLACK 1.1
+/* Of the bound that is good enough: a piece within so much of a likely triangle is measured against that alone. */
+#define LIKELY_SHARE 0.5
+
 /* That a piece was measured against a triangle. */
 typedef struct link {
     uint32_t piece, next;
@@ -39,7 +44,7 @@ typedef struct tracker {
     size_t link_count, link_capacity;
     uint32_t free_link;
     uint32_t *stamp, *piece_stamp, tick; /* per triangle, per piece */
-    double most_up, most_down;
+    double most_up, most_down, granted;
     uint32_t near[STRL_COVER_MAX];
     uint32_t *found;          /* [own_count] gathered pieces */
     uint32_t found_count;
@@ -230,16 +235,15 @@ static double measure_near(tracker *t, const strl_facet *facet, double enough, u
     return fmin(bound, most);
 }
 
-/* A triangle against the pieces gathered, and against others where these leave something open. */
-static void measure_up(tracker *t, uint32_t triangle)
+/* A triangle against the pieces gathered, and against others where these leave something open. claim: by its drift. */
+static void measure_up(tracker *t, uint32_t triangle, double claim)
 {
-    double enough = fmax(t->most_up, t->most_down);
-    double bound = INFINITY;
-    if (t->found_count <= FEW_PIECES)
-        bound = measure_facet(t, &t->facet[triangle], t->found, t->found_count, enough);
+    double enough = fmax(t->most_up, fmax(t->granted, SLACK * t->most_down)), bound = claim;
+    if (claim > enough && t->found_count <= FEW_PIECES)
+        bound = fmin(bound, measure_facet(t, &t->facet[triangle], t->found, t->found_count, enough));
     if (bound > enough)
         bound = fmin(bound, measure_near(t, &t->facet[triangle], enough, QUARTERINGS));
-    t->up[triangle] = (float)bound;
+    t->up[triangle] = (float)(bound * STRL_ROUND_UP);
     t->most_up = fmax(t->most_up, bound);
 }
 
@@ -305,14 +309,39 @@ static void middle_of(const strl_facet *facet, double middle[3])
         middle[k] = (facet->corner[0][k] + facet->corner[1][k] + facet->corner[2][k]) / 3;
 }
 
+/* Pieces come in the order of the triangles that they are or were: the next piece belongs to the next triangle, or to the same. */
+static bool is_near_likely(tracker *t, const strl_facet *piece, double *bound)
+{
+    double reach = LIKELY_SHARE * (fmax(t->most_down, t->granted) - piece->claim);
+    uint32_t last = t->around[0];
+    for (uint32_t i = 2; i-- > 0;) {
+        uint32_t triangle = last + i;
+        double most = 0;
+        if (triangle == t->mesh->triangle_count)
+            continue;
+        for (unsigned c = 0; c < 3 && most <= reach * reach; c++)
+            most = fmax(most, strl_facet_distance2(&t->facet[triangle], piece->corner[c]));
+        if (reach < 0 || most > reach * reach)
+            continue;
+        t->around[0] = triangle;
+        t->around_count = 1;
+        t->used[0] = true;
+        *bound = sqrt(most);
+        return true;
+    }
+    return false;
+}
+
 /* A piece against the triangles near it, before the first collapse. */
 static bool measure_first(tracker *t, uint32_t id)
 {
     const strl_facet *piece = &t->piece[id];
-    double middle[3], distance, along[3];
+    double middle[3], distance, along[3], bound = INFINITY;
+    if (is_near_likely(t, piece, &bound))
+        return keep_measure(t, id, bound + piece->claim);
     middle_of(piece, middle);
     t->around[0] = strl_near_find(&t->tree, middle, t->around[0], &distance);
-    double enough = fmax(t->most_down - piece->claim, FIRST_REACH * distance), bound = INFINITY;
+    double enough = fmax(fmax(t->most_down, t->granted) - piece->claim, FIRST_REACH * distance);
     strl_facet_normal(&t->facet[t->around[0]], along);
     for (uint32_t most = 0; most < WIDER_MAX && bound > enough; most += WIDER_MAX - 1) {
         t->around_count = 1 + strl_near_list(&t->tree, piece, FIRST_REACH * distance, t->around + 1, most);
@@ -325,11 +354,15 @@ static bool measure_first(tracker *t, uint32_t id)
 static bool measure_start(tracker *t)
 {
     bool good = true;
-    t->around[0] = t->found_count = 0;
+    t->around[0] = 0;
     for (uint32_t i = 0; good && i < t->own_count; i++)
         good = measure_first(t, i);
-    for (uint32_t i = 0; good && i < t->mesh->triangle_count; i++)
-        measure_up(t, i);
+    for (uint32_t i = 0; good && i < t->mesh->triangle_count; i++) {
+        t->tick++;
+        t->found_count = 0;
+        gather_pieces(t, i);
+        measure_up(t, i, strl_mesh_error(t->mesh, strl_drift_length(&t->mesh->drift[i])));
+    }
     return good;
 }
 
@@ -379,7 +412,8 @@ static double measure_wider(tracker *t, const strl_facet *piece, double enough)
     return bound;
 }
 
-static bool measure_again(tracker *t, uint32_t v)
+/* claim: of the triangles that the collapse changed, by their drifts. */
+static bool measure_again(tracker *t, uint32_t v, double claim)
 {
     bool good = true;
     double along[3];
@@ -388,7 +422,7 @@ static bool measure_again(tracker *t, uint32_t v)
     for (uint32_t i = 0; i < t->found_count && good; i++) {
         uint32_t id = t->found[i];
         const strl_facet *piece = &t->piece[id];
-        double enough = t->most_down - piece->claim, bound = measure_piece(t, piece, enough);
+        double enough = fmax(t->most_down, t->granted) - piece->claim, bound = measure_piece(t, piece, enough);
         if (bound <= enough) {
             good = keep_measure(t, id, bound + piece->claim);
             continue;
@@ -404,7 +438,7 @@ static bool measure_again(tracker *t, uint32_t v)
         }
     }
     for (uint32_t i = 0; i < t->star_count && good; i++)
-        measure_up(t, t->star[i]);
+        measure_up(t, t->star[i], claim);
     return good;
 }
 
@@ -449,7 +483,7 @@ static bool track(tracker *t, const strl_simplified *simplified, double rounding
         if (i == simplified->collapse_count)
             break;
         carry_out(t, simplified->collapses[i].from, simplified->collapses[i].to);
-        if (!measure_again(t, simplified->collapses[i].to))
+        if (!measure_again(t, simplified->collapses[i].to, simplified->collapses[i].own))
             return false;
     }
     conclude(t, rounding, certificate);
@@ -468,7 +502,7 @@ strl_status strl_certify(const strl_mesh *mesh, const strl_simplified *simplifie
     tracker *t = strl_arena_alloc(arena, 1, sizeof *t);
     bool good = certificate->down && certificate->up && certificate->triangle_down && certificate->triangle_up && t;
     if (good) {
-        *t = (tracker){.mesh = mesh, .own_count = older->own, .piece_count = older->count};
+        *t = (tracker){.mesh = mesh, .own_count = older->own, .piece_count = older->count, .granted = older->granted};
         good = prepare(t, mesh, arena) && prepare_pieces(t, older->piece, arena) &&
                track(t, simplified, rounding_of(mesh, older->piece, older->count), certificate);
         strl__free(t->links);

@@ -4,7 +4,8 @@
  * The older surface comes as pieces, each with a bound of its own distance from the input. Collapses are carried out once more, in their
  * order. What a collapse changes is measured at once: every piece that lay over a triangle of the star against the triangles that are there
  * now (`down`), every new triangle against the pieces over it (`up`), both by geometry/cover.h. So each state is bounded, not only
- * some stops, and a bound does not add up over collapses, because it is measured against the same pieces every time. */
+ * some stops, and a bound does not add up over collapses, because it is measured against the same pieces every time. What chained bounds
+ * (geometry/simplify.h) say is near enough is not measured. */
 #ifndef STRL_GEOMETRY_CERTIFY_H
 #define STRL_GEOMETRY_CERTIFY_H
 
@@ -28,6 +29,7 @@ typedef struct strl_certificate {
 typedef struct strl_older {
     const strl_piece *piece; /* [count] those before `own` are what the mesh stands for; the others only show how far it is from them */
     uint32_t own, count;
+    float granted; /* claimed whatever is measured: bounds up to that need not be tight */
 } strl_older;
 
 void strl_piece_facet(const strl_piece *piece, strl_facet *facet);

@@ -146,7 +146,7 @@ static strl_certificate certify(run *r, const strl_piece *piece, uint32_t count)
 {
     strl_certificate certificate;
     strl_error err = {0};
-    if (strl_certify(&r->mesh, &r->result, &(strl_older){piece, count, count}, &r->arena, &certificate, &err) != STRL_OK)
+    if (strl_certify(&r->mesh, &r->result, &(strl_older){.piece = piece, .own = count, .count = count}, &r->arena, &certificate, &err) != STRL_OK)
         fail_msg("%s", err.message);
     for (uint32_t i = 1; i <= r->result.collapse_count; i++)
         assert_true(certificate.down[i] >= certificate.down[i - 1] && certificate.up[i] >= certificate.up[i - 1]);

@@ -6,9 +6,10 @@
 #include "base/fail.h"
 #include "geometry/near.h"
 
-#define FEW_NODES 8u      /* levels of so few keep their anchors: they cost nothing there, and the older the tighter */
-#define LATEST_FIRST 3u   /* below, what is claimed without certificates is tight, and most of the triangles are there */
-#define FEW_LEVELS 4u     /* so far from the root certificates begin without --certify: the few levels where claims by drifts are loose */
+#define EARLY_FIRST 3u  /* below, what is claimed without certificates is tight, and most of the triangles are there */
+#define FEW_LEVELS 4u   /* so far from the root certificates begin without --certify: the few levels where claims by drifts are loose */
+#define PERIOD 2u       /* levels from anchors to anchors: the longer, the tighter and the dearer */
+#define FEW_NODES 8u    /* levels of so few keep the anchors they have: they cost little there, and errors grow slowly */
 #define CANDIDATES 256u
 #define PARTS_MAX 64u
 /* Of the distance of a piece's middle: what lies so near is looked at. */
@@ -18,43 +19,28 @@
 
 /* ---- plan ---- */
 
-static strl_anchor_plan begin_plan(uint32_t depth, bool certify)
-{
-    uint32_t early = depth / 4 < LATEST_FIRST ? depth / 4 : LATEST_FIRST;
-    uint32_t late = depth > FEW_LEVELS ? depth - FEW_LEVELS : depth / 2;
-    return (strl_anchor_plan){.first = certify && early < late ? early : late};
-}
-
-static void plan_level(strl_anchor_plan *plan, uint32_t level, uint32_t depth)
-{
-    plan->has_young = plan->has_young || plan->bears; /* of the level before */
-    plan->promotes = plan->has_young && plan->born + 2 <= level;
-    plan->has_used = plan->has_used || plan->promotes;
-    plan->has_young = plan->has_young && !plan->promotes;
-    bool is_turn = level >= plan->first && (level - plan->first) % 2 == 0, are_many = 1u << (depth - level) > FEW_NODES;
-    plan->bears = is_turn && !plan->has_young && level < depth && (level == plan->first || are_many);
-    if (plan->bears)
-        plan->born = level;
-    plan->is_on = plan->has_used || plan->has_young || plan->bears;
-}
-
-/* A level's plan follows from those below. */
 strl_anchor_plan strl_anchor_plan_of(uint32_t level, uint32_t depth, bool certify)
 {
-    strl_anchor_plan plan = begin_plan(depth, certify);
-    for (uint32_t i = 0; i <= level; i++)
-        plan_level(&plan, i, depth);
-    return plan;
+    uint32_t late = depth > FEW_LEVELS ? depth - FEW_LEVELS : depth / 2;
+    uint32_t first = certify && EARLY_FIRST < late ? EARLY_FIRST : late;
+    bool is_turn = level >= first && level < depth && (level - first) % PERIOD == 0;
+    return (strl_anchor_plan){.measures = level > first,
+                              .bears = is_turn && (level == first || 1u << (depth - level) > FEW_NODES)};
 }
 
 /* ---- pieces ---- */
 
+void strl_pieces_deinit(strl_pieces *pieces)
+{
+    strl__free(pieces->item);
+    *pieces = (strl_pieces){0};
+}
+
 void strl_anchors_deinit(strl_anchors *anchors)
 {
-    strl__free(anchors->used.item);
-    strl__free(anchors->young.item);
-    strl__free(anchors->beside.item);
-    *anchors = (strl_anchors){0};
+    strl_pieces_deinit(&anchors->own);
+    strl_pieces_deinit(&anchors->beside);
+    anchors->granted = 0;
 }
 
 static bool add_piece(strl_pieces *pieces, const strl_piece *piece)
@@ -65,45 +51,31 @@ static bool add_piece(strl_pieces *pieces, const strl_piece *piece)
     return true;
 }
 
-static void write_pieces(const strl_pieces *pieces, strl_writer *writer)
+void strl_pieces_write(const strl_pieces *pieces, strl_writer *writer)
 {
     strl_writer_u32(writer, pieces->count);
     strl_writer_bytes(writer, pieces->item, pieces->count * sizeof *pieces->item);
 }
 
-void strl_anchors_write(const strl_anchors *anchors, strl_writer *writer)
+strl_status strl_pieces_read(const void *data, size_t size, const int64_t moved[3], strl_pieces *pieces, strl_error *err)
 {
-    write_pieces(&anchors->used, writer);
-    write_pieces(&anchors->young, writer);
-}
-
-static bool read_pieces(strl_cursor *cursor, const int64_t moved[3], strl_pieces *pieces)
-{
-    uint32_t count = strl_cursor_u32(cursor);
-    const uint8_t *data = strl_cursor_take(cursor, (size_t)count * sizeof(strl_piece));
-    if (!data || !pieces)
-        return data != NULL;
+    strl_cursor cursor = strl_cursor_make(data, size);
+    uint32_t count = strl_cursor_u32(&cursor);
+    const uint8_t *bytes = strl_cursor_take(&cursor, (size_t)count * sizeof(strl_piece));
+    if (!bytes || strl_cursor_left(&cursor) || count > UINT32_MAX - pieces->count)
+        return strl__fail(err, STRL_ERR_INTERNAL, "a node's anchors are %zu bytes, not what %u pieces are", size, count);
     if (!strl__grow(&pieces->item, &pieces->capacity, (size_t)pieces->count + count, sizeof *pieces->item))
-        return false;
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %u pieces", count);
     strl_piece *to = pieces->item + pieces->count;
-    memcpy(to, data, (size_t)count * sizeof *to);
+    memcpy(to, bytes, (size_t)count * sizeof *to);
     for (uint32_t i = 0; i < count; i++)
         for (unsigned k = 0; k < 9; k++)
             to[i].corner[k / 3][k % 3] += (int32_t)moved[k % 3];
     pieces->count += count;
-    return true;
+    return STRL_OK;
 }
 
-strl_status strl_anchors_read(const void *data, size_t size, const int64_t moved[3], bool promotes, strl_anchors *anchors,
-                              strl_error *err)
-{
-    strl_cursor cursor = strl_cursor_make(data, size);
-    bool good = read_pieces(&cursor, moved, promotes ? NULL : &anchors->used) &&
-                read_pieces(&cursor, moved, promotes ? &anchors->used : &anchors->young);
-    return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu bytes of anchors", size);
-}
-
-bool strl_anchors_bear(const strl_mesh *base, const strl_certificate *certificate, strl_pieces *young)
+bool strl_anchors_bear(const strl_mesh *base, const strl_certificate *certificate, strl_pieces *born)
 {
     for (uint32_t t = 0; t < base->triangle_count; t++) {
         strl_piece piece = {.claim = strl_mesh_error(base, strl_drift_length(&base->drift[t]))};
@@ -111,7 +83,7 @@ bool strl_anchors_bear(const strl_mesh *base, const strl_certificate *certificat
             piece.claim = fmaxf(certificate->triangle_down[t], fminf(certificate->triangle_up[t], piece.claim));
         for (unsigned c = 0; c < 3; c++)
             memcpy(piece.corner[c], base->position[base->wedge[base->triangle[t][c]].point], sizeof piece.corner[c]);
-        if (!add_piece(young, &piece))
+        if (!add_piece(born, &piece))
             return false;
     }
     return true;
@@ -149,12 +121,12 @@ bool strl_anchors_find_beside(strl_anchors *shares, uint32_t members, double rea
     bool good = true;
     for (uint32_t m = 0; m < members; m++) {
         extent e = nothing;
-        for (uint32_t i = 0; i < shares[m].used.count; i++)
-            include_piece(&e, &shares[m].used.item[i]);
+        for (uint32_t i = 0; i < shares[m].own.count; i++)
+            include_piece(&e, &shares[m].own.item[i]);
         for (uint32_t other = 0; other < members; other++)
-            for (uint32_t i = 0; other != m && i < shares[other].used.count && good; i++)
-                if (lies_near(&e, &shares[other].used.item[i], reach))
-                    good = add_piece(&shares[m].beside, &shares[other].used.item[i]);
+            for (uint32_t i = 0; other != m && i < shares[other].own.count && good; i++)
+                if (lies_near(&e, &shares[other].own.item[i], reach))
+                    good = add_piece(&shares[m].beside, &shares[other].own.item[i]);
     }
     return good;
 }
@@ -169,6 +141,7 @@ typedef struct part {
 typedef struct divider {
     const uint32_t *owner;
     strl_near tree;
+    uint32_t triangles;
     strl_facet *facet; /* [triangles] */
     uint32_t candidate[CANDIDATES], candidate_count;
     double tolerance, enough; /* distances within which a member's triangles are near enough: always, and to the piece at hand */
@@ -229,6 +202,19 @@ static bool is_near_first(const divider *d, const strl_facet *piece, uint32_t me
     return near;
 }
 
+/* Pieces come in the order of the triangles that they are or were: the next piece belongs to the next triangle, or to the same. */
+static bool is_near_likely(divider *d, const strl_facet *piece, uint32_t member)
+{
+    uint32_t last = d->candidate[0];
+    d->enough = d->tolerance;
+    for (uint32_t i = 2; i-- > 0;) {
+        d->candidate[0] = last + i < d->triangles ? last + i : last;
+        if (is_near_first(d, piece, member))
+            return true;
+    }
+    return false;
+}
+
 static bool is_near_all(const divider *d, uint32_t member)
 {
     for (uint32_t i = 0; i < d->candidate_count; i++)
@@ -257,31 +243,33 @@ static bool is_near_to(divider *d, const strl_facet *piece, const double along[3
 }
 
 /* What was a member's stays with it where it can: where sheets overlap, the nearest may well be another's. */
-static bool divide_piece(divider *d, const strl_piece *piece, uint32_t own, strl_pieces *const *shares)
+static bool divide_piece(divider *d, const strl_piece *piece, uint32_t own, strl_anchors *shares)
 {
     strl_facet facet;
     double along[3];
     strl_piece_facet(piece, &facet);
     facet.claim = 0;
+    if (is_near_likely(d, &facet, own))
+        return add_piece(&shares[own].own, piece);
     find_nearest(d, &facet);
     if (is_near_first(d, &facet, own))
-        return add_piece(shares[own], piece);
+        return add_piece(&shares[own].own, piece);
     list_candidates(d, &facet, NEAR_ENOUGH * d->distance);
     if (is_near_all(d, own))
-        return add_piece(shares[own], piece);
+        return add_piece(&shares[own].own, piece);
     list_candidates(d, &facet, d->enough);
     strl_facet_normal(&d->facet[d->candidate[0]], along);
     if (is_near_to(d, &facet, along, own))
-        return add_piece(shares[own], piece);
+        return add_piece(&shares[own].own, piece);
     d->part_count = 0;
     d->is_full = false;
     strl_cover_bound(&facet, &(strl_cover){.by = d->facet, .pick = d->candidate, .count = d->candidate_count, .along = along,
                                            .enough = d->enough, .take = take_part, .context = d});
     if (d->is_full || parts_are_of_one(d))
-        return add_piece(shares[d->is_full ? d->owner[d->candidate[0]] : d->parts[0].member], piece);
+        return add_piece(&shares[d->is_full ? d->owner[d->candidate[0]] : d->parts[0].member].own, piece);
     bool good = true;
     for (uint32_t i = 0; i < d->part_count && good; i++)
-        good = add_part(&d->parts[i], piece->claim, shares[d->parts[i].member]);
+        good = add_part(&d->parts[i], piece->claim, &shares[d->parts[i].member].own);
     return good;
 }
 
@@ -305,7 +293,7 @@ static bool prepare_divider(divider *d, const strl_mesh *mesh, strl_arena *arena
     return true;
 }
 
-static bool divide_pieces(divider *d, const strl_pieces *pieces, uint32_t own, strl_pieces *const *shares)
+static bool divide_pieces(divider *d, const strl_pieces *pieces, uint32_t own, strl_anchors *shares)
 {
     bool good = true;
     for (uint32_t i = 0; i < pieces->count && good; i++)
@@ -313,28 +301,17 @@ static bool divide_pieces(divider *d, const strl_pieces *pieces, uint32_t own, s
     return good;
 }
 
-static bool divide_all(divider *d, uint32_t members, const strl_anchors *own, strl_anchors *shares)
-{
-    strl_pieces *used[8], *young[8];
-    bool good = true;
-    for (uint32_t m = 0; m < members; m++) {
-        used[m] = &shares[m].used;
-        young[m] = &shares[m].young;
-    }
-    for (uint32_t m = 0; m < members && good; m++)
-        good = divide_pieces(d, &own[m].used, m, used) && divide_pieces(d, &own[m].young, m, young);
-    return good;
-}
-
-strl_status strl_anchors_divide(const strl_mesh *mesh, const uint32_t *owner, uint32_t members, double tolerance, const strl_anchors *own,
+strl_status strl_anchors_divide(const strl_mesh *mesh, const uint32_t *owner, uint32_t members, double tolerance, const strl_pieces *own,
                                 strl_arena *arena, strl_anchors *shares, strl_error *err)
 {
     strl_arena_mark mark = strl_arena_get_mark(arena);
     divider *d = strl_arena_alloc(arena, 1, sizeof *d);
     bool good = d != NULL;
     if (good)
-        d->owner = owner, d->tolerance = tolerance, d->candidate[0] = 0;
-    good = good && prepare_divider(d, mesh, arena) && divide_all(d, members, own, shares);
+        d->owner = owner, d->triangles = mesh->triangle_count, d->tolerance = tolerance, d->candidate[0] = 0;
+    good = good && prepare_divider(d, mesh, arena);
+    for (uint32_t m = 0; m < members && good; m++)
+        good = divide_pieces(d, &own[m], m, shares);
     strl_arena_rewind(arena, mark);
     return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for the anchors of a group");
 }

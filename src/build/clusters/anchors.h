@@ -1,11 +1,13 @@
 /* The older surfaces that nodes are measured against (geometry/certify.h).
  *
  * Base meshes of every second level become *anchors*: their triangles, each with a bound of its own distance from the input, go up the
- * hierarchy with the nodes that stand for them. From two levels above on, nodes are measured against them; when the next anchors are old
- * enough these take over, so that bounds do not add up from level to level. Levels of few nodes keep what they have to the top.
+ * hierarchy with the nodes that stand for them, in place of those before. The two levels above are measured against them, so that bounds
+ * do not add up from level to level.
  *
  * Which node stands for which piece decides who answers for it in a cut, whatever states the nodes take. Where a group has moved the
- * boundaries of its members, each piece goes to the member over which it lies now; one that lies over several is cut. */
+ * boundaries of its members, each piece goes to the member over which it lies now; one that lies over several is cut. Members split
+ * together, so in any cut each piece, or what it was made from, has a node that is drawn: no node stands for two generations, and new
+ * anchors take over at the very level above their birth. */
 #ifndef STRL_BUILD_CLUSTERS_ANCHORS_H
 #define STRL_BUILD_CLUSTERS_ANCHORS_H
 
@@ -19,38 +21,35 @@ typedef struct strl_pieces {
     size_t capacity;
 } strl_pieces;
 
-/* Two generations: what nodes are measured against, and what will be. */
+/* Of a node. */
 typedef struct strl_anchors {
-    strl_pieces used, young;
-    strl_pieces beside; /* used ones of other members of the group, near this one: not written */
+    strl_pieces own;
+    strl_pieces beside; /* of other members of the group, near this one: not written */
+    float granted;      /* what the node will claim for its children's sake, whatever is measured */
 } strl_anchors;
 
-/* What happens at the level being made. */
+/* What happens at a level. */
 typedef struct strl_anchor_plan {
-    uint32_t first;     /* the first level whose base meshes become anchors */
-    uint32_t born;      /* the level of the young ones */
-    bool promotes;      /* the children's young ones are used from here on */
-    bool has_used, has_young;
-    bool is_on;         /* any of it */
-    bool bears;         /* the base meshes of this level become young anchors */
+    bool measures; /* nodes are measured against the anchors that their children pass on */
+    bool bears;    /* base meshes become anchors */
 } strl_anchor_plan;
 
-/* Of a level. certify: from as low a level as pays; else near the root only. */
+/* certify: from as low a level as pays; else near the root only. */
 strl_anchor_plan strl_anchor_plan_of(uint32_t level, uint32_t depth, bool certify);
 
 void strl_anchors_deinit(strl_anchors *anchors);
 /* Scratch format. Pieces are relative to their node's anchor. */
-void strl_anchors_write(const strl_anchors *anchors, strl_writer *writer);
+void strl_pieces_write(const strl_pieces *pieces, strl_writer *writer);
 /* Appends the pieces of a node; moved: what is to be added to their positions. */
-strl_status strl_anchors_read(const void *data, size_t size, const int64_t moved[3], bool promotes, strl_anchors *anchors,
-                              strl_error *err);
-/* The triangles of a base mesh as young anchors. certificate: NULL = by their drifts. */
-bool strl_anchors_bear(const strl_mesh *base, const strl_certificate *certificate, strl_pieces *young);
+strl_status strl_pieces_read(const void *data, size_t size, const int64_t moved[3], strl_pieces *pieces, strl_error *err);
+void strl_pieces_deinit(strl_pieces *pieces);
+/* The triangles of a base mesh as anchors. certificate: NULL = by their drifts. */
+bool strl_anchors_bear(const strl_mesh *base, const strl_certificate *certificate, strl_pieces *born);
 /* Fills `beside` of all members. */
 bool strl_anchors_find_beside(strl_anchors *shares, uint32_t members, double reach);
-/* Divides what a group's members (at most 8) stood for as children among them, as their boundaries are now: own[i] becomes shares[i] as far
- * as it lies over triangles of member i (owner: of mesh's triangles), or reaches beyond them by no more than `tolerance`. */
-strl_status strl_anchors_divide(const strl_mesh *mesh, const uint32_t *owner, uint32_t members, double tolerance, const strl_anchors *own,
+/* Divides what a group's members (at most 8) stood for as children among them, as their boundaries are now: own[i] goes to shares[i].own as
+ * far as it lies over triangles of member i (owner: of mesh's triangles), or reaches beyond them by no more than `tolerance`. */
+strl_status strl_anchors_divide(const strl_mesh *mesh, const uint32_t *owner, uint32_t members, double tolerance, const strl_pieces *own,
                                 strl_arena *arena, strl_anchors *shares, strl_error *err);
 
 #endif

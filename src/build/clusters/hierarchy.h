@@ -94,7 +94,7 @@ strl_status strl_take_node(strl_hierarchy *hierarchy, strl_level *level, uint32_
 
 /* The anchors of a group's children, given to its `count` members: shares[i] is member i's. owner: of the merged mesh's triangles. */
 strl_status strl_group_anchors(const strl_level *children, const uint32_t *member, uint32_t count, const strl_node_mesh *merged,
-                               const uint32_t *owner, bool promotes, strl_arena *arena, strl_anchors *shares, strl_error *err);
+                               const uint32_t *owner, strl_arena *arena, strl_anchors *shares, strl_error *err);
 /* Raises the claims of a group's members to those of their children, and to each other's. */
 void strl_group_claims(const strl_level *children, const uint32_t *member, uint32_t count, strl_made_node *made);
 

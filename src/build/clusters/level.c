@@ -304,8 +304,8 @@ static strl_status make_group(void *context, uint64_t index, unsigned slot, unsi
     if (!status && !recount_holders(&work, arena))
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a group");
     if (!status && stage->children->anchors)
-        status = strl_group_anchors(stage->children, work.member, work.count, &work.merged, work.owner,
-                                    stage->hierarchy->anchor_plan.promotes, arena, work.shares, err);
+        status = strl_group_anchors(stage->children, work.member, work.count, &work.merged, work.owner, arena,
+                                    work.shares, err);
     for (uint32_t m = 0; m < work.count && !status; m++) {
         strl_node_mesh node;
         strl_node *record = &made->node[m].state.record;

@@ -136,32 +136,29 @@ static void lower_errors(const strl_certificate *certificate, strl_pm *pm)
 static strl_status certify(const strl_node_mesh *node, const strl_anchors *anchors, const strl_simplified *simplified,
                            strl_arena *arena, strl_certificate *certificate, strl_pm *pm, strl_error *err)
 {
-    uint32_t own = anchors->used.count, beside = anchors->beside.count;
+    uint32_t own = anchors->own.count, beside = anchors->beside.count;
     strl_piece *piece = strl_arena_alloc(arena, (size_t)own + beside, sizeof *piece);
     if (!piece)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for the anchors of a node");
-    memcpy(piece, anchors->used.item, own * sizeof *piece);
+    memcpy(piece, anchors->own.item, own * sizeof *piece);
     if (beside)
         memcpy(piece + own, anchors->beside.item, beside * sizeof *piece);
-    strl_status status = strl_certify(&node->mesh, simplified, &(strl_older){piece, own, own + beside}, arena, certificate, err);
+    strl_status status = strl_certify(&node->mesh, simplified, &(strl_older){piece, own, own + beside, anchors->granted}, arena, certificate, err);
     if (!status)
         lower_errors(certificate, pm);
     return status;
 }
 
-/* The anchors that go on to the parent. */
+/* The anchors that go on to the parent: the node's own base mesh, or what it was measured against. */
 static strl_status pass_anchors(const strl_hierarchy *hierarchy, const strl_anchors *anchors, const strl_mesh *base,
                                 const strl_certificate *certificate, strl_made_node *made, strl_error *err)
 {
     strl_pieces born = {0};
-    strl_anchors passed = anchors ? *anchors : (strl_anchors){0};
-    bool good = !hierarchy->anchor_plan.bears || strl_anchors_bear(base, certificate, &born);
-    if (hierarchy->anchor_plan.bears)
-        passed.young = born;
+    bool bears = hierarchy->anchor_plan.bears, good = !bears || strl_anchors_bear(base, certificate, &born);
     if (good)
-        strl_anchors_write(&passed, &made->anchors);
+        strl_pieces_write(bears || !anchors ? &born : &anchors->own, &made->anchors);
     good = good && !made->anchors.failed;
-    strl__free(born.item);
+    strl_pieces_deinit(&born);
     return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for the anchors of a node");
 }
 
@@ -181,7 +178,7 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
         status = strl_pm_record(&node->mesh, &simplified, ingest->palette, (uint32_t)ingest->palette_count, arena, &pm, err);
     if (!status)
         fill_record(&made->state.record, node, &simplified, &pm);
-    bool is_certified = hierarchy->anchor_plan.has_used && anchors && anchors->used.count > 0;
+    bool is_certified = hierarchy->anchor_plan.measures && anchors && anchors->own.count > 0;
     if (!status && is_certified)
         status = certify(node, anchors, &simplified, arena, &certificate, &pm, err);
     if (!status)
@@ -201,7 +198,7 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
         goto done;
     }
-    if (hierarchy->anchor_plan.is_on)
+    if (hierarchy->anchor_plan.measures || hierarchy->anchor_plan.bears)
         status = pass_anchors(hierarchy, anchors, &base.mesh, is_certified ? &certificate : NULL, made, err);
     if (!status)
         status = strl_node_mesh_write(&base, made->state.needs_payload ? &decoded : NULL, arena, &made->mesh, err);
