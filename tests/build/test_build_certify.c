@@ -56,25 +56,32 @@ static void assert_same_bytes(const char *a, const char *b)
     free(bytes_b);
 }
 
+/* A node may claim a little more than its drifts do, because others' pieces lie over it; a level may not. */
+#define CODEC_STEP 1.2 /* claims are rounded up to a scale of quarter octaves */
+
 /* Nodes and states are alike but for their errors. */
 static void compare_claims(const char *plain, const char *certified)
 {
     built_model a, b;
-    uint32_t lower = 0;
+    uint32_t lower = 0, higher = 0;
+    float most_a[32] = {0}, most_b[32] = {0};
     built_open(&a, plain);
     built_open(&b, certified);
     assert_int_equal(a.tree.node_count, b.tree.node_count);
     for (uint32_t i = 0; i < a.tree.node_count; i++) {
+        uint32_t level = a.node[i].level;
+        float claim_a = a.node[i].geometric_max, claim_b = b.node[i].geometric_max;
         assert_int_equal(a.mesh[i].step_count, b.mesh[i].step_count);
         assert_memory_equal(a.mesh[i].position, b.mesh[i].position, a.mesh[i].vertex_count * sizeof *a.mesh[i].position);
-        if (b.node[i].level + 2 > a.node[0].level) /* near the root, both are measured, against other surfaces */
-            continue;
-        if (b.node[i].geometric_max > a.node[i].geometric_max)
-            fail_msg("node %u of level %u claims %g, without certificates %g", i, b.node[i].level,
-                     (double)b.node[i].geometric_max, (double)a.node[i].geometric_max);
-        lower += b.node[i].geometric_max < a.node[i].geometric_max;
+        most_a[level] = fmaxf(most_a[level], claim_a);
+        most_b[level] = fmaxf(most_b[level], claim_b);
+        lower += claim_b < claim_a;
+        higher += claim_b > claim_a;
     }
-    assert_true(lower > 0);
+    for (uint32_t level = 0; level <= a.node[0].level; level++)
+        if ((double)most_b[level] > CODEC_STEP * (double)most_a[level])
+            fail_msg("level %u claims %g, without certificates %g", level, (double)most_b[level], (double)most_a[level]);
+    assert_true(lower > 2 * higher);
     built_close(&a);
     built_close(&b);
 }

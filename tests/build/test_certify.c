@@ -193,6 +193,7 @@ static void no_state_is_farther_than_its_certificate(void **state)
             run_begin(&r, kind, (uint64_t)rung + 40, (strl_simplify_rung)rung);
             if (rung & 1)
                 run_keep_some(&r, 5);
+            r.mesh.start_error = claim;
             run_simplify(&r);
             strl_piece *piece = pieces_of(&r.mesh, claim);
             strl_certificate certificate = certify(&r, piece, r.mesh.triangle_count);

@@ -8,8 +8,9 @@
 
 #define EARLY_FIRST 3u  /* below, what is claimed without certificates is tight, and most of the triangles are there */
 #define FEW_LEVELS 4u   /* so far from the root certificates begin without --certify: the few levels where claims by drifts are loose */
-#define PERIOD 2u       /* levels from anchors to anchors: the longer, the tighter and the dearer */
-#define FEW_NODES 8u    /* levels of so few keep the anchors they have: they cost little there, and errors grow slowly */
+#define CROWD 3u        /* pieces a triangle: the more, the tighter and the dearer */
+#define FEW_NODES 8u    /* levels of so few keep the anchors they have for longer: they cost little there, and errors grow slowly */
+#define FEW_CROWD 12u
 #define CANDIDATES 256u
 #define PARTS_MAX 64u
 /* Of the distance of a piece's middle: what lies so near is looked at. */
@@ -22,10 +23,10 @@
 strl_anchor_plan strl_anchor_plan_of(uint32_t level, uint32_t depth, bool certify)
 {
     uint32_t late = depth > FEW_LEVELS ? depth - FEW_LEVELS : depth / 2;
-    uint32_t first = certify && EARLY_FIRST < late ? EARLY_FIRST : late;
-    bool is_turn = level >= first && level < depth && (level - first) % PERIOD == 0;
-    return (strl_anchor_plan){.measures = level > first,
-                              .bears = is_turn && (level == first || 1u << (depth - level) > FEW_NODES)};
+    uint32_t early = late > EARLY_FIRST ? EARLY_FIRST : late - (late > 0), first = certify ? early : late;
+    bool are_few = 1u << (depth - level) <= FEW_NODES;
+    return (strl_anchor_plan){.begins = level == first && level < depth, .measures = level > first,
+                              .crowd = level == depth ? 0 : are_few ? FEW_CROWD : CROWD};
 }
 
 /* ---- pieces ---- */

@@ -1,13 +1,13 @@
 /* The older surfaces that nodes are measured against (geometry/certify.h).
  *
- * Base meshes of every second level become *anchors*: their triangles, each with a bound of its own distance from the input, go up the
- * hierarchy with the nodes that stand for them, in place of those before. The two levels above are measured against them, so that bounds
- * do not add up from level to level.
+ * The base meshes of one level become *anchors*: their triangles, each with a bound of its own distance from the input, go up the
+ * hierarchy with the nodes that stand for them. Where they are many for what is left of a node, mostly two levels above, its base mesh takes
+ * their place. So bounds do not add up from level to level.
  *
  * Which node stands for which piece decides who answers for it in a cut, whatever states the nodes take. Where a group has moved the
  * boundaries of its members, each piece goes to the member over which it lies now; one that lies over several is cut. Members split
- * together, so in any cut each piece, or what it was made from, has a node that is drawn: no node stands for two generations, and new
- * anchors take over at the very level above their birth. */
+ * together, so in any cut each piece, or what it was made from, has a node that is drawn: new anchors take over at the very level above
+ * their birth, and the same node answers for them and for those that they replace. */
 #ifndef STRL_BUILD_CLUSTERS_ANCHORS_H
 #define STRL_BUILD_CLUSTERS_ANCHORS_H
 
@@ -30,8 +30,9 @@ typedef struct strl_anchors {
 
 /* What happens at a level. */
 typedef struct strl_anchor_plan {
-    bool measures; /* nodes are measured against the anchors that their children pass on */
-    bool bears;    /* base meshes become anchors */
+    bool begins;    /* all base meshes become anchors, for the first time */
+    bool measures;  /* nodes are measured against the anchors that their children pass on */
+    uint32_t crowd; /* so many pieces for each triangle of a base mesh, and that becomes the anchors in their place; 0 = never */
 } strl_anchor_plan;
 
 /* certify: from as low a level as pays; else near the root only. */

@@ -52,7 +52,7 @@ static strl_status take_stream(strl_build_context *context, const char *name, st
 static bool has_anchors(const strl_hierarchy *hierarchy, uint32_t index)
 {
     strl_anchor_plan plan = strl_anchor_plan_of(index, hierarchy->partition->depth, hierarchy->context->desc->certify);
-    return plan.measures || plan.bears;
+    return plan.measures || plan.begins;
 }
 
 static strl_status open_level(strl_hierarchy *hierarchy, uint32_t index, bool with_meshes, open_fn open,

@@ -154,7 +154,10 @@ static strl_status pass_anchors(const strl_hierarchy *hierarchy, const strl_anch
                                 const strl_certificate *certificate, strl_made_node *made, strl_error *err)
 {
     strl_pieces born = {0};
-    bool bears = hierarchy->anchor_plan.bears, good = !bears || strl_anchors_bear(base, certificate, &born);
+    const strl_anchor_plan *plan = &hierarchy->anchor_plan;
+    uint64_t pieces = anchors ? anchors->own.count : 0, crowd = (uint64_t)plan->crowd * base->triangle_count;
+    bool bears = plan->begins || (certificate && plan->crowd && pieces >= crowd);
+    bool good = !bears || strl_anchors_bear(base, certificate, &born);
     if (good)
         strl_pieces_write(bears || !anchors ? &born : &anchors->own, &made->anchors);
     good = good && !made->anchors.failed;
@@ -198,7 +201,7 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
         goto done;
     }
-    if (hierarchy->anchor_plan.measures || hierarchy->anchor_plan.bears)
+    if (hierarchy->anchor_plan.measures || hierarchy->anchor_plan.begins)
         status = pass_anchors(hierarchy, anchors, &base.mesh, is_certified ? &certificate : NULL, made, err);
     if (!status)
         status = strl_node_mesh_write(&base, made->state.needs_payload ? &decoded : NULL, arena, &made->mesh, err);
