@@ -15,7 +15,7 @@
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define TRIANGLES 40000u
 #else
-#define TRIANGLES 150000u
+#define TRIANGLES 80000u
 #endif
 
 static void build(const char *input, const char *output, bool certify, unsigned jobs)
@@ -105,6 +105,53 @@ static void a_certified_isosurface_claims_less_and_holds(void **state)
         fail_msg("claimed over measured: %g certified, %g without", worst, before);
 }
 
+/* ---- stopped and resumed ---- */
+
+typedef struct stop {
+    const char *stage;
+    uint64_t calls, after;
+} stop;
+
+static bool say_no(void *context, const strl_build_progress *progress)
+{
+    stop *s = context;
+    s->calls += !strcmp(s->stage, progress->stage);
+    return s->calls < s->after;
+}
+
+static strl_status build_kept(const char *input, const char *output, bool certify, stop *s, strl_error *err)
+{
+    const strl_build_desc desc = {.inputs = &input, .input_count = 1, .output = output, .memory_bytes = 256u << 20, .jobs = 1,
+                                  .certify = certify, .keep = true, .keep_triangles = 1, .resume = !s,
+                                  .progress = s ? say_no : NULL, .context = s};
+    strl_build_result result;
+    return strl_build_clusters(&desc, &result, err);
+}
+
+/* In the middle of a level that is measured, and after one. */
+static void a_certified_build_resumes_to_the_same_bytes(void **state)
+{
+    (void)state;
+    char input[512], whole[512], output[512];
+    built_scene("isosurface", "iso.ply", TRIANGLES, false);
+    snprintf(input, sizeof input, "%s", built_path("iso.ply"));
+    snprintf(whole, sizeof whole, "%s", built_path("whole.stroll"));
+    snprintf(output, sizeof output, "%s", built_path("out.stroll"));
+    build(input, whole, true, 2);
+    const stop stops[] = {{"level 1", 0, 2}, {"level 2", 0, 1}, {"level 2", 0, 2}, {"level 3", 0, 1}};
+    for (unsigned i = 0; i < sizeof stops / sizeof *stops; i++) {
+        strl_error err = {0};
+        stop s = stops[i];
+        assert_int_equal(build_kept(input, output, true, &s, &err), STRL_ERR_CANCELLED);
+        assert_int_equal(build_kept(input, output, false, NULL, &err), STRL_ERR_ARGUMENT);
+        assert_non_null(strstr(err.message, "--certify"));
+        if (build_kept(input, output, true, NULL, &err) != STRL_OK)
+            fail_msg("%s", err.message);
+        assert_same_bytes(whole, output);
+        assert_int_equal(remove(output), 0);
+    }
+}
+
 /* Parts that do not hang together, so that the ladder goes to its end. */
 static void certified_boxes_hold(void **state)
 {
@@ -121,6 +168,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_certified_isosurface_claims_less_and_holds),
+        cmocka_unit_test(a_certified_build_resumes_to_the_same_bytes),
         cmocka_unit_test(certified_boxes_hold),
     };
     return cmocka_run_group_tests(tests, built_setup, built_teardown);
