@@ -10,7 +10,7 @@
 #define FEW_LEVELS 4u   /* so far from the root certificates begin without --certify: the few levels where claims by drifts are loose */
 #define CROWD 3u        /* pieces a triangle: the more, the tighter and the dearer */
 #define FEW_NODES 8u    /* levels of so few keep the anchors they have for longer: they cost little there, and errors grow slowly */
-#define FEW_CROWD 12u
+#define FEW_CROWD 20u
 #define CANDIDATES 256u
 #define PARTS_MAX 64u
 /* Of the distance of a piece's middle: what lies so near is looked at. */
