@@ -332,21 +332,32 @@ static bool is_near_likely(tracker *t, const strl_facet *piece, double *bound)
     return false;
 }
 
-/* A piece against the triangles near it, before the first collapse. */
+/* A piece against the triangles within reach, and one that surely counts. */
+static double measure_within(tracker *t, const strl_facet *piece, const double along[3], double reach, uint32_t most, double enough)
+{
+    t->around_count = 1 + strl_near_list(&t->tree, piece, reach, t->around + 1, most);
+    take_around(t, along);
+    return measure_piece(t, piece, enough);
+}
+
+/* A piece against the triangles near it, before the first collapse. What reaches beyond the mesh, at a boundary, may be nearest to
+ * one that is farther than its middle: no farther than the bound, though. */
 static bool measure_first(tracker *t, uint32_t id)
 {
     const strl_facet *piece = &t->piece[id];
-    double middle[3], distance, along[3], bound = INFINITY;
+    double middle[3], distance, along[3], bound;
     if (is_near_likely(t, piece, &bound))
         return keep_measure(t, id, bound + piece->claim);
     middle_of(piece, middle);
     t->around[0] = strl_near_find(&t->tree, middle, t->around[0], &distance);
-    double enough = fmax(fmax(t->most_down, t->granted) - piece->claim, FIRST_REACH * distance);
+    double reach = FIRST_REACH * distance, enough = fmax(fmax(t->most_down, t->granted) - piece->claim, reach);
     strl_facet_normal(&t->facet[t->around[0]], along);
-    for (uint32_t most = 0; most < WIDER_MAX && bound > enough; most += WIDER_MAX - 1) {
-        t->around_count = 1 + strl_near_list(&t->tree, piece, FIRST_REACH * distance, t->around + 1, most);
-        take_around(t, along);
-        bound = measure_piece(t, piece, enough);
+    bound = measure_within(t, piece, along, 0, 0, enough);
+    if (bound > enough)
+        bound = measure_within(t, piece, along, reach, WIDER_MAX - 1, enough);
+    if (bound > enough) {
+        double wider = measure_within(t, piece, along, bound, WIDER_MAX - 1, enough);
+        bound = wider < bound ? wider : measure_within(t, piece, along, reach, WIDER_MAX - 1, enough);
     }
     return keep_measure(t, id, bound + piece->claim);
 }
