@@ -18,6 +18,9 @@
 #define TRIANGLES 80000u
 #endif
 
+/* Of a model so small, with four levels; docs/benchmarks.md has larger ones. */
+#define MOST_CERTIFIED 2.2
+
 static void build(const char *input, const char *output, bool certify, unsigned jobs)
 {
     strl_build_desc desc = {.inputs = &input, .input_count = 1, .output = output, .memory_bytes = 256u << 20, .jobs = jobs,
@@ -101,7 +104,7 @@ static void a_certified_isosurface_claims_less_and_holds(void **state)
     assert_same_bytes(one, two);
     compare_claims(plain, one);
     double worst = worst_ratio(one, input), before = worst_ratio(plain, input);
-    if (!(worst <= 2) || !(before <= 4))
+    if (!(worst <= MOST_CERTIFIED) || !(worst <= before) || !(before <= 4))
         fail_msg("claimed over measured: %g certified, %g without", worst, before);
 }
 
