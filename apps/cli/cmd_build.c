@@ -137,6 +137,8 @@ static int run(strl_cli_args *args)
          .help = "which axis points up; stored, never applied (auto: y for OBJ, z for PLY and STL)"},
         {.name = "unit", .kind = STRL_CLI_ENUM, .value = &unit, .given = &unit_given, .argument = STRL_CLI_UNITS,
          .help = "length unit; stored, never applied (unknown)"},
+        {.name = "certify", .kind = STRL_CLI_FLAG, .value = &desc.certify,
+         .help = "measure each node against older surfaces and claim no more than that: tighter errors for more time"},
         {.name = "no-dependencies", .kind = STRL_CLI_FLAG, .value = &desc.no_dependencies,
          .help = "no shared boundaries simplified before their nodes merge: to measure what that brings"},
         {.name = "json", .kind = STRL_CLI_FLAG, .value = &json, .help = "print one JSON object"},

@@ -60,8 +60,9 @@ static void print_report(const char *model, const strl_verify_report *report)
     for (uint32_t i = 0; i < report->level_count; i++)
         print_cut("level", i, &report->levels[i]);
     if (report->uniform_count)
-        printf("claimed over measured: median %.3g, least %.3g\n", report->claimed_over_measured_median,
-               report->worst_claimed_over_measured);
+        printf("claimed over measured: median %.3g, least %.3g; of levels at most %.3g\n",
+               report->claimed_over_measured_median, report->worst_claimed_over_measured,
+               report->most_claimed_over_measured_of_levels);
     printf("%s: %s\n", model, report->ok ? "good" : "NOT good");
 }
 
@@ -123,6 +124,8 @@ static strl_status print_json(const strl_verify_report *report, strl_error *err)
         good = good && set_new(root, "uniform_cuts", json_cuts(report->uniform, report->uniform_count)) &&
                set_new(root, "levels", json_cuts(report->levels, report->level_count)) &&
                set_new(root, "claimed_over_measured_median", json_real(report->claimed_over_measured_median)) &&
+               set_new(root, "claimed_over_measured_levels_most",
+                       json_real(report->most_claimed_over_measured_of_levels)) &&
                set_new(root, "claimed_over_measured_least", json_real(report->worst_claimed_over_measured));
     if (good)
         good = json_dumpf(root, stdout, JSON_INDENT(1) | JSON_PRESERVE_ORDER) == 0 && putchar('\n') != EOF;

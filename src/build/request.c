@@ -21,6 +21,7 @@ strl_status strl__request_write(const strl_build_desc *desc, strl_writer *writer
     strl_writer_u8(writer, (uint8_t)desc->up_axis);
     write_text(writer, desc->unit ? desc->unit : "");
     strl_writer_u8(writer, desc->no_dependencies);
+    strl_writer_u8(writer, desc->certify);
     strl_writer_u32(writer, desc->input_count);
     for (uint32_t i = 0; i < desc->input_count; i++) {
         strl_file_info info;
@@ -71,7 +72,7 @@ static strl_status compare_options(const strl_build_desc *desc, strl_cursor *sav
     unsigned up = strl_cursor_u8(saved), up_now = (unsigned)desc->up_axis;
     saved_text unit = read_text(saved);
     const char *unit_now = desc->unit ? desc->unit : "";
-    bool no_dependencies = strl_cursor_u8(saved);
+    bool no_dependencies = strl_cursor_u8(saved), certify = strl_cursor_u8(saved);
     if (!(grid == desc->grid))
         return strl__fail(err, STRL_ERR_ARGUMENT, "--grid is %g, in the build to be resumed it was %g (0 = chosen)",
                           desc->grid, grid);
@@ -88,6 +89,9 @@ static strl_status compare_options(const strl_build_desc *desc, strl_cursor *sav
     if (no_dependencies != desc->no_dependencies)
         return strl__fail(err, STRL_ERR_ARGUMENT, "--no-dependencies is %s, in the build to be resumed it was not",
                           desc->no_dependencies ? "given" : "left out");
+    if (certify != desc->certify)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "--certify is %s, in the build to be resumed it was not",
+                          desc->certify ? "given" : "left out");
     return STRL_OK;
 }
 

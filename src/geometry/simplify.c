@@ -102,10 +102,11 @@ void strl__apply_collapse(simplifier *s, const strl_star *star, const collapse_p
     strl__quadric_add(&s->quadrics[v], &s->quadrics[u]);
     s->sites[v].own_cost = strl__quadric_at(&s->quadrics[v], s->sites[v].position);
     s->sites[v].holders |= s->sites[u].holders;
-    result->geometric = strl__larger(result->geometric, strl__larger(plan->geometric, strl_mesh_error(s->mesh, effect->longest)));
+    float own = strl__larger(plan->geometric, strl_mesh_error(s->mesh, effect->longest));
+    result->geometric = strl__larger(result->geometric, own);
     result->appearance = strl__larger(result->appearance, plan->shift);
     result->collapses[result->collapse_count++] =
-        (strl_collapse){u, v, s->triangles_left, result->geometric, result->appearance};
+        (strl_collapse){u, v, s->triangles_left, result->geometric, result->appearance, own};
     if (s->rung > result->rung)
         result->rung = s->rung;
 }

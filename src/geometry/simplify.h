@@ -39,6 +39,7 @@ typedef struct strl_collapse {
     uint32_t from, to;      /* points */
     uint32_t triangles_left; /* after this collapse */
     float geometric, appearance; /* largest error of any triangle so far, never decreasing; lattice units */
+    float own;              /* largest geometric error of the triangles that it changed */
 } strl_collapse;
 
 /* What simplification did. Arrays live in the arena given. */

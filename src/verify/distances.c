@@ -174,6 +174,9 @@ static void summarise(strl_verify_report *report)
 {
     double ratio[STRL_VERIFY_UNIFORM_CUTS];
     uint32_t count = 0;
+    for (uint32_t i = 0; i < report->level_count; i++)
+        report->most_claimed_over_measured_of_levels =
+            fmax(report->most_claimed_over_measured_of_levels, strl_verify_ratio(&report->levels[i]));
     for (uint32_t i = 0; i < report->uniform_count; i++) {
         double one = strl_verify_ratio(&report->uniform[i]);
         if (one > 0)

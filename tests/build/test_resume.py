@@ -134,6 +134,7 @@ def another_request_is_refused(folder):
                          (scene.words("--up", "x"), "--up"),
                          (scene.words("--unit", "mm"), "--unit is mm"),
                          (scene.words("--no-dependencies"), "--no-dependencies"),
+                         (scene.words("--certify"), "--certify is given"),
                          (scene.words("--memory", "512M"), "--memory"),
                          ((scene.source, *scene.words()), "the inputs are 2"),
                          ((other, *scene.words()[1:]), "other.ply")):

@@ -265,6 +265,42 @@ static void test_an_error_that_shrinks_to_the_root_is_found(void **state)
     strl_verify_report_deinit(&report);
 }
 
+static void scale_errors(strl_node *record, strl_pm *mesh, float factor)
+{
+    for (uint32_t s = 0; s <= mesh->step_count; s++)
+        mesh->geometric_error[s] *= factor;
+    record->geometric_min *= factor;
+    record->geometric_max *= factor;
+    record->group_geometric *= factor;
+}
+
+static void claim_less(void *context, uint32_t id, strl_node *record, strl_pm *mesh, strl_arena *arena)
+{
+    (void)context, (void)id, (void)arena;
+    scale_errors(record, mesh, 0x1p-3f);
+}
+
+static void claim_more(void *context, uint32_t id, strl_node *record, strl_pm *mesh, strl_arena *arena)
+{
+    (void)context, (void)id, (void)arena;
+    scale_errors(record, mesh, 0x1p3f);
+}
+
+static void test_claims_too_small_are_broken_and_claims_too_large_are_told(void **state)
+{
+    (void)state;
+    strl_verify_report good = check(&torus, torus.good, true), less = plant(&torus, 0, claim_less, true);
+    strl_verify_report more = plant(&torus, 0, claim_more, true);
+    double most = good.most_claimed_over_measured_of_levels;
+    assert_found(&less, STRL_VERIFY_DISTANCES);
+    assert_good(&more);
+    assert_true(most >= 1 && most <= 4);
+    assert_true(fabs(more.most_claimed_over_measured_of_levels - 8 * most) < 0.01 * most);
+    strl_verify_report_deinit(&good);
+    strl_verify_report_deinit(&less);
+    strl_verify_report_deinit(&more);
+}
+
 static void raise_group_error(void *context, uint32_t id, strl_node *record, strl_pm *mesh, strl_arena *arena)
 {
     (void)mesh, (void)arena;
@@ -569,6 +605,7 @@ int main(void)
         cmocka_unit_test(test_a_turned_leaf_triangle_is_found),
         cmocka_unit_test(test_a_base_mesh_that_is_not_in_the_parent_is_found),
         cmocka_unit_test(test_a_moved_vertex_is_above_the_claim),
+        cmocka_unit_test(test_claims_too_small_are_broken_and_claims_too_large_are_told),
         cmocka_unit_test(test_a_border_vertex_missing_in_one_node_is_a_crack),
         cmocka_unit_test(test_nodes_of_the_last_rung_are_counted_apart),
         cmocka_unit_test(test_a_wrong_group_is_found),

@@ -15,12 +15,16 @@ static strl_status close_meshes(strl_level *level, strl_error *err)
 {
     strl_status status = strl_spill_close_and_delete(level->meshes, err);
     level->meshes = NULL;
-    return status;
+    strl_status other = strl_spill_close_and_delete(level->anchors, status ? NULL : err);
+    level->anchors = NULL;
+    return status ? status : other;
 }
 
 static strl_status flush_level(strl_level *level, strl_error *err)
 {
     strl_status status = strl_spill_flush(level->meshes, err);
+    if (!status && level->anchors)
+        status = strl_spill_flush(level->anchors, err);
     if (!status)
         status = strl_spill_flush(level->payloads, err);
     return status || !level->states ? status : strl_spill_flush(level->states, err);
@@ -60,6 +64,7 @@ static strl_status simplify_levels(strl_hierarchy *hierarchy, const strl_positio
     for (uint32_t level = from->level; level <= hierarchy->partition->depth && !status; level++) {
         uint32_t first = level == from->level ? from->done : 0;
         strl__build_stage(hierarchy->context, names[level < 10 ? level : 10]);
+        hierarchy->anchor_plan = strl_anchor_plan_of(level, hierarchy->partition->depth, hierarchy->context->desc->certify);
         if (first == 0)
             status = strl_level_open(hierarchy, level, err);
         if (!status)
@@ -75,6 +80,7 @@ static void hierarchy_deinit(strl_hierarchy *hierarchy)
     for (uint32_t i = 0; hierarchy->levels && i <= hierarchy->partition->depth; i++) {
         strl_spill_close(hierarchy->levels[i].payloads);
         strl_spill_close(hierarchy->levels[i].meshes);
+        strl_spill_close(hierarchy->levels[i].anchors);
         strl_spill_close(hierarchy->levels[i].states);
         strl__free(hierarchy->levels[i].nodes);
     }

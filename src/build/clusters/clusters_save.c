@@ -49,6 +49,12 @@ static strl_status take_stream(strl_build_context *context, const char *name, st
     return strl_spill_take(context->spills, name, spill, err);
 }
 
+static bool has_anchors(const strl_hierarchy *hierarchy, uint32_t index)
+{
+    strl_anchor_plan plan = strl_anchor_plan_of(index, hierarchy->partition->depth, hierarchy->context->desc->certify);
+    return plan.measures || plan.begins;
+}
+
 static strl_status open_level(strl_hierarchy *hierarchy, uint32_t index, bool with_meshes, open_fn open,
                               strl_error *err)
 {
@@ -64,6 +70,9 @@ static strl_status open_level(strl_hierarchy *hierarchy, uint32_t index, bool wi
     snprintf(name, sizeof name, "mesh-%02u", index);
     if (!status && with_meshes)
         status = open(hierarchy->context, name, &level->meshes, err);
+    snprintf(name, sizeof name, "anchors-%02u", index);
+    if (!status && with_meshes && has_anchors(hierarchy, index))
+        status = open(hierarchy->context, name, &level->anchors, err);
     snprintf(name, sizeof name, "nodes-%02u", index);
     if (!status && hierarchy->context->keep)
         status = open(hierarchy->context, name, &level->states, err);

@@ -9,6 +9,7 @@
 #define STRL_BUILD_CLUSTERS_HIERARCHY_H
 
 #include "base/memory.h"
+#include "build/clusters/anchors.h"
 #include "build/clusters/node_mesh.h"
 #include "build/clusters/partition.h"
 #include "container/writer.h"
@@ -18,6 +19,12 @@
 #define STRL_NORMAL_WEIGHT 0.4f
 #define STRL_COLOUR_WEIGHT 1.f
 
+/* What a node will claim, lattice units. Its record has the same by drifts alone, which the build goes by, so that certificates change
+ * no geometry. */
+typedef struct strl_node_claims {
+    float least, most, group; /* of geometric_min, geometric_max, group_geometric */
+} strl_node_claims;
+
 /* What is kept of every node. Nodes of a level are numbered 0 .. count - 1; the children of i are 2i and 2i + 1 one level down. */
 typedef struct strl_node_state {
     strl_node record;       /* ids, group and page fields are filled in when the container is written */
@@ -25,6 +32,9 @@ typedef struct strl_node_state {
     uint32_t payload_bytes;
     uint64_t mesh_at;       /* base mesh, in the mesh spill of its level; when it is written, the order of its mesh */
     uint32_t mesh_bytes;
+    uint64_t anchors_at;    /* in the anchor spill of its level */
+    uint64_t anchors_bytes;
+    strl_node_claims claims;
     bool needs_payload;     /* positions of the base mesh are in the payload alone */
     uint32_t point_count;   /* of the base mesh */
     uint32_t outer_shared;  /* points of the base mesh that a node other than the sibling has too */
@@ -37,6 +47,7 @@ typedef struct strl_level {
     uint32_t group_count;
     strl_spill *payloads;
     strl_spill *meshes;     /* base meshes, deleted when the next level is done; while writing, orders of meshes */
+    strl_spill *anchors;    /* the same of anchors; NULL where there are none */
     strl_spill *states;     /* of the nodes as they were taken, for checkpoints; NULL where none are made */
 } strl_level;
 
@@ -62,6 +73,7 @@ typedef struct strl_hierarchy {
     strl_adjacency next;    /* of the level above it */
     float even_error;       /* lattice units: where the nodes of the level being made are to end; 0 = at half their triangles */
     uint32_t soft_triangles; /* STRL_SOFT_TRIANGLES but while leaves are sampled */
+    strl_anchor_plan anchor_plan; /* of the level being made */
     float growth;           /* by which even_error grows from level to level, so that about half the triangles go */
     uint32_t saved_done;    /* groups of the level being made that the last checkpoint has */
     uint64_t saved_at_ns;   /* when it was made */
@@ -70,19 +82,25 @@ typedef struct strl_hierarchy {
 /* One node as a worker has made it, before its bytes are put into the spills in order. */
 typedef struct strl_made_node {
     strl_node_state state;
-    strl_writer payload, mesh;
+    strl_writer payload, mesh, anchors;
     uint32_t *next_neighbour; /* pairs (node of the next level, points shared), owned */
     size_t neighbour_count, neighbour_capacity;
 } strl_made_node;
 
 void strl_made_node_deinit(strl_made_node *made);
 /* Simplifies to `target` triangles, records the progressive mesh, encodes it, keeps the base mesh with its shares. `self` is the node's index
- * in its level. Boxes and errors are those of the mesh alone. */
-strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh *node, uint32_t self, uint32_t target,
-                           strl_arena *arena, strl_made_node *made, strl_error *err);
+ * in its level. Boxes and errors are those of the mesh alone. anchors: what the node stands for; NULL = nothing. */
+strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh *node, const strl_anchors *anchors, uint32_t self,
+                           uint32_t target, strl_arena *arena, strl_made_node *made, strl_error *err);
 /* Appends a made node's bytes to its level and counts its neighbours. In node order, one thread. */
 strl_status strl_take_node(strl_hierarchy *hierarchy, strl_level *level, uint32_t self, strl_made_node *made,
                            strl_error *err);
+
+/* The anchors of a group's children, given to its `count` members: shares[i] is member i's. owner: of the merged mesh's triangles. */
+strl_status strl_group_anchors(const strl_level *children, const uint32_t *member, uint32_t count, const strl_node_mesh *merged,
+                               const uint32_t *owner, strl_arena *arena, strl_anchors *shares, strl_error *err);
+/* Raises the claims of a group's members to those of their children, and to each other's. */
+void strl_group_claims(const strl_level *children, const uint32_t *member, uint32_t count, strl_made_node *made);
 
 /* The larger of both errors of a node's base mesh. */
 float strl_node_error(const strl_node *record);

@@ -269,7 +269,7 @@ static strl_status make_one(leaf_stage *stage, uint32_t index, unsigned worker, 
     if (!status)
         status = mark_shared(stage, refs, ref_count, arena, &node, err);
     if (!status)
-        status = strl_make_node(stage->hierarchy, &node, cluster, (own + 1) / 2, arena, made, err);
+        status = strl_make_node(stage->hierarchy, &node, NULL, cluster, (own + 1) / 2, arena, made, err);
     if (!status) {
         for (int k = 0; k < 3; k++) {
             made->state.record.group_box_min[k] = made->state.record.box_min[k];
@@ -278,6 +278,7 @@ static strl_status make_one(leaf_stage *stage, uint32_t index, unsigned worker, 
         made->state.record.group_geometric = made->state.record.geometric_min;
         made->state.record.group_appearance = made->state.record.appearance_min;
         made->state.record.group_size = 1;
+        made->state.claims.group = made->state.claims.least;
         made->state.group = cluster;
     }
     strl_arena_rewind(arena, mark);

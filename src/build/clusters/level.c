@@ -48,6 +48,7 @@ typedef struct group_work {
     uint32_t *outside_first, *outside; /* per point: holders that are not members, ascending */
     uint32_t steps;              /* collapses of the boundary */
     strl_simplify_rung rung;
+    strl_anchors shares[STRL_GROUP_MAX]; /* what each member stands for */
 } group_work;
 
 /* A base mesh comes from its spill, and from the node's payload where that has the positions. */
@@ -302,18 +303,24 @@ static strl_status make_group(void *context, uint64_t index, unsigned slot, unsi
         status = simplify_boundary(stage, &work, arena, err);
     if (!status && !recount_holders(&work, arena))
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a group");
+    if (!status && stage->children->anchors)
+        status = strl_group_anchors(stage->children, work.member, work.count, &work.merged, work.owner, arena,
+                                    work.shares, err);
     for (uint32_t m = 0; m < work.count && !status; m++) {
         strl_node_mesh node;
         strl_node *record = &made->node[m].state.record;
         status = extract_member(&work, m, arena, &node, err);
         if (!status)
-            status = strl_make_node(stage->hierarchy, &node, work.member[m], half_of_children(&work, m), arena,
+            status = strl_make_node(stage->hierarchy, &node, &work.shares[m], work.member[m], half_of_children(&work, m), arena,
                                     &made->node[m], err);
+        strl_anchors_deinit(&work.shares[m]);
         record->boundary_steps = work.steps;
         if (work.steps && (uint32_t)work.rung > record->rung)
             record->rung = work.rung;
         made->node[m].state.group = (uint32_t)index;
     }
+    for (uint32_t m = 0; m < work.count; m++)
+        strl_anchors_deinit(&work.shares[m]);
     strl_arena_rewind(arena, mark);
     return status;
 }
@@ -379,9 +386,12 @@ static strl_status take_group(void *context, uint64_t index, unsigned slot, unsi
     strl_status status = STRL_OK;
     (void)worker;
     finish_records(stage, made, member);
+    strl_group_claims(stage->children, member, made->count, made->node);
     for (uint32_t i = 0; i < 2 * made->count; i++) { /* nobody else reads a child */
         const strl_node_state *child = &stage->children->nodes[2 * member[i / 2] + (i & 1)];
         strl_spill_drop(stage->children->meshes, child->mesh_at, child->mesh_bytes);
+        if (stage->children->anchors)
+            strl_spill_drop(stage->children->anchors, child->anchors_at, child->anchors_bytes);
     }
     for (uint32_t m = 0; m < made->count && !status; m++)
         status = strl_take_node(stage->hierarchy, stage->level, member[m], &made->node[m], err);

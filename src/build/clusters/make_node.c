@@ -17,6 +17,7 @@ void strl_made_node_deinit(strl_made_node *made)
 {
     strl__free(made->payload.data);
     strl__free(made->mesh.data);
+    strl__free(made->anchors.data);
     strl__free(made->next_neighbour);
     *made = (strl_made_node){0};
 }
@@ -128,12 +129,56 @@ static void coarsen_normals(strl_pm *pm)
             pm->normal[v][k] = strl_oct_coarsen(pm->normal[v][k]);
 }
 
-strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh *node, uint32_t self, uint32_t target,
-                           strl_arena *arena, strl_made_node *made, strl_error *err)
+/* Measured claims in place of chained ones: of the way from the mesh to the input the smaller counts; which input the node stands for
+ * is decided by its pieces, so the way back is the measured one. */
+static void lower_errors(const strl_certificate *certificate, strl_pm *pm)
+{
+    for (uint32_t i = 0; i <= pm->step_count; i++) {
+        float *error = &pm->geometric_error[pm->step_count - i];
+        if (isfinite(certificate->down[i]))
+            *error = fmaxf(certificate->down[i], fminf(certificate->up[i], *error));
+    }
+}
+
+static strl_status certify(const strl_node_mesh *node, const strl_anchors *anchors, const strl_simplified *simplified,
+                           strl_arena *arena, strl_certificate *certificate, strl_pm *pm, strl_error *err)
+{
+    uint32_t own = anchors->own.count, beside = anchors->beside.count;
+    strl_piece *piece = strl_arena_alloc(arena, (size_t)own + beside, sizeof *piece);
+    if (!piece)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for the anchors of a node");
+    memcpy(piece, anchors->own.item, own * sizeof *piece);
+    if (beside)
+        memcpy(piece + own, anchors->beside.item, beside * sizeof *piece);
+    strl_status status = strl_certify(&node->mesh, simplified, &(strl_older){piece, own, own + beside, anchors->granted}, arena, certificate, err);
+    if (!status)
+        lower_errors(certificate, pm);
+    return status;
+}
+
+/* The anchors that go on to the parent: the node's own base mesh, or what it was measured against. */
+static strl_status pass_anchors(const strl_hierarchy *hierarchy, const strl_anchors *anchors, const strl_mesh *base,
+                                const strl_certificate *certificate, strl_made_node *made, strl_error *err)
+{
+    strl_pieces born = {0};
+    const strl_anchor_plan *plan = &hierarchy->anchor_plan;
+    uint64_t pieces = anchors ? anchors->own.count : 0, crowd = (uint64_t)plan->crowd * base->triangle_count;
+    bool bears = plan->begins || (certificate && plan->crowd && pieces >= crowd);
+    bool good = !bears || strl_anchors_bear(base, certificate, &born);
+    if (good)
+        strl_pieces_write(bears || !anchors ? &born : &anchors->own, &made->anchors);
+    good = good && !made->anchors.failed;
+    strl_pieces_deinit(&born);
+    return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for the anchors of a node");
+}
+
+strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh *node, const strl_anchors *anchors, uint32_t self,
+                           uint32_t target, strl_arena *arena, strl_made_node *made, strl_error *err)
 {
     const strl_ingest *ingest = hierarchy->ingest;
     strl_arena_mark mark = strl_arena_get_mark(arena);
     strl_simplified simplified;
+    strl_certificate certificate;
     strl_pm pm, decoded, *given = NULL;
     strl_node_mesh base = {0};
     uint32_t *point_map = strl_arena_alloc(arena, node->mesh.point_count, sizeof *point_map);
@@ -143,6 +188,11 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
         status = strl_pm_record(&node->mesh, &simplified, ingest->palette, (uint32_t)ingest->palette_count, arena, &pm, err);
     if (!status && hierarchy->context->desc->compact)
         coarsen_normals(&pm);
+    if (!status)
+        fill_record(&made->state.record, node, &simplified, &pm);
+    bool is_certified = hierarchy->anchor_plan.measures && anchors && anchors->own.count > 0;
+    if (!status && is_certified)
+        status = certify(node, anchors, &simplified, arena, &certificate, &pm, err);
     if (!status)
         status = strl_pm_spill_write(&pm, arena, &made->payload, err);
     if (!status)
@@ -154,7 +204,7 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
     if (status)
         goto done;
     memcpy(base.anchor, node->anchor, sizeof base.anchor);
-    fill_record(&made->state.record, node, &simplified, &pm);
+    made->state.claims = (strl_node_claims){pm.geometric_error[pm.step_count], pm.geometric_error[0], 0};
     made->state.point_count = base.mesh.point_count;
     if (!keep_shares(node, point_map, &base, arena) || !count_neighbours(&base, self, made)) {
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
@@ -162,7 +212,10 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
     }
     if (made->state.needs_payload)
         given = strl_pm_spill_keeps_order(&pm) ? &pm : &decoded;
-    status = strl_node_mesh_write(&base, given, arena, &made->mesh, err);
+    if (hierarchy->anchor_plan.measures || hierarchy->anchor_plan.begins)
+        status = pass_anchors(hierarchy, anchors, &base.mesh, is_certified ? &certificate : NULL, made, err);
+    if (!status)
+        status = strl_node_mesh_write(&base, given, arena, &made->mesh, err);
 done:
     strl_arena_rewind(arena, mark);
     return status;
@@ -177,9 +230,13 @@ strl_status strl_take_node(strl_hierarchy *hierarchy, strl_level *level, uint32_
     state->payload_bytes = (uint32_t)made->payload.size;
     state->mesh_at = strl_spill_bytes(level->meshes);
     state->mesh_bytes = (uint32_t)made->mesh.size;
+    state->anchors_at = level->anchors ? strl_spill_bytes(level->anchors) : 0;
+    state->anchors_bytes = made->anchors.size;
     strl_status status = strl_spill_append(level->payloads, made->payload.data, made->payload.size, err);
     if (!status)
         status = strl_spill_append(level->meshes, made->mesh.data, made->mesh.size, err);
+    if (!status && level->anchors)
+        status = strl_spill_append(level->anchors, made->anchors.data, made->anchors.size, err);
     for (size_t i = 0; i < made->neighbour_count && !status; i++)
         if (made->next_neighbour[2 * i] >= (level->count + 1) / 2)
             status = strl__fail(err, STRL_ERR_INTERNAL, "node %u shares points with one that is not there", self);

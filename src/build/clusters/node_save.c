@@ -7,7 +7,7 @@
 #include "build/saved.h"
 
 #define NEIGHBOUR_BYTES 8u
-#define NODE_BYTES 228u /* what write_node writes */
+#define NODE_BYTES 256u /* what write_node writes */
 #define MOST_COORDINATE (INT64_C(1) << 40)
 
 /* ---- writing ---- */
@@ -38,6 +38,11 @@ static void write_node(uint32_t self, const strl_node_state *state, uint32_t nei
     strl_writer_u32(writer, state->payload_bytes);
     strl_writer_u64(writer, state->mesh_at);
     strl_writer_u32(writer, state->mesh_bytes);
+    strl_writer_u64(writer, state->anchors_at);
+    strl_writer_u64(writer, state->anchors_bytes);
+    strl_writer_f32(writer, state->claims.least);
+    strl_writer_f32(writer, state->claims.most);
+    strl_writer_f32(writer, state->claims.group);
     strl_writer_u32(writer, state->point_count);
     strl_writer_u32(writer, state->outer_shared);
     strl_writer_u32(writer, state->group);
@@ -82,6 +87,17 @@ static bool read_record(strl_cursor *cursor, strl_node *record)
            record->group_size >= 1 && record->group_size <= STRL_GROUP_MAX && record->rung <= STRL_RUNG_CLUSTERING;
 }
 
+static bool read_claims(strl_cursor *cursor, strl_node_claims *claims)
+{
+    float *const all[] = {&claims->least, &claims->most, &claims->group};
+    bool good = true;
+    for (int i = 0; i < 3; i++) {
+        *all[i] = strl_cursor_f32(cursor);
+        good &= *all[i] >= 0 && isfinite(*all[i]);
+    }
+    return good;
+}
+
 static bool is_within(uint64_t at, uint64_t bytes, const strl_spill *spill)
 {
     uint64_t end = spill ? strl_spill_bytes(spill) : UINT64_MAX;
@@ -98,6 +114,9 @@ static bool read_node(strl_cursor *cursor, strl_level *level, uint32_t groups, u
     state.payload_bytes = strl_cursor_u32(cursor);
     state.mesh_at = strl_cursor_u64(cursor);
     state.mesh_bytes = strl_cursor_u32(cursor);
+    state.anchors_at = strl_cursor_u64(cursor);
+    state.anchors_bytes = strl_cursor_u64(cursor);
+    good = read_claims(cursor, &state.claims) && good;
     state.point_count = strl_cursor_u32(cursor);
     state.outer_shared = strl_cursor_u32(cursor);
     state.group = strl_cursor_u32(cursor);
@@ -105,7 +124,8 @@ static bool read_node(strl_cursor *cursor, strl_level *level, uint32_t groups, u
     *neighbours = strl_cursor_u32(cursor);
     good = good && !cursor->failed && *self < level->count && state.payload_bytes > 0 && state.group < groups &&
            is_within(state.payload_at, state.payload_bytes, level->payloads) &&
-           is_within(state.mesh_at, state.mesh_bytes, level->meshes);
+           is_within(state.mesh_at, state.mesh_bytes, level->meshes) &&
+           is_within(state.anchors_at, state.anchors_bytes, level->anchors);
     if (!good || level->nodes[*self].payload_bytes) /* each once */
         return false;
     level->nodes[*self] = state;

@@ -101,6 +101,10 @@ static void place_in_tree(const write_stage *stage, uint32_t index, strl_node *r
     record->child_count = stage->index ? SIBLINGS : 0;
     record->level = stage->index;
     record->group = stage->group_base + stage->level->nodes[index].group;
+    const strl_node_claims *claims = &stage->level->nodes[index].claims;
+    record->geometric_min = claims->least;
+    record->geometric_max = claims->most;
+    record->group_geometric = claims->group;
 }
 
 static strl_status read_alone(const strl_level *level, const strl_node_state *state, strl_arena *arena, strl_pm *pm,
