@@ -130,13 +130,14 @@ static void coarsen_normals(strl_pm *pm)
 }
 
 /* Measured claims in place of chained ones: of the way from the mesh to the input the smaller counts; which input the node stands for
- * is decided by its pieces, so the way back is the measured one. */
-static void lower_errors(const strl_certificate *certificate, strl_pm *pm)
+ * is decided by its pieces, so the way back is the measured one. Both surfaces lie in one box: no claim passes its diagonal. */
+static void lower_errors(const strl_certificate *certificate, const strl_mesh *mesh, strl_pm *pm)
 {
+    float diagonal = mesh->most_error > 0 ? mesh->most_error : INFINITY;
     for (uint32_t i = 0; i <= pm->step_count; i++) {
         float *error = &pm->geometric_error[pm->step_count - i];
         if (isfinite(certificate->down[i]))
-            *error = fmaxf(certificate->down[i], fminf(certificate->up[i], *error));
+            *error = fminf(fmaxf(certificate->down[i], fminf(certificate->up[i], *error)), diagonal);
     }
 }
 
@@ -152,7 +153,7 @@ static strl_status certify(const strl_node_mesh *node, const strl_anchors *ancho
         memcpy(piece + own, anchors->beside.item, beside * sizeof *piece);
     strl_status status = strl_certify(&node->mesh, simplified, &(strl_older){piece, own, own + beside, anchors->granted}, arena, certificate, err);
     if (!status)
-        lower_errors(certificate, pm);
+        lower_errors(certificate, &node->mesh, pm);
     return status;
 }
 
