@@ -71,7 +71,7 @@ strl_status strl_pieces_read(const void *data, size_t size, const int64_t moved[
     memcpy(to, bytes, (size_t)count * sizeof *to);
     for (uint32_t i = 0; i < count; i++)
         for (unsigned k = 0; k < 9; k++)
-            to[i].corner[k / 3][k % 3] += (int32_t)moved[k % 3];
+            to[i].corner[k / 3][k % 3] = (int32_t)((uint32_t)to[i].corner[k / 3][k % 3] + (uint32_t)moved[k % 3]);
     pieces->count += count;
     return STRL_OK;
 }
@@ -80,8 +80,9 @@ bool strl_anchors_bear(const strl_mesh *base, const strl_certificate *certificat
 {
     for (uint32_t t = 0; t < base->triangle_count; t++) {
         strl_piece piece = {.claim = strl_mesh_error(base, strl_drift_length(&base->drift[t]))};
-        if (certificate && isfinite(certificate->triangle_down[t]))
-            piece.claim = fmaxf(certificate->triangle_down[t], fminf(certificate->triangle_up[t], piece.claim));
+        if (certificate)
+            piece.claim = strl_mesh_error(base, fmaxf(certificate->triangle_down[t],
+                                                      fminf(certificate->triangle_up[t], piece.claim)));
         for (unsigned c = 0; c < 3; c++)
             memcpy(piece.corner[c], base->position[base->wedge[base->triangle[t][c]].point], sizeof piece.corner[c]);
         if (!add_piece(born, &piece))

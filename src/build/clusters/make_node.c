@@ -136,8 +136,7 @@ static void lower_errors(const strl_certificate *certificate, const strl_mesh *m
     float diagonal = mesh->most_error > 0 ? mesh->most_error : INFINITY;
     for (uint32_t i = 0; i <= pm->step_count; i++) {
         float *error = &pm->geometric_error[pm->step_count - i];
-        if (isfinite(certificate->down[i]))
-            *error = fminf(fmaxf(certificate->down[i], fminf(certificate->up[i], *error)), diagonal);
+        *error = fminf(fmaxf(certificate->down[i], fminf(certificate->up[i], *error)), diagonal);
     }
 }
 
