@@ -5,6 +5,7 @@
 
 #include "base/fail.h"
 #include "geometry/near.h"
+#include "store/pack.h"
 
 #define EARLY_FIRST 3u  /* below, what is claimed without certificates is tight, and most of the triangles are there */
 #define FEW_LEVELS 4u   /* so far from the root certificates begin without --certify: the few levels where claims by drifts are loose */
@@ -20,10 +21,16 @@
 
 /* ---- plan ---- */
 
-strl_anchor_plan strl_anchor_plan_of(uint32_t level, uint32_t depth, bool certify)
+uint32_t strl_anchor_first_level(uint32_t depth, bool certify)
 {
     uint32_t late = depth > FEW_LEVELS ? depth - FEW_LEVELS : depth / 2;
-    uint32_t early = late > EARLY_FIRST ? EARLY_FIRST : late - (late > 0), first = certify ? early : late;
+    uint32_t early = late > EARLY_FIRST ? EARLY_FIRST : late - (late > 0);
+    return certify ? early : late;
+}
+
+strl_anchor_plan strl_anchor_plan_of(uint32_t level, uint32_t depth, bool certify)
+{
+    uint32_t first = strl_anchor_first_level(depth, certify);
     bool are_few = 1u << (depth - level) <= FEW_NODES;
     return (strl_anchor_plan){.begins = level == first && level < depth, .measures = level > first,
                               .crowd = level == depth ? 0 : are_few ? FEW_CROWD : CROWD};
@@ -52,26 +59,65 @@ static bool add_piece(strl_pieces *pieces, const strl_piece *piece)
     return true;
 }
 
+/* What numbers of pieces are like: the way from piece to piece, from corner to corner, and claims. */
+typedef struct piece_models {
+    strl_pack_model corner[3][3], claim_repeats, claim;
+} piece_models;
+
 void strl_pieces_write(const strl_pieces *pieces, strl_writer *writer)
 {
+    strl_packer packer = {.out = writer};
+    piece_models m = {0};
+    strl_piece last = {0};
+    uint32_t last_claim = 0;
     strl_writer_u32(writer, pieces->count);
-    strl_writer_bytes(writer, pieces->item, pieces->count * sizeof *pieces->item);
+    for (uint32_t i = 0; i < pieces->count; i++) {
+        const strl_piece *piece = &pieces->item[i];
+        uint32_t claim;
+        memcpy(&claim, &piece->claim, sizeof claim);
+        for (unsigned c = 0; c < 3; c++)
+            for (unsigned k = 0; k < 3; k++) {
+                uint32_t from = (uint32_t)(c ? piece->corner[c - 1][k] : last.corner[2][k]);
+                strl_pack(&packer, &m.corner[c][k], strl_pack_zigzag((uint32_t)piece->corner[c][k] - from));
+            }
+        strl_pack(&packer, &m.claim_repeats, claim != last_claim);
+        if (claim != last_claim)
+            strl_pack(&packer, &m.claim, strl_pack_zigzag(claim - last_claim));
+        last = *piece;
+        last_claim = claim;
+    }
+    strl_pack_finish(&packer);
+}
+
+static void unpack_pieces(strl_unpacker *unpacker, uint32_t count, const int64_t moved[3], strl_piece *to)
+{
+    piece_models m = {0};
+    uint32_t at[3] = {0}, claim = 0;
+    for (uint32_t i = 0; i < count; i++) {
+        for (unsigned c = 0; c < 3; c++)
+            for (unsigned k = 0; k < 3; k++) {
+                at[k] += strl_unpack_zigzag(strl_unpack(unpacker, &m.corner[c][k]));
+                to[i].corner[c][k] = (int32_t)(at[k] + (uint32_t)moved[k]);
+            }
+        if (strl_unpack(unpacker, &m.claim_repeats))
+            claim += strl_unpack_zigzag(strl_unpack(unpacker, &m.claim));
+        memcpy(&to[i].claim, &claim, sizeof claim);
+    }
 }
 
 strl_status strl_pieces_read(const void *data, size_t size, const int64_t moved[3], strl_pieces *pieces, strl_error *err)
 {
     strl_cursor cursor = strl_cursor_make(data, size);
     uint32_t count = strl_cursor_u32(&cursor);
-    const uint8_t *bytes = strl_cursor_take(&cursor, (size_t)count * sizeof(strl_piece));
-    if (!bytes || strl_cursor_left(&cursor) || count > UINT32_MAX - pieces->count)
+    /* a piece takes ten bits at least, so a damaged count costs no more memory than some times the bytes read */
+    if (cursor.failed || count > strl_cursor_left(&cursor) || count > UINT32_MAX - pieces->count)
         return strl__fail(err, STRL_ERR_INTERNAL, "a node's anchors are %zu bytes, not what %u pieces are", size, count);
     if (!strl__grow(&pieces->item, &pieces->capacity, (size_t)pieces->count + count, sizeof *pieces->item))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %u pieces", count);
-    strl_piece *to = pieces->item + pieces->count;
-    memcpy(to, bytes, (size_t)count * sizeof *to);
-    for (uint32_t i = 0; i < count; i++)
-        for (unsigned k = 0; k < 9; k++)
-            to[i].corner[k / 3][k % 3] = (int32_t)((uint32_t)to[i].corner[k / 3][k % 3] + (uint32_t)moved[k % 3]);
+    strl_unpacker unpacker = strl_unpacker_make((const uint8_t *)data + cursor.at, size - cursor.at);
+    unpack_pieces(&unpacker, count, moved, pieces->item + pieces->count);
+    if (unpacker.failed)
+        return strl__fail(err, STRL_ERR_INTERNAL, "a node's anchors in scratch are cut off or damaged");
     pieces->count += count;
     return STRL_OK;
 }

@@ -35,7 +35,8 @@ typedef struct strl_anchor_plan {
     uint32_t crowd; /* so many pieces for each triangle of a base mesh, and that becomes the anchors in their place; 0 = never */
 } strl_anchor_plan;
 
-/* certify: from as low a level as pays; else near the root only. */
+/* Whose base meshes become the first anchors. certify: as low a level as pays; else near the root. */
+uint32_t strl_anchor_first_level(uint32_t depth, bool certify);
 strl_anchor_plan strl_anchor_plan_of(uint32_t level, uint32_t depth, bool certify);
 
 void strl_anchors_deinit(strl_anchors *anchors);

@@ -51,7 +51,7 @@ static strl_status take_stream(strl_build_context *context, const char *name, st
 
 static bool has_anchors(const strl_hierarchy *hierarchy, uint32_t index)
 {
-    strl_anchor_plan plan = strl_anchor_plan_of(index, hierarchy->partition->depth, hierarchy->context->desc->certify);
+    strl_anchor_plan plan = strl_hierarchy_anchor_plan(hierarchy, index);
     return plan.measures || plan.begins;
 }
 

@@ -7,6 +7,31 @@
 /* Of what children claim: a piece that reaches beyond its member's boundary by so little may be measured there. */
 #define TOLERANCE 0.5
 
+/* Claims of no more lattice units, some times what rounding costs, are left as they are: flat places, where drifts do not grow and what
+ * pieces lose at boundaries would count. */
+#define SMALL_CLAIM 4.f
+/* For each triangle: a soup is no surface to measure. */
+#define MOST_POINTS 2u
+
+strl_anchor_plan strl_hierarchy_anchor_plan(const strl_hierarchy *hierarchy, uint32_t level)
+{
+    uint32_t depth = hierarchy->partition->depth;
+    bool certify = hierarchy->context->desc->certify;
+    uint32_t first = strl_anchor_first_level(depth, certify);
+    float claim = first == 0 ? INFINITY : 0;
+    uint64_t points = 0, triangles = 0;
+    if (level < first)
+        return (strl_anchor_plan){0};
+    for (uint32_t i = 0; first > 0 && i < hierarchy->levels[first - 1].count; i++) {
+        const strl_node_state *state = &hierarchy->levels[first - 1].nodes[i];
+        claim = fmaxf(claim, state->claims.most);
+        points += state->point_count;
+        triangles += state->record.base_triangle_count;
+    }
+    bool is_worth_it = claim > SMALL_CLAIM && points <= MOST_POINTS * triangles;
+    return is_worth_it ? strl_anchor_plan_of(level, depth, certify) : (strl_anchor_plan){0};
+}
+
 static strl_status read_anchors(const strl_level *children, uint32_t index, const int64_t origin[3], strl_arena *arena,
                                 strl_pieces *all, strl_error *err)
 {

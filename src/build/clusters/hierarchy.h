@@ -96,6 +96,8 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
 strl_status strl_take_node(strl_hierarchy *hierarchy, strl_level *level, uint32_t self, strl_made_node *made,
                            strl_error *err);
 
+/* What happens at a level; those below must be done. */
+strl_anchor_plan strl_hierarchy_anchor_plan(const strl_hierarchy *hierarchy, uint32_t level);
 /* The anchors of a group's children, given to its `count` members: shares[i] is member i's. owner: of the merged mesh's triangles. */
 strl_status strl_group_anchors(const strl_level *children, const uint32_t *member, uint32_t count, const strl_node_mesh *merged,
                                const uint32_t *owner, strl_arena *arena, strl_anchors *shares, strl_error *err);
