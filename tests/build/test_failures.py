@@ -6,7 +6,7 @@ import signal
 import subprocess
 import time
 
-from building import STROLL, assert_refused, build, must, run, run_tests, write_box_stl, write_grid_obj
+from building import STROLL, assert_refused, build, must, run, run_tests, sanitizers, write_box_stl, write_grid_obj
 
 OLDER = b"an older container"
 PATIENCE_S = 600  # a machine may be slow; what waits longer hangs
@@ -152,10 +152,13 @@ def files_of_others_in_the_scratch_folder_stay(folder):
 
 
 # ---- stopped on the way ----
+LONG = "100K" if sanitizers() else "400K"  # long enough to be stopped in any stage
+
+
 def start_long_build(folder, out):
     source = os.path.join(folder, "long.ply")
     if not os.path.exists(source):
-        must("scene", "isosurface", "--triangles", "400K", "-o", source, "--quiet")
+        must("scene", "isosurface", "--triangles", LONG, "-o", source, "--quiet")
     child = subprocess.Popen([STROLL, "build", source, "-o", out], stdout=subprocess.PIPE,
                              stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + PATIENCE_S

@@ -155,6 +155,8 @@ static void test_a_truncated_file_is_found(void **state)
 
 #if defined(__SANITIZE_THREAD__)
 #define DAMAGED_FILES 12 /* they are read by one thread */
+#elif defined(__SANITIZE_ADDRESS__)
+#define DAMAGED_FILES 60
 #else
 #define DAMAGED_FILES 120
 #endif
