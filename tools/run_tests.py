@@ -22,7 +22,8 @@ BUILD = ROOT / "build"
 # Folders of tests/ whose modules start threads or are called from several; none of them needs a GL driver, whose own
 # threads ThreadSanitizer cannot see into.
 # Loops over failures and shapes that put no thread to a use which test_build does not.
-SLOW_UNDER_TSAN = ("test_build_faults", "test_build_root", "test_build_cuts", "test_simplify", "test_simplify_shape")
+SLOW_UNDER_TSAN = ("test_build_certify", "test_build_faults", "test_build_root", "test_build_cuts", "test_certify",
+                   "test_simplify", "test_simplify_shape")
 THREADED_AREAS = ("platform", "jobs", "store", "source", "container", "build", "walk", "verify")
 
 STAGES = {

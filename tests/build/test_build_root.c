@@ -15,7 +15,7 @@
 #define SMALLER 10u
 #define MOST_SECONDS 300
 #else
-#define SMALLER 1u
+#define SMALLER 2u
 #define MOST_SECONDS 60
 #endif
 

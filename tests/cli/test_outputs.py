@@ -17,6 +17,8 @@ import traceback
 STROLL = os.path.abspath(sys.argv[1])
 ROOT = os.geteuid() == 0
 PATIENCE_S = 600
+with open(STROLL, "rb") as program:
+    IS_SANITIZED = b"__asan_init" in program.read()
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
@@ -448,20 +450,22 @@ def a_full_standard_output_is_one_sentence(folder, writers):
         assert done.returncode == 1 and done.stderr.count("\n") == 1, done
 
 
+FILES = (what_is_no_place_for_a_file_is_refused_before_any_work, a_folder_is_no_file, without_rights_nothing_is_begun,
+         images_go_to_a_png_or_into_a_folder, an_empty_input_is_named, a_link_is_followed_and_stays,
+         files_with_names_of_helpers_stay, a_foreign_scratch_folder_is_refused_and_stays,
+         what_came_into_a_scratch_folder_meanwhile_stays, a_scratch_option_names_the_place_and_is_made_for_the_time,
+         a_full_standard_output_is_one_sentence)
+# Many commands that are long enough to be stopped.
+SIGNALLED = (what_a_killed_build_left_is_taken_over, a_signal_leaves_nothing_behind, stopped_images_are_whole,
+             verify_and_compare_end_by_signals, what_was_ignored_before_stays_so, a_second_ctrl_c_ends_the_process)
+
+
 def main():
     failed = 0
     with tempfile.TemporaryDirectory(prefix="stroll-outputs-") as data:
         os.chmod(data, 0o755)
         writers = make_writers(data)
-        for test in (what_is_no_place_for_a_file_is_refused_before_any_work, a_folder_is_no_file,
-                     without_rights_nothing_is_begun, images_go_to_a_png_or_into_a_folder, an_empty_input_is_named,
-                     a_link_is_followed_and_stays, files_with_names_of_helpers_stay,
-                     a_foreign_scratch_folder_is_refused_and_stays, what_a_killed_build_left_is_taken_over,
-                     what_came_into_a_scratch_folder_meanwhile_stays,
-                     a_scratch_option_names_the_place_and_is_made_for_the_time, a_signal_leaves_nothing_behind,
-                     stopped_images_are_whole, verify_and_compare_end_by_signals,
-                     what_was_ignored_before_stays_so, a_second_ctrl_c_ends_the_process,
-                     a_full_standard_output_is_one_sentence):
+        for test in FILES + (() if IS_SANITIZED else SIGNALLED):
             with tempfile.TemporaryDirectory(prefix="stroll-outputs-") as folder:
                 start = time.monotonic()
                 try:
