@@ -205,6 +205,8 @@ def fill(path):
             pass
 
 
+if sanitizers():  # what reads scratch; the rest is the program's order of work, the same without them
+    run_tests(killed_at_random_moments_it_resumes, damage_is_found)
 run_tests(killed_at_random_moments_it_resumes, killed_while_it_writes_it_resumes,
           interrupted_it_keeps_what_is_finished, with_nothing_to_resume_it_begins, of_a_small_model_nothing_is_kept, without_resume_it_begins_anew,
           what_was_not_saved_is_cut_off_or_removed, damage_is_found, another_request_is_refused,
