@@ -16,9 +16,10 @@
 #define HEIGHT 720u
 
 /* begin: shaders */
-/* A vertex reaches the shader as integers. anchor - eye cell (64 bits, in two words) plus the vertex's offset is added exactly,
- * and only the sum becomes a float: two nodes that share a vertex get the same bits, so there is no crack between them, and near
- * the eye, where it matters, the sum is small and the float exact. */
+/* A vertex reaches the shader as integers. anchor - eye cell (64 bits, in two words) plus the vertex's
+ * offset is added exactly, and only the sum becomes a float: two nodes that share a vertex get the same
+ * bits, so there is no crack between them, and near the eye, where it matters, the sum is small and the
+ * float exact. */
 static const char vertex_shader[] =
     "#version 330 core\n"
     "layout(location = 0) in ivec3 position;\n"
@@ -97,9 +98,11 @@ typedef struct drawer {
 /* begin: context */
 static strl_status create_context(drawer *d, strl_error *err)
 {
-    static const EGLint config_wanted[] = {EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_SURFACE_TYPE, EGL_DONT_CARE, EGL_NONE};
-    static const EGLint context_wanted[] = {EGL_CONTEXT_MAJOR_VERSION, 3, EGL_CONTEXT_MINOR_VERSION, 3,
-                                            EGL_CONTEXT_OPENGL_PROFILE_MASK, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
+    static const EGLint config_wanted[] = {EGL_RENDERABLE_TYPE, EGL_OPENGL_BIT, EGL_SURFACE_TYPE, EGL_DONT_CARE,
+                                           EGL_NONE};
+    static const EGLint context_wanted[] = {
+        EGL_CONTEXT_MAJOR_VERSION,           3,       EGL_CONTEXT_MINOR_VERSION, 3, EGL_CONTEXT_OPENGL_PROFILE_MASK,
+        EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT, EGL_NONE};
     EGLConfig config;
     EGLint count = 0;
     d->display = eglGetPlatformDisplayEXT(EGL_PLATFORM_SURFACELESS_MESA, EGL_DEFAULT_DISPLAY, NULL);
@@ -187,7 +190,8 @@ static gpu_node *add_node(drawer *d, const strl_draw_item *item)
     glGenBuffers(1, &node->vertices);
     glGenBuffers(1, &node->indices);
     glBindBuffer(GL_ARRAY_BUFFER, node->vertices);
-    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(item->vertex_count * sizeof *item->vertices), item->vertices, GL_STATIC_DRAW);
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)(item->vertex_count * sizeof *item->vertices), item->vertices,
+                 GL_STATIC_DRAW);
     glVertexAttribIPointer(0, 3, GL_INT, sizeof(strl_vertex), (void *)offsetof(strl_vertex, position));
     glVertexAttribIPointer(1, 2, GL_UNSIGNED_SHORT, sizeof(strl_vertex), (void *)offsetof(strl_vertex, normal));
     glVertexAttribPointer(2, 4, GL_UNSIGNED_BYTE, GL_TRUE, sizeof(strl_vertex), (void *)offsetof(strl_vertex, rgba));
@@ -205,14 +209,15 @@ static void upload_indices(drawer *d, gpu_node *node, const strl_draw_item *item
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, node->indices);
     if (item->index_count > node->index_capacity) {
         node->index_capacity = item->index_count + item->index_count / 2;
-        glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)(node->index_capacity * sizeof(uint16_t)), NULL, GL_DYNAMIC_DRAW);
+        glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)(node->index_capacity * sizeof(uint16_t)), NULL,
+                     GL_DYNAMIC_DRAW);
         whole = true;
     }
     if (whole)
         first = 0, count = item->index_count;
     if (count)
-        glBufferSubData(GL_ELEMENT_ARRAY_BUFFER, (GLintptr)(first * sizeof(uint16_t)), (GLsizeiptr)(count * sizeof(uint16_t)),
-                        item->indices + first);
+        glBufferSubData(GL_ELEMENT_ARRAY_BUFFER, (GLintptr)(first * sizeof(uint16_t)),
+                        (GLsizeiptr)(count * sizeof(uint16_t)), item->indices + first);
     node->frame = frame;
     d->uploaded_bytes += count * sizeof(uint16_t);
 }
@@ -297,7 +302,8 @@ static void find_eye_cell(const strl_draw_item *item, const double eye[3], doubl
 
 /* With c a vertex's cell and r the eye's, both integers:
  *     view = V L step (c - r)  +  V (L (origin + step r) + t - eye)
- * where L and t are the placement and V the camera's axes. The first part is the shader's; the second is small and made here. */
+ * where L and t are the placement and V the camera's axes. The first part is the shader's; the second is
+ * small and made here. */
 static void place(const drawer *d, const strl_camera *camera, const view_basis *basis, const strl_draw_item *item)
 {
     const double *m = item->transform;
@@ -341,8 +347,8 @@ static strl_status draw(drawer *d, const strl_camera *camera, const strl_draw_li
     glClearColor(0.1f, 0.11f, 0.13f, 1);
     glClear(GL_COLOR_BUFFER_BIT | GL_DEPTH_BUFFER_BIT);
     glUseProgram(d->program);
-    glUniform4f(d->projection, (GLfloat)(1 / basis.tan_x), (GLfloat)(1 / basis.tan_y), (GLfloat)((far + near) / (far - near)),
-                (GLfloat)(-2 * far * near / (far - near)));
+    glUniform4f(d->projection, (GLfloat)(1 / basis.tan_x), (GLfloat)(1 / basis.tan_y),
+                (GLfloat)((far + near) / (far - near)), (GLfloat)(-2 * far * near / (far - near)));
     for (uint32_t i = 0; i < list->count; i++) {
         const strl_draw_item *item = &list->items[i];
         if (!item->visible)

@@ -46,8 +46,8 @@ static strl_status walk_round(strl_walk *walk, strl_renderer *renderer, strl_err
             status = strl_renderer_draw(renderer, &camera, &list, NULL, &drawn, err);
         if (status != STRL_OK)
             return status;
-        printf("frame %d: %" PRIu32 " nodes, %" PRIu64 " triangles, %" PRIu32 " nodes still coarser than wanted\n", frame,
-               drawn.items, drawn.triangles, strl_walk_get_stats(walk)->missing_nodes);
+        printf("frame %d: %" PRIu32 " nodes, %" PRIu64 " triangles, %" PRIu32 " nodes still coarser than wanted\n",
+               frame, drawn.items, drawn.triangles, strl_walk_get_stats(walk)->missing_nodes);
         strl_walk_pump(walk, 4000000); /* 4 ms for decoding what has been read */
     }
     return STRL_OK;
@@ -78,8 +78,8 @@ static strl_status print_list(strl_walk *walk, const strl_draw_list *list, strl_
         strl_status status = STRL_OK;
         uint32_t *parts = malloc(item->vertex_count * sizeof *parts);
         if (parts)
-            status = strl_container_vertex_parts(strl_walk_container(walk), item->placement, item->node, item->vertex_count,
-                                                 parts, NULL, err);
+            status = strl_container_vertex_parts(strl_walk_container(walk), item->placement, item->node,
+                                                 item->vertex_count, parts, NULL, err);
         if (parts && status == STRL_OK)
             status = strl_container_part(strl_walk_container(walk), parts[item->indices[0]], name, sizeof name, err);
         free(parts);

@@ -164,7 +164,8 @@ static strl_status walk_within(const char *path, uint64_t first, workers *w, uin
     }
     if (status == STRL_OK) {
         const strl_walk_stats *stats = strl_walk_get_stats(walk);
-        printf("budget %" PRIu64 " KiB: holds %" PRIu64 " KiB, %" PRIu64 " triangles; wanted 0.5 pixels, allowed %.2f\n",
+        printf("budget %" PRIu64 " KiB: holds %" PRIu64 " KiB, %" PRIu64
+               " triangles; wanted 0.5 pixels, allowed %.2f\n",
                memory_bytes >> 10, stats->resident_bytes >> 10, stats->triangles, stats->allowed_error_px);
     }
     strl_walk_close(walk); /* before the workers stop */
@@ -183,7 +184,8 @@ int main(int argc, char **argv)
     }
     uint64_t first = strtoull(argv[2], NULL, 10);
     strl_status status = start(&w, &err);
-    for (uint64_t memory_bytes = (uint64_t)64 << 20; status == STRL_OK && memory_bytes >= (uint64_t)2 << 20; memory_bytes /= 4)
+    for (uint64_t memory_bytes = (uint64_t)64 << 20; status == STRL_OK && memory_bytes >= (uint64_t)2 << 20;
+         memory_bytes /= 4)
         status = walk_within(argv[1], first, &w, memory_bytes, &err);
     stop(&w);
     if (status != STRL_OK)

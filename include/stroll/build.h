@@ -1,6 +1,6 @@
-/* Building a container from input files, under a memory budget, out of core from the first byte. It is in a library of its own,
- * libstroll_build (CMake: the component build, target stroll::build; pkg-config: stroll-build), because who walks through models
- * needs none of what reads and partitions them. */
+/* Building a container from input files, under a memory budget, out of core from the first byte. It is in a
+ * library of its own, libstroll_build (CMake: the component build, target stroll::build; pkg-config:
+ * stroll-build), because who walks through models needs none of what reads and partitions them. */
 #ifndef STROLL_BUILD_H
 #define STROLL_BUILD_H
 
@@ -50,16 +50,16 @@ typedef struct strl_build_desc {
     int up_axis;            /* 1 x, 2 y, 3 z; 0 = the inputs' own */
     const char *unit;       /* NULL = unknown */
     bool certify;           /* measure what nodes claim, and claim no more */
-    /* A build that is stopped leaves its scratch folder, with the stages that are finished, for a later one that resumes.
-     * Not set: nothing is left. */
+    /* A build that is stopped leaves its scratch folder, with the stages that are finished, for a later one
+     * that resumes. Not set: nothing is left. */
     bool keep;
     uint64_t keep_triangles; /* of models of fewer nothing is kept: they are built at once; 0 = 65,536 */
     bool resume; /* goes on with what an earlier build of the same request has left, if anything; keeps, too */
     bool no_dependencies;   /* for measuring what dependencies bring: every group has one member */
     /* Called on the caller's thread, often; false cancels. May be NULL. */
     bool (*progress)(void *context, const strl_build_progress *progress);
-    /* Told on the caller's thread, once for each thing amiss that does not stop the build; the sentence is borrowed for the
-     * call. May be NULL; the result has the counts. */
+    /* Told on the caller's thread, once for each thing amiss that does not stop the build; the sentence is
+     * borrowed for the call. May be NULL; the result has the counts. */
     void (*warn)(void *context, const char *sentence);
     /* Told on the caller's thread, once, before the inputs are read. May be NULL. */
     void (*estimate)(void *context, const strl_build_estimate *estimate);
@@ -81,13 +81,15 @@ typedef struct strl_build_result {
     bool scratch_kept; /* of a failed build: there is something to resume */
 } strl_build_result;
 
-/* Builds the structure of clusters. Works on threads of its own, desc->jobs at most, and returns when they are done; several builds
- * at a time are legal, of different outputs. What desc points at is borrowed for the call. result is filled in as far as the
- * build came, also on failure. Fails with STRL_ERR_UNSUPPORTED, STRL_ERR_FORMAT where an input cannot be read, STRL_ERR_LIMIT where
- * memory or scratch do not suffice, STRL_ERR_DISK_FULL, STRL_ERR_IO, STRL_ERR_CANCELLED.
+/* Builds the structure of clusters. Works on threads of its own, desc->jobs at most, and returns when they
+ * are done; several builds at a time are legal, of different outputs. What desc points at is borrowed for
+ * the call. result is filled in as far as the build came, also on failure. Fails with STRL_ERR_UNSUPPORTED,
+ * STRL_ERR_FORMAT where an input cannot be read, STRL_ERR_LIMIT where memory or scratch do not suffice,
+ * STRL_ERR_DISK_FULL, STRL_ERR_IO, STRL_ERR_CANCELLED.
  *
- * Writes desc->output, which appears only when whole. On failure nothing is left of it but what desc->keep asks for, and
- * an older file of that name stays. The bytes are the same whether the build was stopped and resumed, however often, or not. */
+ * Writes desc->output, which appears only when whole. On failure nothing is left of it but what desc->keep
+ * asks for, and an older file of that name stays. The bytes are the same whether the build was stopped and
+ * resumed, however often, or not. */
 STRL_API strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err);
 
 #ifdef __cplusplus

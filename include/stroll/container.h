@@ -1,6 +1,6 @@
-/* What a container (one .stroll file) says of its model: facts, names, placements. Every call here but those that only look may
- * wait for the source: for opening, for tools and for a click of the mouse, never inside a frame.
- * docs/format.md is the format. One thread at a time. */
+/* What a container (one .stroll file) says of its model: facts, names, placements. Every call here but
+ * those that only look may wait for the source: for opening, for tools and for a click of the mouse, never
+ * inside a frame. docs/format.md is the format. One thread at a time. */
 #ifndef STROLL_CONTAINER_H
 #define STROLL_CONTAINER_H
 
@@ -38,8 +38,8 @@ typedef struct strl_placement {
 
 typedef struct strl_container strl_container;
 
-/* Reads at most 128 KiB. Owns the source from then on, also on failure. Fails with STRL_ERR_FORMAT where it is no container or a
- * broken one, with STRL_ERR_UNSUPPORTED where its version is another. */
+/* Reads at most 128 KiB. Owns the source from then on, also on failure. Fails with STRL_ERR_FORMAT where it
+ * is no container or a broken one, with STRL_ERR_UNSUPPORTED where its version is another. */
 STRL_API strl_status strl_container_open(strl_source *source, strl_container **container, strl_error *err);
 /* A path, opened as a file source with inline reads. */
 STRL_API strl_status strl_container_open_path(const char *path, strl_container **container, strl_error *err);
@@ -58,10 +58,11 @@ STRL_API strl_status strl_container_part(strl_container *container, uint32_t par
 STRL_API strl_status strl_container_material(strl_container *container, uint32_t material, char *name, size_t size,
                                              uint32_t *rgba, strl_error *err);
 
-/* Which part and material each vertex of a draw item is of: placement, node and vertex_count are the item's. parts and
- * materials take vertex_count numbers each; NULL is legal. The three corners of a triangle may be of different parts only where
- * simplification has merged these; the first stands for it. Reads and decodes the node anew, and those above it where it is
- * told by them, in memory of the container's own. */
+/* Which part and material each vertex of a draw item is of: placement, node and vertex_count are the
+ * item's. parts and materials take vertex_count numbers each; NULL is legal. The three corners of a
+ * triangle may be of different parts only where simplification has merged these; the first stands for it.
+ * Reads and decodes the node anew, and those above it where it is told by them, in memory of the
+ * container's own. */
 STRL_API strl_status strl_container_vertex_parts(strl_container *container, uint32_t placement, uint32_t node,
                                                  uint32_t vertex_count, uint32_t *parts, uint32_t *materials,
                                                  strl_error *err);

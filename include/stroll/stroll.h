@@ -1,4 +1,5 @@
-/* All of Stroll. A program that embeds a walk links libstroll; strl_build_* is in libstroll_build (stroll/build.h). */
+/* All of Stroll. A program that embeds a walk links libstroll; strl_build_* is in libstroll_build
+ * (stroll/build.h). */
 #ifndef STROLL_STROLL_H
 #define STROLL_STROLL_H
 

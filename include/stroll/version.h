@@ -1,5 +1,5 @@
-/* The version, in this one place: the build reads it from here. Until 1.0 a new minor version may change any declaration, and
- * the shared library has another soname then; a new patch version changes none. */
+/* The version, in this one place: the build reads it from here. Until 1.0 a new minor version may change
+ * any declaration, and the shared library has another soname then; a new patch version changes none. */
 #ifndef STROLL_VERSION_H
 #define STROLL_VERSION_H
 

@@ -28,8 +28,8 @@ strl_status strl_container_vertex_parts(strl_container *container, uint32_t plac
         status = strl_container_node(container, placed.tree, node, &record, err);
     if (status == STRL_OK && record.vertex_count != vertex_count)
         status = strl__fail(err, STRL_ERR_ARGUMENT,
-                            "node %" PRIu32 " of placement %" PRIu32 " has %" PRIu32 " vertices, asked for %" PRIu32, node,
-                            placement, record.vertex_count, vertex_count);
+                            "node %" PRIu32 " of placement %" PRIu32 " has %" PRIu32 " vertices, asked for %" PRIu32,
+                            node, placement, record.vertex_count, vertex_count);
     if (status == STRL_OK)
         status = strl_container_mesh(container, placed.tree, &record, &arena, &mesh, err);
     if (status == STRL_OK)

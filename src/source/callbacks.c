@@ -19,8 +19,9 @@ static strl_status callback_read(strl_source *source, uint64_t offset, void *dat
     if (status == STRL_OK)
         return STRL_OK;
     own.message[sizeof own.message - 1] = 0;
-    return own.message[0] ? strl__fail(err, status, "%s", own.message)
-                          : strl__fail(err, status, "the callback could not read %zu bytes at byte %" PRIu64, size, offset);
+    return own.message[0]
+               ? strl__fail(err, status, "%s", own.message)
+               : strl__fail(err, status, "the callback could not read %zu bytes at byte %" PRIu64, size, offset);
 }
 
 static void release(callback_source *self)

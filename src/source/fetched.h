@@ -1,5 +1,6 @@
-/* What sources share whose class can read and wait: queued reads are served by that, on threads of the source's own or inside
- * poll. Each accepted read puts one job into the pool; a job serves whichever waiting read is the most urgent when it starts. */
+/* What sources share whose class can read and wait: queued reads are served by that, on threads of the
+ * source's own or inside poll. Each accepted read puts one job into the pool; a job serves whichever
+ * waiting read is the most urgent when it starts. */
 #ifndef STRL_SOURCE_FETCHED_H
 #define STRL_SOURCE_FETCHED_H
 

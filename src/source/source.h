@@ -1,5 +1,5 @@
-/* What is behind stroll/source.h: a walk polls a source and never waits; it cannot tell sources apart. A source belongs to one
- * thread (the walk's) and may use threads of its own behind this interface. */
+/* What is behind stroll/source.h: a walk polls a source and never waits; it cannot tell sources apart. A
+ * source belongs to one thread (the walk's) and may use threads of its own behind this interface. */
 #ifndef STRL_SOURCE_SOURCE_H
 #define STRL_SOURCE_SOURCE_H
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Manual pages and shell completion say what --help says: every command, every option, no other. The help is read here in another
-way than tools/manual.py reads it.
+"""Manual pages and shell completion say what --help says: every command, every option, no other. The help is read
+here in another way than tools/manual.py reads it.
 
 usage: test_manual.py PROGRAM      in the folder of the build"""
 import pathlib
@@ -45,7 +45,8 @@ def pages_have_each_option(command, options):
     page = (MANUAL / f"man/stroll-{command}.1").read_text().replace("\\-", "-")
     part = page.partition(".SH OPTIONS\n")[2].partition("\n.SH ")[0]
     lines = [line for line in part.split("\n") if line.startswith("\\fB-")]
-    found = {re.search(r"\\fB(--[a-z0-9-]+)", line)[1]: (re.match(r"\\fB(-\w)\\fR, ", line) or [None, None])[1] for line in lines}
+    found = {re.search(r"\\fB(--[a-z0-9-]+)", line)[1]: (re.match(r"\\fB(-\w)\\fR, ", line) or [0, None])[1]
+             for line in lines}
     check(f"stroll-{command}.1 has the options of --help", found == options, (found, options))
     check(f"stroll-{command}.1 explains each option", all(text.strip() for text in re.split(r"\n?\.TP\n.*\n", part)[1:]), part)
 
@@ -65,7 +66,8 @@ def pages_are_well_formed():
         print("not looked at: what groff warns of (it is missing)")
         return
     for page in sorted(MANUAL.glob("man/*.1")):
-        result = subprocess.run(["groff", "-man", "-Tascii", "-ww", "-z", "-rLL=200n", page], stderr=subprocess.PIPE, text=True)
+        words = ["groff", "-man", "-Tascii", "-ww", "-z", "-rLL=200n", page]
+        result = subprocess.run(words, stderr=subprocess.PIPE, text=True)
         check(f"groff finds nothing amiss in {page.name}", result.returncode == 0 and not result.stderr, result.stderr)
 
 
@@ -92,7 +94,8 @@ def bash_offers_words(commands):
     check("bash offers the scenes", "isosurface" in bash_completes(["stroll", "scene", ""]))
     check("bash offers files for a model", bash_completes(["stroll", "info", "CMakeCach"]) == ["CMakeCache.txt"])
     check("bash offers files behind an option", bash_completes(["stroll", "build", "-o", "CMakeCach"]) == ["CMakeCache.txt"])
-    check("bash offers folders alone where one is wanted", bash_completes(["stroll", "build", "--scratch", "CMakeF"]) == ["CMakeFiles"])
+    found = bash_completes(["stroll", "build", "--scratch", "CMakeF"])
+    check("bash offers folders alone where one is wanted", found == ["CMakeFiles"], found)
 
 
 def texts_have_each_option(command, options):

@@ -10,7 +10,8 @@ int main(int argc, char **argv)
     strl_build_result result;
     if (argc != 3)
         return 2;
-    const strl_build_desc desc = {.inputs = (const char *const[]){argv[2]}, .input_count = 1, .output = argv[1], .jobs = 1};
+    const strl_build_desc desc = {
+        .inputs = (const char *const[]){argv[2]}, .input_count = 1, .output = argv[1], .jobs = 1};
     if (strl_build_clusters(&desc, &result, &err) != STRL_OK) {
         fprintf(stderr, "builder: %s: %s\n", strl_status_name(err.status), err.message);
         return 1;

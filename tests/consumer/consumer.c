@@ -1,5 +1,5 @@
-/* A program outside of Stroll's tree: walks ten frames through MODEL with the null renderer, reads the draw list, and prints the
- * error sentence of BROKEN. tests/install/test_install.py builds and runs it. */
+/* A program outside of Stroll's tree: walks ten frames through MODEL with the null renderer, reads the draw
+ * list, and prints the error sentence of BROKEN. tests/install/test_install.py builds and runs it. */
 #include <inttypes.h>
 #include <stdio.h>
 

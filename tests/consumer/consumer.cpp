@@ -4,10 +4,14 @@
 
 #include <stroll/stroll.h>
 
-namespace {
+namespace
+{
 
 struct walk_closer {
-    void operator()(strl_walk *walk) const { strl_walk_close(walk); }
+    void operator()(strl_walk *walk) const
+    {
+        strl_walk_close(walk);
+    }
 };
 using walk_pointer = std::unique_ptr<strl_walk, walk_closer>;
 

@@ -46,7 +46,8 @@ static void what_is_no_vertex_of_a_draw_item_is_refused(void **state)
     assert_int_equal(strl_container_vertex_parts(container, 0, 1, count + 1, parts, NULL, &err), STRL_ERR_ARGUMENT);
     assert_non_null(strstr(err.message, "node 1 of placement 0"));
     assert_int_equal(strl_container_vertex_parts(container, 1, 1, count, parts, NULL, &err), STRL_ERR_ARGUMENT);
-    assert_int_equal(strl_container_vertex_parts(container, 0, self.node_count, count, parts, NULL, &err), STRL_ERR_ARGUMENT);
+    assert_int_equal(strl_container_vertex_parts(container, 0, self.node_count, count, parts, NULL, &err),
+                     STRL_ERR_ARGUMENT);
     assert_int_equal(strl_container_vertex_parts(container, 0, 1, count, parts, NULL, &err), STRL_OK);
     strl_container_close(container);
     fixture_teardown(&self);
@@ -85,7 +86,8 @@ static void a_broken_container_is_named_whatever_it_is_read_from(void **state)
     assert_int_equal(fixture_write(&self, &err), STRL_OK);
     uint8_t *bytes = fixture_load(self.path, &size);
     bytes[100] ^= 1;
-    const strl_source_callbacks callbacks = {.name = "hall in pack.zip", .bytes = size, .context = bytes, .read = read_bytes};
+    const strl_source_callbacks callbacks = {
+        .name = "hall in pack.zip", .bytes = size, .context = bytes, .read = read_bytes};
     strl_source *source;
     strl_container *container;
     assert_int_equal(strl_source_open_callbacks(&callbacks, 0, &source, &err), STRL_OK);

@@ -45,11 +45,19 @@ class Test:
         first.rename(self.prefix)
         found = {path.name for path in self.prefix.rglob("*") if path.is_file()}
         version = self.run(self.prefix / "bin/stroll", "--version").split()[1]
-        for name in ("libstroll.a", "libstroll_build.a", f"libstroll.so.{version}", f"libstroll_build.so.{version}", "stroll.pc",
-                     "stroll-build.pc", "stroll-config.cmake", "stroll-config-version.cmake", "README.md", "embedding.md"):
+        for name in ("libstroll.a", "libstroll_build.a", f"libstroll.so.{version}", f"libstroll_build.so.{version}",
+                     "stroll.pc", "stroll-build.pc", "stroll-config.cmake", "stroll-config-version.cmake", "README.md",
+                     "stroll.1", "stroll-build.1", "_stroll", "stroll.fish"):
             self.check(f"{name} is installed", name in found, sorted(found))
-        self.check("every public header is installed", sorted(p.name for p in self.prefix.glob("include/stroll/*")) == HEADERS)
+        headers = sorted(path.name for path in self.prefix.glob("include/stroll/*"))
+        self.check("every public header is installed", headers == HEADERS, headers)
         self.version = version
+        guide = next(self.prefix.rglob("embedding.md")).parent
+        links = set(re.findall(r"\]\(([^)#:]+)\)", (guide / "embedding.md").read_text()))
+        missing = [link for link in links if not (guide / link).is_file()]
+        self.check("what the guide leads to is installed beside it", links and not missing, missing)
+        completion = self.prefix / "share/bash-completion/completions/stroll"
+        self.check("completion of bash has the program's name", completion.is_file())
 
     def honours_destdir(self):
         self.run("cmake", "--install", ".", "--prefix", "/opt/stroll", environment={"DESTDIR": str(self.folder / "stage")})
@@ -81,8 +89,8 @@ class Test:
         self.check(f"{way}: ten frames are walked and drawn", len(frames) == 10 and all(int(f[2]) for f in frames), out)
         self.check(f"{way}: the version is the program's", f"version {self.version}\n" in out, out)
         sentence = re.search(r"^broken: bad format: (.*)$", out, re.M)
-        self.check(f"{way}: a broken file is refused with a sentence that names it", sentence and str(self.broken) in sentence[1],
-                   out)
+        named = sentence and str(self.broken) in sentence[1]
+        self.check(f"{way}: a broken file is refused with a sentence that names it", named, out)
         out = self.run(folder / "consumer_cpp", self.model, self.broken, environment=environment)
         self.check(f"{way}: C++ opens the model", out.startswith(f"triangles {self.triangles}\nbroken: {self.broken}"), out)
         built = self.folder / "again.stroll"

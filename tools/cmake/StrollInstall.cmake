@@ -14,6 +14,8 @@ install(TARGETS stroll_static stroll_build_static EXPORT stroll-static
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development)
 install(DIRECTORY include/stroll DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development FILES_MATCHING PATTERN *.h)
 
+add_custom_target(stroll_package DEPENDS stroll stroll_shared stroll_static stroll_build_shared stroll_build_static)
+
 # ---- CMake: find_package(stroll)
 strl_needs_of(needs base platform jobs geometry source container frame walk render readers store build)
 set(STRL_PACKAGES "")
@@ -84,6 +86,7 @@ if(Python3_FOUND)
     COMMAND ${Python3_EXECUTABLE} ${CMAKE_SOURCE_DIR}/tools/manual.py --program $<TARGET_FILE:stroll> --out ${manual}
     COMMAND ${CMAKE_COMMAND} -E touch ${manual}/stamp)
   add_custom_target(manual ALL DEPENDS ${manual}/stamp)
+  add_dependencies(stroll_package manual)
   install(DIRECTORY ${manual}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program)
   install(FILES ${manual}/completion/stroll.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
     RENAME stroll COMPONENT program)
@@ -95,5 +98,5 @@ else()
 endif()
 
 install(FILES README.md CHANGELOG.md LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation)
-install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation
-  FILES_MATCHING PATTERN *.md PATTERN *.png PATTERN *.svg PATTERN guide/*.c)
+install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation
+  FILES_MATCHING REGEX "\\.(md|png|svg)$" REGEX "/guide/.*\\.[ch]$" PATTERN man EXCLUDE)
