@@ -98,7 +98,7 @@ class Test:
     # ---- the programs
 
     def makes_a_model(self):
-        self.run("stroll", "scene", "isosurface", "-n", "200K", "-o", self.mesh, "--quiet")
+        self.run("stroll", "scene", "isosurface", "-n", "60K", "-o", self.mesh, "--quiet")
         self.run("stroll", "build", self.mesh, "-o", self.model, "--quiet")
         self.info = json.loads(self.run("stroll", "info", "--json", self.model))
 
