@@ -30,7 +30,6 @@ Each record goes at once to --log (JSON lines). What is there of the same progra
 run that was stopped goes on; --again measures anew. --write-docs rewrites the tables of docs/benchmarks.md from the log
 and the rows of bench/results.csv, so that parts may be measured one after another."""
 import argparse
-import hashlib
 import json
 import math
 import pathlib
@@ -235,7 +234,7 @@ def part_bytes(bench, model):
     digests, container = {}, bench.scratch / f"{model}_jobs.stroll"
     for jobs in (1, 2, 3, 8):
         bench.program("build", bench.input_of(model), "-o", container, "--jobs", jobs)
-        digests[jobs] = hashlib.sha256(container.read_bytes()).hexdigest()
+        digests[jobs] = measure.digest(container)
         container.unlink()
     bench.log.add("bytes", model, {}, digests=digests, holds=len(set(digests.values())) == 1)
 

@@ -10,22 +10,17 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(os.environ.get("STRL_TEST_ROOT", pathlib.Path(__file__).resolve().parents[2]))
-sys.path.insert(0, str(ROOT / "bench"))
+sys.path[:0] = [str(ROOT / "bench"), str(ROOT / "tests" / "support")]
 sys.dont_write_bytecode = True
 import measure
 import must_show
+import sanitized
 import sheets
 import tables
 
 MODELS = ("isosurface_3k", "isosurface_6k")
 ONE_EACH = ("build", "images_orbit", "images_flythrough", "psnr_orbit", "psnr_flythrough", "verify", "backends",
             "rate", "bytes", "sizes", "dependencies", "walk", "scale", "shapes", "cap", "walk_cold")
-
-
-def is_sanitized(program):
-    """Sanitizers reserve address space by the terabyte, which no limit allows."""
-    content = pathlib.Path(program).read_bytes()
-    return any(name in content for name in (b"__asan_init", b"__tsan_init"))
 
 
 class Test:
@@ -164,7 +159,7 @@ class Test:
 
 def main():
     program = os.path.abspath(sys.argv[1])
-    if is_sanitized(program):
+    if sanitized.sanitizers(program):  # they reserve address space by the terabyte, which no limit allows
         print("skipped: what it asks of the program, other tests ask too")
         return 77
     with tempfile.TemporaryDirectory() as folder:

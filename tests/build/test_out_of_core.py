@@ -4,38 +4,14 @@ folder the disk."""
 import json
 import os
 import struct
-import threading
+import sys
 from random import Random
 
 from building import MIB, check_result, must, run_tests, sanitizers, skip
 
-
-class DiskWatch:
-    """The most bytes that the files of a folder took while it was watched; the unfinished output (*.part) is no scratch."""
-
-    def __init__(self, folder):
-        self.folder, self.most, self.stop = folder, 0, threading.Event()
-        self.thread = threading.Thread(target=self.watch)
-
-    def watch(self):
-        while not self.stop.wait(0.02):
-            size = 0
-            try:
-                for entry in os.scandir(self.folder):
-                    if not entry.name.endswith(".part"):
-                        size += entry.stat().st_blocks * 512
-            except OSError:
-                continue
-            self.most = max(self.most, size)
-
-    def __enter__(self):
-        self.thread.start()
-        return self
-
-    def __exit__(self, *_):
-        self.stop.set()
-        self.thread.join()
-
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "bench"))
+sys.dont_write_bytecode = True
+from measure import DiskWatch
 
 SCRATCH_A_TRIANGLE = 80
 
@@ -49,12 +25,12 @@ def build_within(source, folder, memory, jobs):
     triangles = result["triangles_in"]
     print(f"{triangles} triangles, --memory {memory}M --jobs {jobs}: peak {done.peak_bytes / MIB:.1f} MiB, said "
           f"{result['peak_rss_bytes'] / MIB:.1f}; scratch {result['scratch_bytes'] / triangles:.1f} bytes a triangle, "
-          f"seen {disk.most / triangles:.1f}; {done.seconds:.1f} s", flush=True)
+          f"seen {disk.most_bytes / triangles:.1f}; {done.seconds:.1f} s", flush=True)
     assert done.peak_bytes < memory * MIB, f"peak {done.peak_bytes} bytes"
     assert abs(done.peak_bytes - result["peak_rss_bytes"]) < 8 * MIB
     assert result["scratch_bytes"] <= SCRATCH_A_TRIANGLE * triangles
-    assert disk.most <= SCRATCH_A_TRIANGLE * triangles, f"{disk.most / triangles:.1f} bytes of disk a triangle"
-    assert disk.most > 10 * triangles, "the folder was not where it was watched"
+    assert disk.most_bytes <= SCRATCH_A_TRIANGLE * triangles, f"{disk.most_bytes / triangles:.1f} bytes of disk a triangle"
+    assert disk.most_bytes > 10 * triangles, "the folder was not where it was watched"
     assert sorted(os.listdir(folder)) == ["in.ply", "out.stroll"]
     return result
 

@@ -64,7 +64,6 @@ static strl_status simplify_levels(strl_hierarchy *hierarchy, const strl_positio
     for (uint32_t level = from->level; level <= hierarchy->partition->depth && !status; level++) {
         uint32_t first = level == from->level ? from->done : 0;
         strl__build_stage(hierarchy->context, names[level < 10 ? level : 10]);
-        hierarchy->anchor_plan = strl_hierarchy_anchor_plan(hierarchy, level);
         if (first == 0)
             status = strl_level_open(hierarchy, level, err);
         if (!status)
