@@ -40,6 +40,7 @@ struct strl_reader {
     strl_file *file;       /* owned */
     strl_file_info opened; /* as it was at opening */
     uint64_t triangles_hint;
+    uint64_t vertex_count; /* when it was last at rest */
     strl__input input;
     strl__table vertices, normals;
     strl__batch batch;

@@ -107,8 +107,9 @@ strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__forma
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a reader", desc->path);
     reader->format = format;
     reader->memory_bytes = memory_bytes;
-    strl__names_init(&reader->parts, (size_t)(memory_bytes / 16));
-    strl__names_init(&reader->materials, (size_t)(memory_bytes / 16));
+    size_t names_bytes = (size_t)(desc->names_bytes ? desc->names_bytes : memory_bytes / 16);
+    strl__names_init(&reader->parts, names_bytes);
+    strl__names_init(&reader->materials, names_bytes);
     strl_status status = open_file(reader, desc, err);
     if (!status)
         status = open_format(reader, err);
@@ -168,13 +169,18 @@ strl_status strl__reader_init_batch(strl_reader *reader, bool indexed, strl_erro
     return strl__batch_init(&reader->batch, &desc, err);
 }
 
+static void release_tables(strl_reader *reader)
+{
+    strl__table_deinit(&reader->vertices);
+    strl__table_deinit(&reader->normals);
+    strl__batch_deinit(&reader->batch);
+}
+
 static strl_status make_ready(strl_reader *reader, strl_error *err)
 {
-    strl_status status = STRL_OK;
-    if (!reader->prepared) {
-        strl__table_deinit(&reader->vertices);
-        strl__table_deinit(&reader->normals);
-        strl__batch_deinit(&reader->batch);
+    strl_status status = strl__input_wake(&reader->input, err);
+    if (!status && !reader->prepared) {
+        release_tables(reader);
         status = reader->format->prepare(reader, err);
         reader->prepared = !status;
     }
@@ -248,6 +254,15 @@ strl_status strl_reader_rewind(strl_reader *reader, strl_error *err)
     return STRL_OK;
 }
 
+void strl_reader_rest(strl_reader *reader)
+{
+    reader->vertex_count = reader->vertices.count;
+    release_tables(reader);
+    strl__input_rest(&reader->input);
+    reader->prepared = reader->started = false;
+    reader->ended = true;
+}
+
 void strl_reader_drops_get(const strl_reader *reader, strl_reader_drops *drops)
 {
     *drops = reader->drops;
@@ -255,7 +270,7 @@ void strl_reader_drops_get(const strl_reader *reader, strl_reader_drops *drops)
 
 uint64_t strl_reader_vertex_count(const strl_reader *reader)
 {
-    return reader->vertices.count;
+    return reader->vertices.count ? reader->vertices.count : reader->vertex_count;
 }
 
 uint32_t strl_reader_missing_count(const strl_reader *reader)

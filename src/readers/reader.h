@@ -37,7 +37,8 @@ typedef struct strl_triangle {
 typedef struct strl_reader_desc {
     const char *path;         /* UTF-8; borrowed during the call of open */
     const char *scratch_dir;  /* an existing folder for spill files, which close removes; borrowed during open */
-    uint64_t memory_bytes;    /* budget of all the reader holds; 0 = 256 MiB; the least is 8 MiB */
+    uint64_t memory_bytes;    /* budget of all the reader holds but names; 0 = 256 MiB; the least is 8 MiB */
+    uint64_t names_bytes;     /* budget of the names of parts, and of those of materials; 0 = a 16th of memory_bytes */
 } strl_reader_desc;
 
 typedef enum strl_axis { STRL_AXIS_X, STRL_AXIS_Y, STRL_AXIS_Z } strl_axis;
@@ -57,6 +58,9 @@ void strl_reader_info_get(const strl_reader *reader, strl_reader_info *info);
 strl_status strl_reader_next(strl_reader *reader, strl_triangle *triangles, size_t capacity, size_t *count, strl_error *err);
 /* Back to the first triangle. Fails where the file has changed (size or time of change). */
 strl_status strl_reader_rewind(strl_reader *reader, strl_error *err);
+/* Gives back what reading takes, tables and windows, until rewind: of many files that are open one is read. Facts, drops and
+ * names stay; next gives nothing. */
+void strl_reader_rest(strl_reader *reader);
 /* Of the pass so far; complete after the end was reached. */
 void strl_reader_drops_get(const strl_reader *reader, strl_reader_drops *drops);
 /* Vertices that the file lists, used or not, after the first call of next; 0 where the format has no such list (STL). */

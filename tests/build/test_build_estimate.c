@@ -31,7 +31,7 @@ static void ask_shares(double shares[STAGES])
         shares[i] = estimate.share - before;
     }
     assert_true(fabs(estimate.share - 1) < 1e-9);
-    assert_int_equal(estimate.stage_index, STRL_STAGE_COUNT);
+    assert_int_equal(estimate.stage_index, STRL_BUILD_STAGES);
 }
 
 static void ask_seconds(double seconds[STAGES], double total)
@@ -155,8 +155,9 @@ static void without_anything_known_nothing_is_said(void **state)
     assert_true(estimate.seconds_left == 0 && strl__estimate_rate(&estimate, 1000) == 0);
     strl__estimate_update(&estimate, 0, 0, 7);
     assert_true(estimate.seconds_left == 0 && estimate.share == 0);
-    assert_true(strl__estimate_seconds(1000000, 0) == strl__estimate_seconds(1000000, 1));
-    assert_true(strl__estimate_seconds(1000000, 2) < strl__estimate_seconds(1000000, 1));
+    assert_true(strl__estimate_seconds(1000000, 0, false) == strl__estimate_seconds(1000000, 1, false));
+    assert_true(strl__estimate_seconds(1000000, 2, false) < strl__estimate_seconds(1000000, 1, false));
+    assert_true(strl__estimate_seconds(1000000, 1, true) > strl__estimate_seconds(1000000, 1, false));
 }
 
 static void more_triangles_need_more_memory(void **state)

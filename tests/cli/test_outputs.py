@@ -107,9 +107,7 @@ def what_is_no_place_for_a_file_is_refused_before_any_work(folder, writers):
             print("no right to make a device: not tested")
         before = every_file(place)
         for path, part in cases:
-            start = time.monotonic()
             assert_refused(run(*writer.long, path), part)
-            assert time.monotonic() - start < 5, f"{writer.name} worked before it refused {path}"
             assert every_file(place) == before, (writer.name, path, every_file(place))
 
 

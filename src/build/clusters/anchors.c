@@ -124,9 +124,9 @@ bool strl_anchors_bear(const strl_mesh *base, const strl_certificate *certificat
 {
     for (uint32_t t = 0; t < base->triangle_count; t++) {
         strl_piece piece = {.claim = strl_mesh_error(base, strl_drift_length(&base->drift[t]))};
-        if (certificate)
-            piece.claim = strl_mesh_error(base, fmaxf(certificate->triangle_down[t],
-                                                      fminf(certificate->triangle_up[t], piece.claim)));
+        if (certificate) /* the claims of the older pieces, which these hold, have the start's error already */
+            piece.claim = fminf(fmaxf(certificate->triangle_down[t], fminf(certificate->triangle_up[t], piece.claim)),
+                                base->most_error > 0 ? base->most_error : INFINITY);
         for (unsigned c = 0; c < 3; c++)
             memcpy(piece.corner[c], base->position[base->wedge[base->triangle[t][c]].point], sizeof piece.corner[c]);
         if (!add_piece(born, &piece))

@@ -136,16 +136,22 @@ static void write_triangles(const strl_mesh *mesh, models *m, strl_packer *packe
             strl_pack_corner(packer, &m->corner[c], mesh->triangle[t][c], &next);
 }
 
+/* The wedges have been read. A triangle has three points. */
 static bool read_triangles(strl_mesh *mesh, models *m, strl_unpacker *unpacker)
 {
     uint32_t next = 0;
-    bool good = true;
-    for (uint32_t t = 0; t < mesh->triangle_count; t++)
+    for (uint32_t t = 0; t < mesh->triangle_count; t++) {
+        uint32_t point[3];
         for (int c = 0; c < 3; c++) {
-            mesh->triangle[t][c] = strl_unpack_corner(unpacker, &m->corner[c], &next);
-            good &= mesh->triangle[t][c] < mesh->wedge_count;
+            uint32_t wedge = mesh->triangle[t][c] = strl_unpack_corner(unpacker, &m->corner[c], &next);
+            if (wedge >= mesh->wedge_count)
+                return false;
+            point[c] = mesh->wedge[wedge].point;
         }
-    return good;
+        if (point[0] == point[1] || point[1] == point[2] || point[2] == point[0])
+            return false;
+    }
+    return true;
 }
 
 /* Drifts are rounded outward to steps of a 250th of the largest: six small numbers, and still boxes that hold them. */
@@ -259,7 +265,7 @@ static bool read_arrays(strl_node_mesh *node, const strl_pm *payload, uint32_t s
     if (!payload)
         read_positions(mesh, unpacker);
     good = read_wedges(mesh, &m, unpacker) && good;
-    good = read_triangles(mesh, &m, unpacker) && good;
+    good = good && read_triangles(mesh, &m, unpacker);
     read_drifts(mesh, step, &m, unpacker);
     strl_unpack_floats(unpacker, &m.deviation, mesh->deviation, mesh->triangle_count);
     strl_unpack_floats(unpacker, &m.shift, mesh->shift, mesh->triangle_count);

@@ -14,14 +14,16 @@
 static strl_status open_readers(strl_build_context *context, strl_reader **readers, strl_ingest *ingest, strl_error *err)
 {
     strl_status status = STRL_OK;
-    uint64_t share = context->memory_bytes / 4 / context->desc->input_count;
+    uint64_t share = context->memory_bytes / 4; /* one at a time is read */
     for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
         strl_reader_desc desc = {.path = context->desc->inputs[i], .scratch_dir = context->scratch_dir,
-                                 .memory_bytes = share < LEAST_READER_BYTES ? LEAST_READER_BYTES : share};
+                                 .memory_bytes = share < LEAST_READER_BYTES ? LEAST_READER_BYTES : share,
+                                 .names_bytes = context->memory_bytes / 6};
         strl_reader_info info;
         status = strl_reader_open(&desc, &readers[i], err);
         if (status)
             break;
+        strl_reader_rest(readers[i]);
         strl_reader_info_get(readers[i], &info);
         if (context->desc->up_axis)
             ingest->up = (strl_axis)(context->desc->up_axis - 1);
