@@ -176,7 +176,7 @@ void strl__part_torus(strl__part_mesh *mesh, double ring, double radius, int sid
 void strl__part_bolt(strl__part_mesh *mesh, double radius, double low, double high)
 {
     const strl__affine before = mesh->place;
-    const strl__outline hexagon = strl__outline_round(6, radius * 1.8), shank = strl__outline_round(6, radius);
+    const strl__outline hexagon = strl__outline_round(6, radius * 1.8), shank = strl__outline_round(3, radius);
     const struct {
         const strl__outline *outline;
         double from, length;

@@ -173,10 +173,13 @@ static void put_tray_piece(strl__plant *plant, double x, double length)
     }
     strl__plant_part(plant, "CABLES", STRL__CABLE, &place);
     for (int i = 0; i < 2; i++) {
-        const double low[3] = {x + length * (i + 0.5) / 2, -0.05, -0.05}, high[3] = {low[0] + 0.05, 0.5, 0};
-        const double rod_from[3] = {low[0] + 0.02, -0.03, 0}, rod_to[3] = {rod_from[0], -0.03, 0.5};
-        strl__plant_box(plant, "BRACKET", STRL__GALVANISED, low, high);
-        strl__plant_bar(plant, "ROD", STRL__GALVANISED, rod_from, rod_to, 0.006, 5);
+        const strl__affine hung = strl__affine_move(x + length * (i + 0.5) / 2, 0, 0);
+        const double low[3] = {0, -0.05, -0.05}, high[3] = {0.05, 0.5, 0}, from[3] = {0.02, -0.03, 0};
+        const double to[3] = {0.02, -0.03, 0.5};
+        mesh = strl__plant_mesh(plant);
+        strl__part_box(mesh, low, high);
+        strl__part_bar(mesh, from, to, 0.006, 5);
+        strl__plant_part(plant, "BRACKET", STRL__GALVANISED, &hung);
     }
 }
 

@@ -48,7 +48,7 @@ void strl__plant_item_air_cooler(strl__plant *plant, const void *what)
     double length = spot->wide - 0.8, deep = spot->deep - 0.8;
     const strl__affine place = strl__affine_move(spot->x + 0.4, spot->y + 0.4, spot->z);
     strl__plant_open(plant, "AIRCOOLER", &place);
-    put_cooler_tubes(plant, length, deep, strl__plant_chance(plant, 0.5) ? 6 : 4, (int)(deep / 0.065));
+    put_cooler_tubes(plant, length, deep, strl__plant_chance(plant, 0.5) ? 8 : 6, (int)(deep / 0.06));
     int fans = length > 8 ? 2 : 1;
     for (int i = 0; i < fans; i++)
         put_fan(plant, length * (i + 0.5) / fans, deep / 2, fmin(length / fans, deep) * 0.42);
@@ -78,7 +78,7 @@ void strl__plant_item_air_cooler(strl__plant *plant, const void *what)
 /* A wall of tubes along the group's x, standing on the slope of a hopper; each tube has a fin to its neighbour. */
 static void put_tube_wall(strl__plant *plant, const strl__affine *place, double wide, double high, double slope)
 {
-    int count = (int)(wide / 0.11);
+    int count = (int)(wide / 0.08);
     strl__part_mesh *mesh = strl__plant_mesh(plant);
     for (int i = 0; i < count; i++) {
         double x = wide * (i + 0.5) / count;
@@ -92,7 +92,7 @@ static void put_tube_wall(strl__plant *plant, const strl__affine *place, double 
                                  : 0;
             rings[k] = (strl__sweep_ring){{x, in, z}, {1, 0, 0}, {0, 1, 0}};
         }
-        strl__part_sweep(mesh, rings, 6, 0.038, 8, false);
+        strl__part_sweep(mesh, rings, 6, 0.03, 10, false);
         const double low[3] = {x, -0.006, 3.2}, fin[3] = {x + wide / count, 0.006, high};
         strl__part_box(mesh, low, fin);
     }
@@ -112,7 +112,7 @@ static void put_superheater(strl__plant *plant, double wide, double deep, double
     enum { LOOPS = 8, STEPS = 4 };
     const strl__affine here = strl__affine_identity();
     strl__part_mesh *mesh = strl__plant_mesh(plant);
-    for (double y = 0.6; y < deep - 0.4; y += 0.45) {
+    for (double y = 0.6; y < deep - 0.4; y += 0.22) {
         strl__sweep_ring rings[2 * LOOPS * (STEPS + 1)];
         int count = 0;
         for (int loop = 0; loop < 2 * LOOPS; loop++)

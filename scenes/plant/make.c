@@ -202,15 +202,23 @@ int strl__plant_sides(double radius)
     return radius < 0.03 ? 8 : radius < 0.06 ? 10 : radius < 0.09 ? 12 : radius < 0.16 ? 16 : radius < 0.25 ? 20 : 28;
 }
 
-double strl__plant_flange(strl__plant *plant, const strl__affine *place, double pipe_radius, bool bolts)
+double strl__plant_flange_thickness(double pipe_radius)
 {
-    double thick = 0.018 + 0.14 * pipe_radius, outer = 1.45 * pipe_radius + 0.045, bolt = 0.006 + 0.03 * pipe_radius;
-    strl__part_ring(strl__plant_mesh(plant), pipe_radius * 0.9, outer, 0, thick, strl__plant_sides(pipe_radius) + 2);
+    return 0.018 + 0.14 * pipe_radius;
+}
+
+void strl__plant_flange(strl__plant *plant, const strl__affine *place, double pipe_radius, int count, bool bolts)
+{
+    double thick = strl__plant_flange_thickness(pipe_radius), outer = 1.45 * pipe_radius + 0.045;
+    strl__part_mesh *mesh = strl__plant_mesh(plant);
+    for (int i = 0; i < count; i++)
+        strl__part_ring(mesh, pipe_radius * 0.9, outer, thick * i, thick * (i + 0.96),
+                        strl__plant_sides(pipe_radius) + 2);
     strl__plant_part(plant, "FLANGE", STRL__STEEL, place);
-    int count = pipe_radius < 0.045 ? 4 : pipe_radius < 0.13 ? 8 : pipe_radius < 0.22 ? 12 : 20;
+    int around = pipe_radius < 0.045 ? 4 : pipe_radius < 0.13 ? 8 : pipe_radius < 0.22 ? 12 : 20;
     if (bolts)
-        strl__plant_bolts(plant, place, (pipe_radius + outer) * 0.52, count, bolt, -0.2 * thick, 2 * thick);
-    return thick;
+        strl__plant_bolts(plant, place, (pipe_radius + outer) * 0.52, around, 0.006 + 0.03 * pipe_radius, -0.1 * thick,
+                          thick * (count == 1 ? 2 : 2.1));
 }
 
 void strl__plant_ladder(strl__plant *plant, const strl__affine *place, double height)

@@ -103,11 +103,9 @@ static void put_elbow(const line_run *run, const double corner[3], const double 
 /* Two flanges face to face and their bolts; returns the length. */
 static double put_joint(const line_run *run, const strl__affine *leg, double s)
 {
-    const strl__affine first = at_run(leg, s);
-    double thick = strl__plant_flange(run->plant, &first, run->line->radius, true);
-    const strl__affine second = at_run(leg, s + thick);
-    strl__plant_flange(run->plant, &second, run->line->radius, false);
-    return 2 * thick;
+    const strl__affine place = at_run(leg, s);
+    strl__plant_flange(run->plant, &place, run->line->radius, 2, true);
+    return 2 * strl__plant_flange_thickness(run->line->radius);
 }
 
 static void put_wheel(const line_run *run, const strl__affine *body, double r)
@@ -155,11 +153,6 @@ static double put_valve(const line_run *run, const strl__affine *leg, double s)
     return s + put_joint(run, leg, s) - from;
 }
 
-static double joint_length(double radius)
-{
-    return 2 * (0.018 + 0.14 * radius);
-}
-
 /* Clamps with rods up to the steel above. */
 static void put_hangers(const line_run *run, const strl__affine *leg, double from, double to)
 {
@@ -170,18 +163,17 @@ static void put_hangers(const line_run *run, const strl__affine *leg, double fro
         strl__part_mesh *mesh = strl__plant_mesh(run->plant);
         const double low[3] = {0, run->outer * 0.9, 0}, high[3] = {0, up, 0};
         strl__part_ring(mesh, run->outer * 0.97, run->outer + 0.008, -0.02, 0.02, run->sides);
-        strl__plant_part(run->plant, "CLAMP", STRL__GALVANISED, &place);
-        strl__part_bar(strl__plant_mesh(run->plant), low, high, 0.008, 5);
-        strl__plant_part(run->plant, "ROD", STRL__GALVANISED, &place);
+        strl__part_bar(mesh, low, high, 0.008, 5);
+        strl__plant_part(run->plant, "HANGER", STRL__GALVANISED, &place);
     }
 }
 
 /* A leg between its elbows or ends: a valve where there is room, and spools of pipe with joints or welds. */
-static void put_leg(const line_run *run, const strl__affine *leg, double from, double to, bool horizontal)
+static void put_leg(const line_run *run, const strl__affine *leg, double from, double to, bool hung)
 {
     strl__plant *plant = run->plant;
-    double valve = 2 * joint_length(run->line->radius) + 4 * run->line->radius + 0.08;
-    if (horizontal && run->line->hangers > 0)
+    double valve = 4 * strl__plant_flange_thickness(run->line->radius) + 4 * run->line->radius + 0.08;
+    if (hung)
         put_hangers(run, leg, from, to);
     if (run->line->valves && to - from > valve + 0.6 && strl__plant_chance(plant, 0.4)) {
         double at = strl__plant_between(plant, from + 0.2, to - valve - 0.2);
@@ -201,7 +193,7 @@ static void put_legs(const line_run *run)
 {
     const strl__line *line = run->line;
     const strl__route *route = &line->route;
-    const double thick = 0.018 + 0.14 * line->radius;
+    const double thick = strl__plant_flange_thickness(line->radius);
     double way[3], next[3], points[2][3];
     for (int i = 0; i + 1 < route->count; i++) {
         for (int k = 0; k < 3; k++) {
@@ -212,14 +204,16 @@ static void put_legs(const line_run *run)
         bool first = i == 0, last = i + 2 == route->count;
         const strl__affine leg = strl__affine_along(points[0], way);
         double from = first ? 0 : run->bend, to = last ? length : length - run->bend;
-        if (first && line->flange_first)
-            from = strl__plant_flange(run->plant, &leg, line->radius, false);
+        if (first && line->flange_first) {
+            strl__plant_flange(run->plant, &leg, line->radius, 1, false);
+            from = thick;
+        }
         if (last && line->flange_last) {
             to -= thick;
             const strl__affine end = at_run(&leg, to);
-            strl__plant_flange(run->plant, &end, line->radius, true);
+            strl__plant_flange(run->plant, &end, line->radius, 1, true);
         }
-        put_leg(run, &leg, from, to, fabs(way[2]) < 0.5);
+        put_leg(run, &leg, from, to, line->hangers > 0 && fabs(way[0]) > 0.5);
         if (!last) {
             leg_length(route->points[i + 1], route->points[i + 2], next);
             put_elbow(run, points[1], way, next);

@@ -128,8 +128,9 @@ void strl__plant_beam(strl__plant *plant, const char *kind, strl__plant_material
 /* Bolts on a circle, through [low, high] along z of the place; one part. */
 void strl__plant_bolts(strl__plant *plant, const strl__affine *place, double circle, int count, double radius,
                        double low, double high);
-/* A flange on z from 0 to its thickness; returns the thickness. */
-double strl__plant_flange(strl__plant *plant, const strl__affine *place, double pipe_radius, bool bolts);
+double strl__plant_flange_thickness(double pipe_radius);
+/* One flange on z from 0 to its thickness, or two of them face to face; bolts reach through two. */
+void strl__plant_flange(strl__plant *plant, const strl__affine *place, double pipe_radius, int count, bool bolts);
 int strl__plant_sides(double radius); /* of a pipe */
 
 /* ---- items: `what` is NULL or as stated ---- */
@@ -192,7 +193,7 @@ typedef struct strl__line {
     bool insulated;
     bool flange_first, flange_last; /* else the end runs into something */
     bool valves;
-    double hangers; /* length of rods above horizontal legs; 0 = none */
+    double hangers; /* length of rods above legs along x; 0 = none */
 } strl__line;
 
 /* Joins legs of one direction; false where legs are too short for their elbows or turn back. */

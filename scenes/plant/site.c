@@ -20,18 +20,18 @@ typedef struct site_plan {
     double length, depth;
 } site_plan;
 
-/* Bays by what a bay of a floor takes, with a third of the budget for the frame. */
+/* Bays by what a bay of a floor takes, with a quarter of the budget for the frame. */
 static site_plan make_plan(uint64_t triangles)
 {
     site_plan plan = {.units = (unsigned)lround(fmax(1, (double)triangles / UNIT_TRIANGLES))};
-    double budget = (double)triangles / plan.units, bays = fmax(1, budget * 0.32 / 2600);
+    double budget = (double)triangles / plan.units, bays = fmax(1, budget * 0.26 / 2600);
     plan.columns = (unsigned)ceil(sqrt(plan.units * 0.75));
     plan.levels = bays < 4 ? 1 : bays < 10 ? 2 : bays < 30 ? 3 : bays < 55 ? 4 : 5;
     bays /= plan.levels;
     plan.bays_y = bays < 2 ? 1 : bays < 6 ? 2 : bays < 12 ? 3 : 4;
     plan.bays_x = (int)lround(bays / plan.bays_y);
     plan.bays_x = plan.bays_x < 1 ? 1 : plan.bays_x > STRL__PLANT_BAYS ? STRL__PLANT_BAYS : plan.bays_x;
-    double beside = budget < 30000 ? 6 : budget < 120000 ? 12 : budget < 300000 ? 24 : 42;
+    double beside = budget < 30000 ? 6 : budget < 120000 ? 12 : budget < 300000 ? 20 : 34;
     plan.length = STRL__PLANT_BAY * ceil((4 + STRL__PLANT_BAY * plan.bays_x + beside) / STRL__PLANT_BAY);
     plan.depth = 12 + STRL__PLANT_BAY * plan.bays_y +
                  (budget < 30000    ? 2
@@ -97,7 +97,10 @@ static void make_unit(strl__plant *plant, const site_plan *plan, unsigned number
 {
     char name[STRL__PART_NAME_BYTES];
     begin_unit(plant, plan, number);
-    strl__plant_unit_kind kind = (strl__plant_unit_kind)(number == 0 ? 0 : strl__plant_choice(plant, 4));
+    static const strl__plant_unit_kind first[] = {UNIT_PROCESS, UNIT_POWER, UNIT_COOLING, UNIT_STORAGE};
+    strl__plant_unit_kind kind = first[number < 4 ? (int)number : strl__plant_choice(plant, 4)];
+    if (number >= 4 && strl__plant_chance(plant, 0.2))
+        kind = UNIT_POWER;
     bool mirrored = number > 0 && strl__plant_chance(plant, 0.4);
     const strl__affine place = unit_place(plan, number % plan->columns, number / plan->columns, mirrored);
     snprintf(name, sizeof name, "UNIT-%02u", number + 1);

@@ -15,7 +15,8 @@ void strl__plant_item_ground(strl__plant *plant, const void *what)
     const strl__affine place = strl__affine_identity();
     const strl__plant_unit *unit = &plant->unit;
     strl__plant_open_named(plant, "GROUND", &place);
-    const double low[3] = {0, 0, -0.3}, high[3] = {unit->length, unit->depth, -0.05};
+    const double reach = STRL__PLANT_REACH; /* to the middle of the road round the plot */
+    const double low[3] = {-reach, -reach, -0.3}, high[3] = {unit->length + reach, unit->depth + reach, -0.05};
     strl__plant_box(plant, "SLAB", STRL__CONCRETE, low, high);
     const double pad_low[3] = {unit->frame_x - 0.8, unit->frame_y - 0.8, -0.05};
     const double pad_high[3] = {unit->frame_x + BAY * unit->bays_x + 0.8, unit->frame_y + BAY * unit->bays_y + 0.8, 0};
@@ -91,24 +92,38 @@ void strl__plant_item_column(strl__plant *plant, const void *what)
 
 /* ---- floors ---- */
 
+/* Two bolts through each end of a beam, the beam's bolts as one part. */
+static void put_beam_bolts(strl__plant *plant, double x, double y, double dx, double dy)
+{
+    const double way[3] = {dy, dx, 0}, zero[3] = {0};
+    const strl__affine place = strl__affine_move(x, y, -0.24), across = strl__affine_along(zero, way);
+    strl__part_mesh *mesh = strl__plant_mesh(plant);
+    for (int i = 0; i < 4; i++) {
+        double s = i & 2 ? BAY - 0.26 : 0.26;
+        mesh->place = across;
+        mesh->place.origin[0] = s * dx;
+        mesh->place.origin[1] = s * dy;
+        mesh->place.origin[2] = i & 1 ? 0.08 : -0.08;
+        strl__part_bolt(mesh, 0.01, -0.03, 0.03);
+    }
+    strl__plant_part(plant, "BOLTS", STRL__GALVANISED, &place);
+}
+
 /* A main beam with a gusset and bolts at each end; along x or y. */
 static void put_main_beam(strl__plant *plant, double x, double y, bool along_y)
 {
     const strl__outline beam = strl__outline_i(0.2, 0.4, 0.016, 0.01);
     const double dx = along_y ? 0 : 1, dy = along_y ? 1 : 0;
-    const double from[3] = {x + 0.16 * dx, y + 0.16 * dy, -0.24},
-                 to[3] = {x + (BAY - 0.16) * dx, y + (BAY - 0.16) * dy, -0.24};
+    const double from[3] = {x + 0.16 * dx, y + 0.16 * dy, -0.24};
+    const double to[3] = {x + (BAY - 0.16) * dx, y + (BAY - 0.16) * dy, -0.24};
     strl__plant_beam(plant, "BEAM", STRL__FRAME_GREY, from, to, &beam);
     for (int end = 0; end < 2; end++) {
-        double s = end ? BAY - 0.26 : 0.26;
-        const double middle[3] = {x + s * dx, y + s * dy, -0.24};
-        const double low[3] = {middle[0] - 0.1 * dx - 0.02 * dy, middle[1] - 0.1 * dy - 0.02 * dx, -0.38};
-        const double high[3] = {middle[0] + 0.1 * dx + 0.02 * dy, middle[1] + 0.1 * dy + 0.02 * dx, -0.1};
+        double s = end ? BAY - 0.26 : 0.26, at_x = x + s * dx, at_y = y + s * dy;
+        const double low[3] = {at_x - 0.1 * dx - 0.02 * dy, at_y - 0.1 * dy - 0.02 * dx, -0.38};
+        const double high[3] = {at_x + 0.1 * dx + 0.02 * dy, at_y + 0.1 * dy + 0.02 * dx, -0.1};
         strl__plant_box(plant, "GUSSET", STRL__FRAME_GREY, low, high);
-        const double way[3] = {dy, dx, 0};
-        const strl__affine place = strl__affine_along(middle, way);
-        strl__plant_bolts(plant, &place, 0.08, 3, 0.01, -0.03, 0.03);
     }
+    put_beam_bolts(plant, x, y, dx, dy);
 }
 
 static void put_brace(strl__plant *plant, const double from[3], const double to[3])
@@ -117,10 +132,23 @@ static void put_brace(strl__plant *plant, const double from[3], const double to[
     strl__plant_beam(plant, "BRACE", STRL__PRIMER, from, to, &angle);
 }
 
+static void put_joists(strl__plant *plant, double x, double y)
+{
+    const strl__outline joist = strl__outline_i(0.12, 0.2, 0.01, 0.007);
+    const double way[3] = {1, 0, 0}, zero[3] = {0};
+    const strl__affine place = strl__affine_move(x + 0.1, y, -0.14), along = strl__affine_along(zero, way);
+    strl__part_mesh *mesh = strl__plant_mesh(plant);
+    for (int i = 1; i < 4; i++) {
+        mesh->place = along;
+        mesh->place.origin[1] = 1.5 * i;
+        strl__part_prism(mesh, &joist, BAY - 0.2);
+    }
+    strl__plant_part(plant, "JOISTS", STRL__FRAME_GREY, &place);
+}
+
 static void put_bay_steel(strl__plant *plant, int x, int y, int level)
 {
     const strl__plant_unit *unit = &plant->unit;
-    const strl__outline joist = strl__outline_i(0.12, 0.2, 0.01, 0.007);
     double left = BAY * x, front = BAY * y;
     if (x < unit->bays_x)
         put_main_beam(plant, left, front, false);
@@ -128,10 +156,8 @@ static void put_bay_steel(strl__plant *plant, int x, int y, int level)
         put_main_beam(plant, left, front, true);
     if (x == unit->bays_x || y == unit->bays_y)
         return;
-    for (int i = 1; i < 4 && !unit->hollow[x][y]; i++) {
-        const double from[3] = {left + 0.1, front + 1.5 * i, -0.14}, to[3] = {left + BAY - 0.1, front + 1.5 * i, -0.14};
-        strl__plant_beam(plant, "JOIST", STRL__FRAME_GREY, from, to, &joist);
-    }
+    if (!unit->hollow[x][y])
+        put_joists(plant, left, front);
     if (y == 0 && (x + level) % 3 == 0) {
         const double low[3] = {left + 0.2, 0, -STOREY + 0.2}, high[3] = {left + BAY - 0.2, 0, -0.5};
         const double low_right[3] = {high[0], 0.1, low[2]}, high_left[3] = {low[0], 0.1, high[2]};
@@ -180,7 +206,7 @@ void strl__plant_item_grating(strl__plant *plant, const void *what)
     const strl__plant_unit *unit = &plant->unit;
     const strl__affine place = frame_place(plant, STOREY * at->level), here = strl__affine_identity();
     bool whole = strl__plant_chance(plant, 0.5) || unit->bays_x * unit->bays_y > 8;
-    double pitch = unit->bays_x * unit->bays_y > 40 ? 0.08 : 0.06;
+    double pitch = unit->bays_x * unit->bays_y > 30 ? 0.08 : 0.05;
     strl__plant_open(plant, "DECK", &place);
     if (whole)
         strl__plant_mesh(plant);
@@ -211,10 +237,9 @@ static void put_rail(strl__plant *plant, const strl__affine *place, double long_
         const double from[3] = {0, 0, i ? 1.1 : 0.6}, to[3] = {long_m, 0, from[2]};
         strl__part_bar(mesh, from, to, 0.022, 6);
     }
-    strl__plant_part(plant, "HANDRAIL", STRL__SAFETY_YELLOW, place);
     const double low[3] = {0, -0.01, 0}, high[3] = {long_m, 0.01, 0.12};
-    strl__part_box(strl__plant_mesh(plant), low, high);
-    strl__plant_part(plant, "KICKPLATE", STRL__SAFETY_YELLOW, place);
+    strl__part_box(mesh, low, high);
+    strl__plant_part(plant, "HANDRAIL", STRL__SAFETY_YELLOW, place);
 }
 
 void strl__plant_item_rails(strl__plant *plant, const void *what)

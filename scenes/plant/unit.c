@@ -4,12 +4,13 @@
 #include <math.h>
 
 /* Shares of the budget that must be left when a phase ends, so that every phase gets its own. */
-#define KEEP_STEEL 0.5
-#define KEEP_GROUND_PLOTS 0.34
-#define KEEP_FLOOR_PLOTS 0.26
-#define KEEP_HEADERS 0.19
-#define KEEP_NOZZLE_LINES 0.10
-#define KEEP_TRAYS 0.06
+#define KEEP_STEEL 0.45
+#define KEEP_BOILER 0.32
+#define KEEP_FLOOR_PLOTS 0.42
+#define KEEP_GROUND_PLOTS 0.3
+#define KEEP_HEADERS 0.25
+#define KEEP_NOZZLE_LINES 0.15
+#define KEEP_TRAYS 0.12
 
 enum { FAILURES_MOST = 60, LAMPS_MOST = 12, SPOOLS_MOST = 400 };
 
@@ -53,7 +54,7 @@ static const plot_item plots[] = {
     {strl__plant_item_drum, 7.0, 3.6, 5, 11.0, {3, 2, 2, 2}},
     {strl__plant_item_tank, 11.0, 11.0, 14, 17.0, {1, 6, 1, 1}},
     {strl__plant_item_cooling_tower, 17.0, 17.0, 40, 21.0, {0, 0, 6, 2}},
-    {strl__plant_item_stack, 6.0, 6.0, 50, 7.5, {1, 0, 0, 4}},
+    {strl__plant_item_stack, 6.0, 6.0, 50, 7.5, {1, 0, 0, 2}},
     {strl__plant_item_skid, 3.6, 2.4, 3, 4.0, {3, 4, 4, 3}},
     {strl__plant_item_air_cooler, 7.0, 6.0, 5, 12.0, {2, 0, 3, 1}},
     {strl__plant_item_cabin, 8.0, 6.0, 4, 11.0, {1, 1, 1, 1}},
@@ -147,7 +148,7 @@ static void make_boiler(strl__plant *plant)
                                    2 * STRL__PLANT_BAY,
                                    STRL__PLANT_STOREY * unit->levels + 1};
     if (unit->hollow[1][1])
-        strl__plant_try(plant, strl__plant_item_boiler, &spot, keep(plant, KEEP_GROUND_PLOTS));
+        strl__plant_try(plant, strl__plant_item_boiler, &spot, keep(plant, KEEP_BOILER));
 }
 
 static void make_equipment(strl__plant *plant, int kind)
@@ -156,12 +157,12 @@ static void make_equipment(strl__plant *plant, int kind)
     double right = unit->frame_x + STRL__PLANT_BAY * unit->bays_x + 2.5,
            back = unit->frame_y + STRL__PLANT_BAY * unit->bays_y + 2;
     make_boiler(plant);
-    fill_ground(plant, right, unit->frame_y, unit->length - right - 1, unit->depth - unit->frame_y - 1, kind);
-    fill_ground(plant, unit->frame_x - 2.5, back, right - unit->frame_x, unit->depth - back - 1, kind);
     for (int level = unit->levels; level >= 0; level--)
         for (int y = 0; y < unit->bays_y; y++)
             for (int x = 0; x < unit->bays_x; x++)
                 fill_bay(plant, x, y, level);
+    fill_ground(plant, right, unit->frame_y, unit->length - right - 1, unit->depth - unit->frame_y - 1, kind);
+    fill_ground(plant, unit->frame_x - 2.5, back, right - unit->frame_x, unit->depth - back - 1, kind);
 }
 
 /* ---- what runs between ---- */
@@ -180,7 +181,7 @@ static void make_lines(strl__plant *plant)
     uint64_t kept = keep(plant, KEEP_HEADERS);
     for (int i = 0; i < STRL__PLANT_TIERS * STRL__PLANT_LANES; i++) {
         /* Lanes far from each other first, so that a small unit's few headers are spread. */
-        int lane = i * 5 % STRL__PLANT_LANES, tier = i / STRL__PLANT_LANES;
+        int lane = i / STRL__PLANT_TIERS * 5 % STRL__PLANT_LANES, tier = i % STRL__PLANT_TIERS;
         if (unit->headers[tier][lane].radius > 0 &&
             !strl__plant_try(plant, strl__plant_item_header, &(strl__plant_bay){tier, lane, 0}, kept))
             plant->unit.headers[tier][lane].radius = 0;

@@ -29,12 +29,12 @@ static void add_shell(strl__part_mesh *mesh, double radius, double high)
 static void put_nozzle(strl__plant *plant, const double from[3], const double way[3], double radius, double reach)
 {
     double to[3];
-    const double thick = 0.018 + 0.14 * radius;
+    const double thick = strl__plant_flange_thickness(radius);
     for (int k = 0; k < 3; k++)
         to[k] = from[k] + way[k] * (reach - thick);
     strl__plant_bar(plant, "NECK", STRL__STEEL, from, to, radius, strl__plant_sides(radius));
     const strl__affine flange = strl__affine_along(to, way);
-    strl__plant_flange(plant, &flange, radius, true);
+    strl__plant_flange(plant, &flange, radius, 1, true);
     for (int k = 0; k < 3; k++)
         to[k] += way[k] * thick;
     strl__plant_add_nozzle(plant, to, way, radius);
@@ -257,18 +257,18 @@ static void put_girth_joint(strl__plant *plant, double x, double radius, double 
     strl__plant_bolts(plant, &place, radius + 0.075, 24, 0.014, -0.09, 0.09);
 }
 
-/* One in eight stands open, its bundle drawn. */
+/* One in four stands open, its bundle drawn. */
 void strl__plant_item_exchanger(strl__plant *plant, const void *what)
 {
     const strl__plant_spot *spot = what;
     double radius = fmin(strl__plant_between(plant, 0.3, 0.62), spot->deep * 0.5 - 0.5), length = spot->wide - 1.6;
     double axis_z = radius + 0.6, channel = 0.9;
-    bool open = strl__plant_chance(plant, 0.125);
+    bool open = strl__plant_chance(plant, 0.25);
     const strl__affine place = strl__affine_move(spot->x + 0.8, spot->y + spot->deep / 2, spot->z + 0.02);
     strl__plant_open(plant, "EXCHANGER", &place);
     const strl__affine shell = lying(channel, axis_z), head = lying(0.05, axis_z);
     if (open) {
-        put_bundle(plant, &shell, radius * 0.95, length - channel, 0.05);
+        put_bundle(plant, &shell, radius * 0.95, length - channel, 0.042);
     } else {
         add_shell(strl__plant_mesh(plant), radius, length - channel - radius * 0.5);
         strl__plant_part(plant, "SHELL", STRL__INSULATION, &shell);
