@@ -185,12 +185,13 @@ static void put_fill(strl__plant *plant, double radius)
 {
     strl__part_mesh *mesh = strl__plant_mesh(plant);
     const strl__affine place = strl__affine_move(0, 0, 3);
-    for (int layer = 0; layer < 2; layer++)
+    for (int layer = 0; layer < 4; layer++)
         for (double at = -radius; at < radius; at += 0.18) {
             double half = sqrt(fmax(0, radius * radius - at * at));
             for (double x = -half; x + 1 < half; x += 1.0) {
-                const double low[3] = {layer ? at : x, layer ? x : at, 0.35 * layer};
-                const double high[3] = {low[0] + (layer ? 0.02 : 0.95), low[1] + (layer ? 0.95 : 0.02), low[2] + 0.3};
+                const double low[3] = {layer & 1 ? at : x, layer & 1 ? x : at, 0.35 * layer};
+                const double high[3] = {low[0] + (layer & 1 ? 0.02 : 0.95), low[1] + (layer & 1 ? 0.95 : 0.02),
+                                        low[2] + 0.3};
                 strl__part_box(mesh, low, high);
             }
         }

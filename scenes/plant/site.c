@@ -101,7 +101,7 @@ static void make_unit(strl__plant *plant, const site_plan *plan, unsigned number
     strl__plant_unit_kind kind = first[number < 4 ? (int)number : strl__plant_choice(plant, 4)];
     if (number >= 4 && strl__plant_chance(plant, 0.2))
         kind = UNIT_POWER;
-    bool mirrored = number > 0 && strl__plant_chance(plant, 0.4);
+    bool mirrored = number % 3 == 1 || (number > 0 && strl__plant_chance(plant, 0.3));
     const strl__affine place = unit_place(plan, number % plan->columns, number / plan->columns, mirrored);
     snprintf(name, sizeof name, "UNIT-%02u", number + 1);
     strl__plant_open_named(plant, name, &place);
