@@ -4,6 +4,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/fail.h"
@@ -21,6 +22,20 @@ strl_status strl__json_print(strl__stream *stream, strl_error *err, const char *
         return strl__fail(err, STRL_ERR_INTERNAL, "a piece of glTF has %d characters, expected at most %d", length,
                           TEXT_MOST);
     return strl__stream_write(stream, text, (uint64_t)length, err);
+}
+
+strl_status strl__json_floats(strl__stream *stream, const char *name, const float *values, int count, strl_error *err)
+{
+    strl_status status = strl__json_print(stream, err, ",\"%s\":[", name);
+    for (int i = 0; status == STRL_OK && i < count; i++) {
+        int digits = 4;
+        char text[320]; /* %g may be told to write more than it ever does */
+        do
+            snprintf(text, sizeof text, "%.*g", digits++, (double)values[i]);
+        while (strtof(text, NULL) != values[i]);
+        status = strl__json_print(stream, err, "%s%s", i ? "," : "", text);
+    }
+    return status == STRL_OK ? strl__json_print(stream, err, "]") : status;
 }
 
 /* -0 is written as 0. */

@@ -219,9 +219,10 @@ static strl_status put_bounds(gltf_writer *self, const strl__part_mesh *mesh, st
             low[k] = i == 0 || value < low[k] ? value : low[k];
             high[k] = i == 0 || value > high[k] ? value : high[k];
         }
-    return strl__json_print(&self->arrays[ACCESSORS], err, ",\"min\":[%.9g,%.9g,%.9g],\"max\":[%.9g,%.9g,%.9g]}",
-                            (double)low[0], (double)low[1], (double)low[2], (double)high[0], (double)high[1],
-                            (double)high[2]);
+    strl_status status = strl__json_floats(&self->arrays[ACCESSORS], "min", low, 3, err);
+    if (status == STRL_OK)
+        status = strl__json_floats(&self->arrays[ACCESSORS], "max", high, 3, err);
+    return status == STRL_OK ? strl__json_print(&self->arrays[ACCESSORS], err, "}") : status;
 }
 
 static strl_status put_accessors(gltf_writer *self, const strl__part_mesh *mesh, int kind, strl_error *err)

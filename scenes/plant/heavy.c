@@ -185,7 +185,7 @@ static void put_fill(strl__plant *plant, double radius)
 {
     strl__part_mesh *mesh = strl__plant_mesh(plant);
     const strl__affine place = strl__affine_move(0, 0, 3);
-    for (int layer = 0; layer < 4; layer++)
+    for (int layer = 0; layer < 3; layer++)
         for (double at = -radius; at < radius; at += 0.18) {
             double half = sqrt(fmax(0, radius * radius - at * at));
             for (double x = -half; x + 1 < half; x += 1.0) {

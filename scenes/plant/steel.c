@@ -117,12 +117,14 @@ static void put_main_beam(strl__plant *plant, double x, double y, bool along_y)
     const double from[3] = {x + 0.16 * dx, y + 0.16 * dy, -0.24};
     const double to[3] = {x + (BAY - 0.16) * dx, y + (BAY - 0.16) * dy, -0.24};
     strl__plant_beam(plant, "BEAM", STRL__FRAME_GREY, from, to, &beam);
+    const strl__affine place = strl__affine_move(x, y, -0.24);
+    strl__part_mesh *mesh = strl__plant_mesh(plant);
     for (int end = 0; end < 2; end++) {
-        double s = end ? BAY - 0.26 : 0.26, at_x = x + s * dx, at_y = y + s * dy;
-        const double low[3] = {at_x - 0.1 * dx - 0.02 * dy, at_y - 0.1 * dy - 0.02 * dx, -0.38};
-        const double high[3] = {at_x + 0.1 * dx + 0.02 * dy, at_y + 0.1 * dy + 0.02 * dx, -0.1};
-        strl__plant_box(plant, "GUSSET", STRL__FRAME_GREY, low, high);
+        double s = end ? BAY - 0.26 : 0.26;
+        const double middle[3] = {s * dx, s * dy, 0};
+        strl__part_block(mesh, middle, 0.2 * dx + 0.04 * dy, 0.2 * dy + 0.04 * dx, 0.28);
     }
+    strl__plant_part(plant, "GUSSETS", STRL__FRAME_GREY, &place);
     put_beam_bolts(plant, x, y, dx, dy);
 }
 

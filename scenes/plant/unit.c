@@ -5,7 +5,7 @@
 
 /* Shares of the budget that must be left when a phase ends, so that every phase gets its own. */
 #define KEEP_STEEL 0.45
-#define KEEP_BOILER 0.32
+#define KEEP_LANDMARK 0.32
 #define KEEP_FLOOR_PLOTS 0.42
 #define KEEP_GROUND_PLOTS 0.3
 #define KEEP_HEADERS 0.25
@@ -53,7 +53,7 @@ static const plot_item plots[] = {
     {strl__plant_item_column_vessel, 5.0, 5.0, 26, 7.0, {5, 1, 1, 2}},
     {strl__plant_item_drum, 7.0, 3.6, 5, 11.0, {3, 2, 2, 2}},
     {strl__plant_item_tank, 11.0, 11.0, 14, 17.0, {1, 6, 1, 1}},
-    {strl__plant_item_cooling_tower, 17.0, 17.0, 40, 21.0, {0, 0, 6, 2}},
+    {strl__plant_item_cooling_tower, 17.0, 17.0, 40, 21.0, {0, 0, 1, 0}},
     {strl__plant_item_stack, 6.0, 6.0, 50, 7.5, {1, 0, 0, 2}},
     {strl__plant_item_skid, 3.6, 2.4, 3, 4.0, {3, 4, 4, 3}},
     {strl__plant_item_air_cooler, 7.0, 6.0, 5, 12.0, {2, 0, 3, 1}},
@@ -138,30 +138,36 @@ static void plan_hollow(strl__plant *plant, int kind)
             unit->hollow[x][y] = true;
 }
 
-static void make_boiler(strl__plant *plant)
+/* What makes a kind of unit: a boiler inside the frame, or a cooling tower beside it. Returns the width that it takes of the
+ * ground on the right of the frame. */
+static double make_landmark(strl__plant *plant, strl__plant_unit_kind kind, double right)
 {
     const strl__plant_unit *unit = &plant->unit;
-    const strl__plant_spot spot = {unit->frame_x + STRL__PLANT_BAY,
-                                   unit->frame_y + STRL__PLANT_BAY,
-                                   0,
-                                   2 * STRL__PLANT_BAY,
-                                   2 * STRL__PLANT_BAY,
-                                   STRL__PLANT_STOREY * unit->levels + 1};
+    uint64_t kept = keep(plant, KEEP_LANDMARK);
+    const double bay = STRL__PLANT_BAY, size = fmin(20, unit->depth - unit->frame_y - 1);
+    const strl__plant_spot inside = {
+        unit->frame_x + bay, unit->frame_y + bay, 0, 2 * bay, 2 * bay, STRL__PLANT_STOREY * unit->levels + 1};
+    const strl__plant_spot beside = {right, unit->frame_y, 0, size, size, 60};
     if (unit->hollow[1][1])
-        strl__plant_try(plant, strl__plant_item_boiler, &spot, keep(plant, KEEP_BOILER));
+        strl__plant_try(plant, strl__plant_item_boiler, &inside, kept);
+    if (kind == UNIT_COOLING && size > 12 && right + size < unit->length &&
+        strl__plant_try(plant, strl__plant_item_cooling_tower, &beside, kept))
+        return size + 1;
+    return 0;
 }
 
-static void make_equipment(strl__plant *plant, int kind)
+static void make_equipment(strl__plant *plant, strl__plant_unit_kind kind)
 {
     const strl__plant_unit *unit = &plant->unit;
     double right = unit->frame_x + STRL__PLANT_BAY * unit->bays_x + 2.5,
            back = unit->frame_y + STRL__PLANT_BAY * unit->bays_y + 2;
-    make_boiler(plant);
+    double taken = make_landmark(plant, kind, right);
     for (int level = unit->levels; level >= 0; level--)
         for (int y = 0; y < unit->bays_y; y++)
             for (int x = 0; x < unit->bays_x; x++)
                 fill_bay(plant, x, y, level);
-    fill_ground(plant, right, unit->frame_y, unit->length - right - 1, unit->depth - unit->frame_y - 1, kind);
+    fill_ground(plant, right + taken, unit->frame_y, unit->length - right - taken - 1, unit->depth - unit->frame_y - 1,
+                kind);
     fill_ground(plant, unit->frame_x - 2.5, back, right - unit->frame_x, unit->depth - back - 1, kind);
 }
 
