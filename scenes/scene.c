@@ -38,7 +38,7 @@ static const scene_entry scenes[] = {
      STRL__SCENE_MESH_POSITION,
      false},
     {{"plant",
-      "power plant of named pipes, vessels, steel and bolts, 12 to 100,000 triangles a part, as glTF, OBJ, PLY or STL",
+      "power plant of named parts, 12 to 100,000 triangles each: pipes, vessels, steel, bolts; also as glTF and OBJ",
       10000, 4000000000},
      strl__scene_plant,
      STRL__SCENE_MESH_POSITION_NORMAL,
