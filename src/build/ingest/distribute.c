@@ -23,8 +23,8 @@ uint64_t strl__bucket_bytes(const strl_build_context *context)
 unsigned strl__ingest_window(const strl_build_context *context, uint64_t bytes_each)
 {
     uint64_t fit = context->memory_bytes * 2 / 3 / (bytes_each ? bytes_each : 1);
-    unsigned workers = strl_pool_workers(context->pool);
-    return fit < 1 ? 1 : fit < workers ? (unsigned)fit : workers;
+    unsigned wanted = strl_pool_workers(context->pool) + 1; /* one waits for its turn while all work */
+    return fit < 1 ? 1 : fit < wanted ? (unsigned)fit : wanted;
 }
 
 static int compare_keys(const void *a, const void *b)

@@ -97,7 +97,7 @@ strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest,
 /* Pairs to edges and shared positions. */
 strl_status strl__connect_cells(strl_build_context *context, strl_ingest *ingest, pair_spills *pairs, strl_error *err);
 
-/* How many items of this size may be under way at once: one a worker where the budget allows, one in any case. Buckets and pair
+/* How many items of this size may be under way at once: one a worker and one more where the budget allows, one in any case. Buckets and pair
  * spills are of bounded number, so those of a very large model are larger than strl__bucket_bytes. */
 unsigned strl__ingest_window(const strl_build_context *context, uint64_t bytes_each);
 
