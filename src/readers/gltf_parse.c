@@ -404,6 +404,7 @@ static bool is_known_extension(const char *name)
         "EXT_texture_webp",           "EXT_texture_avif",        "MSFT_texture_dds",
         "KHR_lights_punctual",        "KHR_xmp_json_ld",         "KHR_animation_pointer",
         "EXT_mesh_features",          "EXT_instance_features",   "EXT_structural_metadata",
+        "KHR_techniques_webgl",       "KHR_technique_webgl",
     };
     static const char materials[] = "KHR_materials_";
     if (strncmp(name, materials, sizeof materials - 1) == 0)
@@ -471,8 +472,12 @@ static strl_status take(void *context, const char *member, uint64_t index, const
     const size_t which = member_index(member);
     strl__fields fields = {.path = path, .member = member, .index = index, .err = err};
     if (members[which].is_list != (index != STRL__JSON_WHOLE))
-        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected its %s to be %s", path, member,
-                          members[which].is_list ? "a list, as in glTF 2" : "no list");
+        return members[which].is_list
+                   ? strl__fail(err, STRL_ERR_UNSUPPORTED,
+                                "%s: expected glTF 2.0, whose %s are a list, found %s", path, member,
+                                json_is_object(value) ? "an object, as in glTF 1" : "none")
+                   : strl__fail(err, STRL_ERR_FORMAT, "%s: expected its %s not to be a list", path,
+                                member);
     if (index == 0 || index == STRL__JSON_WHOLE) {
         if (gltf->seen >> which & 1)
             return strl__fail(err, STRL_ERR_FORMAT, "%s: its %s stand in it twice", path, member);
