@@ -90,8 +90,8 @@ static strl_status read_container(strl__gltf *gltf, chunk *json, strl_error *err
     uint8_t header[HEADER_BYTES];
     if (reader->opened.bytes < sizeof header)
         return strl__fail(err, STRL_ERR_FORMAT,
-                          "%s: expected the 12 bytes of a GLB header, found %" PRIu64,
-                          reader->path, reader->opened.bytes);
+                          "%s: expected the 12 bytes of a GLB header, found %" PRIu64, reader->path,
+                          reader->opened.bytes);
     strl_status status = strl_file_read(reader->file, 0, header, sizeof header, err);
     if (status)
         return status;
@@ -105,8 +105,8 @@ static strl_status read_container(strl__gltf *gltf, chunk *json, strl_error *err
                           "%s: expected a GLB of version 2, found %" PRIu64, reader->path, version);
     if (end > reader->opened.bytes || end < sizeof header)
         return strl__fail(err, STRL_ERR_FORMAT,
-                          "%s: announces %" PRIu64 " bytes, found a file of %" PRIu64,
-                          reader->path, end, reader->opened.bytes);
+                          "%s: announces %" PRIu64 " bytes, found a file of %" PRIu64, reader->path,
+                          end, reader->opened.bytes);
     status = read_chunk(reader, sizeof header, end, json, err);
     if (status)
         return status;
@@ -154,6 +154,7 @@ static void init(strl_reader *reader)
     gltf->reader = reader;
     gltf->scene = STRL__NO_ITEM;
     gltf->table_limit = reader->memory_bytes / 4;
+    reader->parts.limit_bytes = (size_t)(reader->memory_bytes / 8); /* they are whole paths */
     strl_arena_init(&gltf->arena, (size_t)(reader->memory_bytes / 8));
     strl__gltf_init_thresholds(gltf);
 }
@@ -190,8 +191,8 @@ static strl_status gltf_prepare(strl_reader *reader, strl_error *err)
             most = gltf->accessors[primitive->position].count;
     }
     const strl__batch_desc desc = {.indexed = true,
-                                   .sorted = most > strl__gltf_table_bytes(reader) /
-                                                        sizeof(strl__corner),
+                                   .sorted =
+                                       most > strl__gltf_table_bytes(reader) / sizeof(strl__corner),
                                    .bytes = (size_t)(reader->memory_bytes / 8)};
     strl__gltf_empty_table(reader); /* corners that are known keep their normals and colours */
     return strl__batch_init(&reader->batch, &desc, err);
@@ -213,9 +214,9 @@ static uint64_t instance_count(const strl__gltf_node *node)
 static void count_drops(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t times)
 {
     strl_reader_drops *drops = &gltf->reader->drops;
-    const uint64_t elements = strl__gltf_element_count(gltf, primitive);
     if (primitive->position == STRL__NO_ITEM)
-        return;
+        return; /* what else it names was not checked */
+    const uint64_t elements = strl__gltf_element_count(gltf, primitive);
     if (primitive->mode == 0)
         drops->points += elements * times;
     else if (primitive->mode < 4)

@@ -7,8 +7,9 @@
  * to placement; of the buffers only windows are in memory. Poses of skins and morph targets are not
  * applied.
  *
- * Of the reader's budget at most a quarter is for tables, half less those for what is decompressed,
- * an eighth for buffers that stand in the JSON as text, an eighth for the vertices of a primitive. */
+ * Of the reader's budget at most a quarter is for tables, half less those for what is
+ * decompressed, an eighth for buffers that stand in the JSON as text, an eighth for the vertices
+ * of a primitive. */
 #ifndef STRL_READERS_GLTF_H
 #define STRL_READERS_GLTF_H
 
@@ -21,11 +22,11 @@
 
 /* Numbers that follow each other in a buffer view. */
 typedef struct strl__gltf_column {
-    uint64_t offset;   /* bytes from the view's start */
-    uint32_t view;     /* STRL__NO_ITEM: all zeros */
+    uint64_t offset; /* bytes from the view's start */
+    uint32_t view;   /* STRL__NO_ITEM: all zeros */
     strl__scalar type;
     uint8_t components;
-    bool normalized;   /* integers stand for 0..1 or -1..1 */
+    bool normalized; /* integers stand for 0..1 or -1..1 */
 } strl__gltf_column;
 
 /* Elements of an accessor that are not those of its view. */
@@ -71,14 +72,14 @@ typedef struct strl__gltf_view {
 } strl__gltf_view;
 
 typedef struct strl__gltf_buffer {
-    uint64_t bytes;        /* announced */
-    char *uri;             /* in the arena; NULL: the GLB's second chunk */
+    uint64_t bytes; /* announced */
+    char *uri;      /* in the arena; NULL: the GLB's second chunk */
     bool is_open;
-    strl_file *file;       /* where the bytes are; owned where owns_file */
+    strl_file *file;           /* where the bytes are; owned where owns_file */
     bool owns_file, is_beside; /* is_beside: a file that the user gave, not one of our own */
-    strl_file_info opened; /* of a file beside the model */
+    strl_file_info opened;     /* of a file beside the model */
     uint64_t file_offset;
-    uint8_t *memory;       /* owned; where the bytes are instead of file */
+    uint8_t *memory; /* owned; where the bytes are instead of file */
 } strl__gltf_buffer;
 
 typedef struct strl__gltf_draco_use {
@@ -88,9 +89,9 @@ typedef struct strl__gltf_draco_use {
 
 typedef struct strl__gltf_primitive {
     uint8_t mode; /* as in the file: 0 points, 1..3 lines, 4 triangles, 5 strip, 6 fan */
-    uint32_t indices, material;          /* or STRL__NO_ITEM, as all below */
-    uint32_t position, normal, colour;   /* accessors */
-    strl__gltf_draco_use *draco;         /* in the arena; NULL: not compressed */
+    uint32_t indices, material;        /* or STRL__NO_ITEM, as all below */
+    uint32_t position, normal, colour; /* accessors */
+    strl__gltf_draco_use *draco;       /* in the arena; NULL: not compressed */
 } strl__gltf_primitive;
 
 typedef struct strl__gltf_mesh {
@@ -123,7 +124,7 @@ typedef struct strl__gltf_node {
 } strl__gltf_node;
 
 typedef struct strl__gltf_material {
-    char *name; /* in the arena; may be NULL */
+    char *name;      /* in the arena; may be NULL */
     uint32_t rgba;   /* sRGB-encoded; what the reader tells of it */
     double alpha;    /* factor, linear */
     double cutoff;   /* of a mask, else negative */
@@ -148,7 +149,7 @@ typedef struct strl__gltf_decoded {
 /* The placement that is read. */
 typedef struct strl__gltf_pass {
     bool has_node, has_placement; /* stands at one */
-    uint32_t root;     /* of the scene: the one under which node is */
+    uint32_t root;                /* of the scene: the one under which node is */
     uint32_t node;
     uint32_t primitive; /* of the node's mesh */
     uint64_t instance;
@@ -181,21 +182,21 @@ typedef struct strl__gltf {
     size_t accessor_capacity, view_capacity, buffer_capacity, mesh_capacity, primitive_capacity;
     size_t node_capacity, material_capacity, scene_capacity, child_capacity, root_capacity;
     bool has_asset;
-    uint32_t scene;                   /* as the file says, or STRL__NO_ITEM */
-    uint64_t seen;                    /* top-level members, one bit each */
+    uint32_t scene;                       /* as the file says, or STRL__NO_ITEM */
+    uint64_t seen;                        /* top-level members, one bit each */
     uint64_t binary_offset, binary_bytes; /* the GLB's second chunk */
     bool has_binary;
-    uint64_t text_bytes;              /* of buffers that are in memory */
+    uint64_t text_bytes; /* of buffers that are in memory */
     strl__gltf_decoded decoded[STRL__GLTF_DECODED_MAX];
     uint64_t decoded_bytes, clock;
-    strl__draco *draco;               /* the primitive decompressed last; owned */
+    strl__draco *draco; /* the primitive decompressed last; owned */
     uint32_t draco_primitive;
     uint64_t draco_bytes;
-    uint64_t triangles, vertices;     /* of all placements; of all meshes */
-    strl__gltf_matrix *world;         /* owned; of node's ancestors and itself, by depth */
+    uint64_t triangles, vertices; /* of all placements; of all meshes */
+    strl__gltf_matrix *world;     /* owned; of node's ancestors and itself, by depth */
     strl__gltf_pass pass;
-    uint8_t *window;                  /* owned */
-    double thresholds[255];           /* linear light from where the sRGB code is one more */
+    uint8_t *window;        /* owned */
+    double thresholds[255]; /* linear light from where the sRGB code is one more */
     double values[STRL__GLTF_CHUNK * 4];
     strl__corner corners[STRL__GLTF_CHUNK];
     uint32_t elements[STRL__GLTF_CHUNK];

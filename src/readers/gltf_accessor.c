@@ -122,11 +122,10 @@ static strl_status check_sparse(strl__gltf *gltf, uint32_t index, strl_error *er
 {
     const strl__gltf_accessor *accessor = &gltf->accessors[index];
     const strl__gltf_sparse *sparse = accessor->sparse;
-    strl_status status = check_column(gltf, index, ".sparse.indices", &sparse->indices,
-                                      sparse->count, err);
+    strl_status status =
+        check_column(gltf, index, ".sparse.indices", &sparse->indices, sparse->count, err);
     if (!status)
-        status =
-            check_column(gltf, index, ".sparse.values", &sparse->values, sparse->count, err);
+        status = check_column(gltf, index, ".sparse.values", &sparse->values, sparse->count, err);
     uint64_t least = 0;
     for (uint64_t first = 0; first < sparse->count && !status; first += STRL__GLTF_CHUNK) {
         uint64_t left = sparse->count - first;
@@ -135,10 +134,11 @@ static strl_status check_sparse(strl__gltf *gltf, uint32_t index, strl_error *er
         for (size_t i = 0; i < count && !status; i++) {
             uint32_t element = gltf->elements[i];
             if (element < least || element >= accessor->count)
-                status = strl__fail(err, STRL_ERR_FORMAT,
-                                    "%s, accessors[%u].sparse: expected growing indices below %"
-                                    PRIu64 ", found %u at %" PRIu64,
-                                    gltf->reader->path, index, accessor->count, element, first + i);
+                status =
+                    strl__fail(err, STRL_ERR_FORMAT,
+                               "%s, accessors[%u].sparse: expected growing indices below %" PRIu64
+                               ", found %u at %" PRIu64,
+                               gltf->reader->path, index, accessor->count, element, first + i);
             least = (uint64_t)element + 1;
         }
     }
@@ -153,8 +153,7 @@ strl_status strl__gltf_check_accessor(strl__gltf *gltf, uint32_t index, strl_err
     strl__gltf_accessor *accessor = &gltf->accessors[index];
     if (accessor->is_checked)
         return STRL_OK;
-    strl_status status =
-        check_column(gltf, index, "", &accessor->values, accessor->count, err);
+    strl_status status = check_column(gltf, index, "", &accessor->values, accessor->count, err);
     if (!status && accessor->sparse && accessor->sparse->count > accessor->count)
         status = strl__fail(err, STRL_ERR_FORMAT,
                             "%s, accessors[%u].sparse: expected at most %" PRIu64
@@ -208,8 +207,7 @@ static strl_status read_column(strl__gltf *gltf, const strl__gltf_column *column
         size_t some = window_elements(gltf, column, count - done);
         status = load(gltf, column, first + done, some, err);
         for (size_t i = 0; i < some && !status; i++)
-            convert(column, gltf->window + i * stride,
-                    numbers + (done + i) * column->components);
+            convert(column, gltf->window + i * stride, numbers + (done + i) * column->components);
         done += some;
     }
     return status;

@@ -40,11 +40,13 @@ static bool decode_percent(char *text)
 /* A scheme, or a path from the root: files beside the model have neither. */
 static bool is_relative(const char *uri)
 {
-    size_t letters = strspn(uri, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789+-.");
+    size_t letters =
+        strspn(uri, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789+-.");
     return uri[0] && uri[0] != '/' && uri[0] != '\\' && uri[letters] != ':';
 }
 
-/* The URI's path beside the model, as it is or decoded; owned by the caller, NULL without memory. */
+/* The URI's path beside the model, as it is or decoded; owned by the caller, NULL without memory.
+ */
 static char *beside(const char *model, const char *uri, bool decode, bool *good)
 {
     const char *slash = strrchr(model, '/');
@@ -101,13 +103,12 @@ static strl_status open_binary(strl__gltf *gltf, uint32_t index, strl_error *err
 {
     strl__gltf_buffer *buffer = &gltf->buffers[index];
     if (!gltf->has_binary || index > 0)
-        return strl__fail(err, STRL_ERR_FORMAT,
-                          "%s, buffers[%u]: expected a uri%s, found none", gltf->reader->path,
-                          index, index ? "" : " or a binary chunk");
+        return strl__fail(err, STRL_ERR_FORMAT, "%s, buffers[%u]: expected a uri%s, found none",
+                          gltf->reader->path, index, index ? "" : " or a binary chunk");
     if (gltf->binary_bytes < buffer->bytes)
         return strl__fail(err, STRL_ERR_FORMAT,
-                          "%s, buffers[%u]: expected %" PRIu64 " bytes, found a binary chunk of %"
-                          PRIu64,
+                          "%s, buffers[%u]: expected %" PRIu64
+                          " bytes, found a binary chunk of %" PRIu64,
                           gltf->reader->path, index, buffer->bytes, gltf->binary_bytes);
     buffer->file = gltf->reader->file;
     buffer->file_offset = gltf->binary_offset;
@@ -120,8 +121,8 @@ static strl_status open_binary(strl__gltf *gltf, uint32_t index, strl_error *err
 typedef struct data_text {
     strl__gltf *gltf;
     uint32_t index;
-    uint64_t at, end;   /* in the file */
-    uint64_t decoded;   /* bytes so far */
+    uint64_t at, end; /* in the file */
+    uint64_t decoded; /* bytes so far */
     uint32_t bits, bit_count;
     uint8_t out[TEXT_BYTES]; /* that wait to be written */
     size_t waiting;
@@ -187,8 +188,8 @@ static strl_status decode_base64(data_text *text, const char *chars, size_t coun
 static strl_status pass_header(data_text *text, strl_error *err)
 {
     char header[HEADER_BYTES_MAX + 1];
-    size_t size = text->end - text->at < HEADER_BYTES_MAX ? (size_t)(text->end - text->at)
-                                                          : HEADER_BYTES_MAX;
+    size_t size =
+        text->end - text->at < HEADER_BYTES_MAX ? (size_t)(text->end - text->at) : HEADER_BYTES_MAX;
     strl_status status = strl_file_read(text->gltf->reader->file, text->at, header, size, err);
     if (status)
         return status;
@@ -220,10 +221,10 @@ static strl_status decode_text(data_text *text, strl_error *err)
     if (!status)
         status = flush_decoded(text, err);
     if (!status && text->decoded < buffer->bytes)
-        status = strl__fail(err, STRL_ERR_FORMAT,
-                            "%s, buffers[%u]: expected %" PRIu64 " bytes, found a data URI of %"
-                            PRIu64,
-                            text->gltf->reader->path, text->index, buffer->bytes, text->decoded);
+        status =
+            strl__fail(err, STRL_ERR_FORMAT,
+                       "%s, buffers[%u]: expected %" PRIu64 " bytes, found a data URI of %" PRIu64,
+                       text->gltf->reader->path, text->index, buffer->bytes, text->decoded);
     return status;
 }
 
@@ -262,8 +263,8 @@ static strl_status open_text(strl__gltf *gltf, uint32_t index, strl_error *err)
     text.end = text.at + bytes;
     if (buffer->bytes > bytes) /* before it sizes anything */
         return strl__fail(err, STRL_ERR_FORMAT,
-                          "%s, buffers[%u]: expected %" PRIu64 " bytes, found a data URI of %"
-                          PRIu64 " letters",
+                          "%s, buffers[%u]: expected %" PRIu64
+                          " bytes, found a data URI of %" PRIu64 " letters",
                           gltf->reader->path, index, buffer->bytes, bytes);
     strl_status status = make_place(gltf, index, err);
     return status ? status : decode_text(&text, err);
@@ -292,8 +293,8 @@ strl_status strl__gltf_check_unchanged(const strl__gltf *gltf, strl_error *err)
     strl_status status = STRL_OK;
     for (size_t i = 0; i < gltf->buffer_count && !status; i++)
         if (gltf->buffers[i].is_beside)
-            status = strl__reader_check_unchanged(gltf->buffers[i].file, &gltf->buffers[i].opened,
-                                                  err);
+            status =
+                strl__reader_check_unchanged(gltf->buffers[i].file, &gltf->buffers[i].opened, err);
     return status;
 }
 

@@ -16,19 +16,18 @@ typedef struct expectation {
     const char *sentence;
 } expectation;
 
-static const expectation expected_position = {
-    "POSITION", 3, 3,
-    TYPE(STRL__F32) | TYPE(STRL__I8) | TYPE(STRL__U8) | TYPE(STRL__I16) | TYPE(STRL__U16),
-    "three floats, bytes or shorts"};
+static const expectation expected_position = {"POSITION", 3, 3,
+                                              TYPE(STRL__F32) | TYPE(STRL__I8) | TYPE(STRL__U8) |
+                                                  TYPE(STRL__I16) | TYPE(STRL__U16),
+                                              "three floats, bytes or shorts"};
 static const expectation expected_normal = {"NORMAL", 3, 3,
                                             TYPE(STRL__F32) | TYPE(STRL__I8) | TYPE(STRL__I16),
                                             "three floats, signed bytes or shorts"};
 static const expectation expected_colour = {"COLOR_0", 3, 4,
                                             TYPE(STRL__F32) | TYPE(STRL__U8) | TYPE(STRL__U16),
                                             "three or four floats, unsigned bytes or shorts"};
-static const expectation expected_indices = {"indices", 1, 1,
-                                             TYPE(STRL__U8) | TYPE(STRL__U16) | TYPE(STRL__U32),
-                                             "unsigned integers"};
+static const expectation expected_indices = {
+    "indices", 1, 1, TYPE(STRL__U8) | TYPE(STRL__U16) | TYPE(STRL__U32), "unsigned integers"};
 static const expectation expected_translation = {"TRANSLATION", 3, 3, TYPE(STRL__F32),
                                                  "three floats"};
 static const expectation expected_rotation = {"ROTATION", 4, 4,
@@ -110,8 +109,7 @@ static strl_status check_triangles(strl__gltf *gltf, const strl__gltf_primitive 
 
 uint64_t strl__gltf_element_count(const strl__gltf *gltf, const strl__gltf_primitive *primitive)
 {
-    uint32_t index =
-        primitive->indices != STRL__NO_ITEM ? primitive->indices : primitive->position;
+    uint32_t index = primitive->indices != STRL__NO_ITEM ? primitive->indices : primitive->position;
     return index == STRL__NO_ITEM ? 0 : gltf->accessors[index].count;
 }
 

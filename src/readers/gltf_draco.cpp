@@ -12,7 +12,8 @@ struct strl__draco {
     std::unique_ptr<draco::Mesh> mesh;
 };
 
-namespace {
+namespace
+{
 
 /* The start of a bitstream, as its specification has it:
  * https://google.github.io/draco/spec/ (header, metadata, connectivity). */
@@ -168,7 +169,8 @@ int strl__draco_numbers(const strl__draco *mesh, uint32_t id, uint64_t first, si
         if (good && attribute->data_type() == draco::DT_FLOAT32)
             good = attribute->ConvertValue<float>(value, static_cast<int8_t>(components), reals);
         else if (good)
-            good = attribute->ConvertValue<int32_t>(value, static_cast<int8_t>(components), integers);
+            good =
+                attribute->ConvertValue<int32_t>(value, static_cast<int8_t>(components), integers);
         if (!good)
             return -1;
         for (unsigned k = 0; k < components; k++)

@@ -13,9 +13,9 @@ void strl__fields_fail(strl__fields *fields, const char *key, const char *expect
         return;
     if (fields->index != STRL__JSON_WHOLE)
         snprintf(index, sizeof index, "[%" PRIu64 "]", fields->index);
-    fields->status = strl__fail(fields->err, STRL_ERR_FORMAT, "%s, %s%s%s%s: expected %s",
-                                fields->path, fields->member, index, *key ? "." : "", key,
-                                expected);
+    fields->status =
+        strl__fail(fields->err, STRL_ERR_FORMAT, "%s, %s%s%s%s: expected %s", fields->path,
+                   fields->member, index, *key ? "." : "", key, expected);
 }
 
 /* The member; fails where the object is none. */

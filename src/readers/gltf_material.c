@@ -1,5 +1,5 @@
 /* Materials come down to one colour: the base colour's factor, linear in the file. Of alpha modes,
- * OPAQUE makes alpha 1, BLEND keeps it, and MASK makes it 0 or 1 by the cutoff, vertex by vertex. */
+ * OPAQUE makes alpha 1, BLEND keeps it, MASK makes it 0 or 1 by the cutoff, vertex by vertex. */
 #include <math.h>
 #include <string.h>
 
@@ -67,9 +67,9 @@ strl_status strl__gltf_parse_material(strl__gltf *gltf, strl__fields *fields, co
     if (mode && strcmp(mode, "MASK") == 0)
         material.cutoff = fmax(cutoff, 0);
     material.alpha = factor[3];
-    material.rgba = strl__pack_colour(
-        strl__gltf_encode(gltf, factor[0]), strl__gltf_encode(gltf, factor[1]),
-        strl__gltf_encode(gltf, factor[2]), mask_or_blend(&material, factor[3]));
+    material.rgba =
+        strl__pack_colour(strl__gltf_encode(gltf, factor[0]), strl__gltf_encode(gltf, factor[1]),
+                          strl__gltf_encode(gltf, factor[2]), mask_or_blend(&material, factor[3]));
     if (fields->status)
         return fields->status;
     if (name && !(material.name = strl__gltf_keep(gltf, strlen(name) + 1, fields->err)))

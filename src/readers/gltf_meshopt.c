@@ -51,7 +51,8 @@ strl_status strl__gltf_make_room(strl__gltf *gltf, uint64_t bytes, const char *w
     if (bytes <= limit && bytes + gltf->draco_bytes <= limit)
         return STRL_OK;
     return strl__fail(err, STRL_ERR_LIMIT,
-                      "%s: %s takes %" PRIu64 " bytes decompressed, the memory budget allows %" PRIu64
+                      "%s: %s takes %" PRIu64
+                      " bytes decompressed, the memory budget allows %" PRIu64
                       ": more --memory may help",
                       gltf->reader->path, what, bytes, limit);
 }
@@ -95,8 +96,8 @@ strl_status strl__gltf_check_meshopt(strl__gltf *gltf, uint32_t index, strl_erro
     strl_status status = strl__gltf_open_buffer(gltf, meshopt->buffer, err);
     uint64_t decoded = meshopt->count * meshopt->stride;
     return status ? status
-                  : strl__gltf_make_room(gltf, decoded + meshopt->bytes,
-                                         "a compressed buffer view", err);
+                  : strl__gltf_make_room(gltf, decoded + meshopt->bytes, "a compressed buffer view",
+                                         err);
 }
 
 static int decode(const strl__gltf_meshopt *meshopt, const uint8_t *packed, uint8_t *bytes)
@@ -157,9 +158,10 @@ static strl_status add_decoded(strl__gltf *gltf, uint32_t index, strl__gltf_deco
         drop(gltf, place);
     }
     uint8_t *bytes = strl__alloc((size_t)size, 1);
-    status = bytes ? decompress(gltf, index, bytes, err)
-                   : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for %" PRIu64
-                                " decompressed bytes", gltf->reader->path, size);
+    status =
+        bytes ? decompress(gltf, index, bytes, err)
+              : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for %" PRIu64 " decompressed bytes",
+                           gltf->reader->path, size);
     if (status) {
         strl__free(bytes);
         return status;

@@ -56,8 +56,8 @@ static char *keep_text(strl__gltf *gltf, strl__fields *fields, const json_t *val
 }
 
 #define ADD(gltf, list, count, capacity, err)                                                      \
-    strl__gltf_add(gltf, &(gltf)->list, &(gltf)->count, &(gltf)->capacity,                         \
-                   sizeof *(gltf)->list, err)
+    strl__gltf_add(gltf, &(gltf)->list, &(gltf)->count, &(gltf)->capacity, sizeof *(gltf)->list,   \
+                   err)
 
 /* ---- buffers, views, accessors */
 
@@ -291,8 +291,7 @@ static strl_status parse_mesh(strl__gltf *gltf, strl__fields *fields, const json
 /* ---- nodes and scenes */
 
 static strl_status parse_indices(strl__gltf *gltf, strl__fields *fields, const json_t *list,
-                                 const char *key, uint32_t **items, size_t *count,
-                                 size_t *capacity)
+                                 const char *key, uint32_t **items, size_t *count, size_t *capacity)
 {
     for (size_t i = 0; !fields->status && i < json_array_size(list); i++) {
         uint32_t index = strl__fields_list_index(fields, list, i, key);
@@ -390,8 +389,11 @@ static strl_status parse_asset(strl__gltf *gltf, strl__fields *fields, const jso
     gltf->has_asset = true;
     if (version && strncmp(version, "2.", 2) == 0 && (!least || strcmp(least, "2.0") == 0))
         return STRL_OK;
-    return strl__fail(fields->err, STRL_ERR_UNSUPPORTED, "%s: expected glTF 2.0, found version %.20s",
-                      fields->path, least ? least : version ? version : "unknown");
+    return strl__fail(fields->err, STRL_ERR_UNSUPPORTED,
+                      "%s: expected glTF 2.0, found version %.20s", fields->path,
+                      least     ? least
+                      : version ? version
+                                : "unknown");
 }
 
 /* Those of textures and materials change no geometry: what is not understood of them becomes the
@@ -443,11 +445,16 @@ static const struct {
     bool is_list;
     parse_element parse;
 } members[] = {
-    {"asset", false, parse_asset},           {"scene", false, parse_default_scene},
-    {"extensionsRequired", true, parse_required}, {"scenes", true, parse_scene},
-    {"nodes", true, parse_node},             {"meshes", true, parse_mesh},
-    {"accessors", true, parse_accessor},     {"bufferViews", true, parse_view},
-    {"buffers", true, parse_buffer},         {"materials", true, strl__gltf_parse_material},
+    {"asset", false, parse_asset},
+    {"scene", false, parse_default_scene},
+    {"extensionsRequired", true, parse_required},
+    {"scenes", true, parse_scene},
+    {"nodes", true, parse_node},
+    {"meshes", true, parse_mesh},
+    {"accessors", true, parse_accessor},
+    {"bufferViews", true, parse_view},
+    {"buffers", true, parse_buffer},
+    {"materials", true, strl__gltf_parse_material},
 };
 
 static size_t member_index(const char *name)
@@ -474,8 +481,8 @@ static strl_status take(void *context, const char *member, uint64_t index, const
     if (members[which].is_list != (index != STRL__JSON_WHOLE))
         return members[which].is_list
                    ? strl__fail(err, STRL_ERR_UNSUPPORTED,
-                                "%s: expected glTF 2.0, whose %s are a list, found %s", path, member,
-                                json_is_object(value) ? "an object, as in glTF 1" : "none")
+                                "%s: expected glTF 2.0, whose %s are a list, found %s", path,
+                                member, json_is_object(value) ? "an object, as in glTF 1" : "none")
                    : strl__fail(err, STRL_ERR_FORMAT, "%s: expected its %s not to be a list", path,
                                 member);
     if (index == 0 || index == STRL__JSON_WHOLE) {

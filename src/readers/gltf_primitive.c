@@ -27,8 +27,8 @@ static strl_status check_announced(strl__gltf *gltf, const strl__gltf_primitive 
                           gltf->reader->path, primitive->draco->view, faces_most,
                           gltf->accessors[primitive->position].count, faces, points);
     gltf->draco_bytes = 0;
-    strl_status status = strl__gltf_make_room(gltf, faces * DRACO_FACE_BYTES + size,
-                                              "a Draco mesh", err);
+    strl_status status =
+        strl__gltf_make_room(gltf, faces * DRACO_FACE_BYTES + size, "a Draco mesh", err);
     gltf->draco_bytes = status ? 0 : faces * DRACO_FACE_BYTES + size;
     return status;
 }
@@ -61,11 +61,11 @@ static strl_status decode_draco(strl__gltf *gltf, const strl__gltf_primitive *pr
         strl__gltf_make_room(gltf, view->bytes, "a Draco mesh's compressed form", err);
     uint8_t *packed = status ? NULL : strl__alloc((size_t)view->bytes, 1);
     if (!status && !packed)
-        status = strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a Draco mesh",
-                            gltf->reader->path);
+        status =
+            strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a Draco mesh", gltf->reader->path);
     if (!status)
-        status = strl__gltf_read_view(gltf, primitive->draco->view, 0, packed, (size_t)view->bytes,
-                                      err);
+        status =
+            strl__gltf_read_view(gltf, primitive->draco->view, 0, packed, (size_t)view->bytes, err);
     if (!status)
         status = check_announced(gltf, primitive, packed, (size_t)view->bytes, err);
     if (!status) {
@@ -124,8 +124,8 @@ static void place_positions(strl__gltf *gltf, strl__corner *corners, size_t coun
     for (size_t i = 0; i < count; i++) {
         const double *p = gltf->values + 3 * i;
         for (unsigned row = 0; row < 3; row++)
-            corners[i].position[row] = m[4 * row] * p[0] + m[4 * row + 1] * p[1] +
-                                       m[4 * row + 2] * p[2] + m[4 * row + 3];
+            corners[i].position[row] =
+                m[4 * row] * p[0] + m[4 * row + 1] * p[1] + m[4 * row + 2] * p[2] + m[4 * row + 3];
     }
 }
 
@@ -166,7 +166,8 @@ static strl_status read_corners(strl__gltf *gltf, const strl__gltf_primitive *pr
 {
     static const strl__gltf_draco_use none = {0, STRL__NO_ITEM, STRL__NO_ITEM, STRL__NO_ITEM};
     const strl__gltf_draco_use *draco = primitive->draco ? primitive->draco : &none;
-    strl_status status = read_attribute(gltf, primitive->position, draco->position, first, count, err);
+    strl_status status =
+        read_attribute(gltf, primitive->position, draco->position, first, count, err);
     if (status)
         return status;
     for (size_t i = 0; i < count; i++) {
@@ -198,8 +199,7 @@ static strl__layout corner_layout(void)
                            .has_alpha = true};
     for (uint32_t i = 0; i < 4; i++) {
         uint32_t byte = layout.big_endian ? 3 - i : i;
-        layout.colour[i] =
-            (strl__field){(uint32_t)offsetof(strl__corner, colour) + byte, STRL__U8};
+        layout.colour[i] = (strl__field){(uint32_t)offsetof(strl__corner, colour) + byte, STRL__U8};
     }
     for (uint32_t i = 0; i < 3; i++) {
         layout.position[i] =
@@ -227,8 +227,8 @@ static strl_status load_vertices(strl__gltf *gltf, const strl__gltf_primitive *p
     strl_status status = STRL_OK;
     strl__gltf_empty_table(reader);
     for (uint64_t first = 0; first < total && !status; first += STRL__GLTF_CHUNK) {
-        size_t count = total - first < STRL__GLTF_CHUNK ? (size_t)(total - first)
-                                                        : STRL__GLTF_CHUNK;
+        size_t count =
+            total - first < STRL__GLTF_CHUNK ? (size_t)(total - first) : STRL__GLTF_CHUNK;
         status = read_corners(gltf, primitive, first, count, gltf->corners, err);
         for (size_t i = 0; i < count && !status; i++)
             status = strl__table_append(&reader->vertices, &gltf->corners[i], err);
@@ -246,7 +246,8 @@ static strl_status place_instance(strl__gltf *gltf, const strl__gltf_instances *
     const uint64_t instance = gltf->pass.instance;
     strl_status status = STRL_OK;
     if (instances->translation != STRL__NO_ITEM)
-        status = strl__gltf_read_numbers(gltf, instances->translation, instance, 1, translation, err);
+        status =
+            strl__gltf_read_numbers(gltf, instances->translation, instance, 1, translation, err);
     if (!status && instances->rotation != STRL__NO_ITEM)
         status = strl__gltf_read_numbers(gltf, instances->rotation, instance, 1, rotation, err);
     if (!status && instances->scale != STRL__NO_ITEM)
@@ -337,11 +338,10 @@ static void corners_of(unsigned mode, uint64_t triangle, size_t in_chunk, uint32
 static strl_status index_fail(const strl__gltf *gltf, const strl__gltf_primitive *primitive,
                               uint32_t found, uint64_t triangle, strl_error *err)
 {
-    return strl__fail(err, STRL_ERR_FORMAT,
-                      "%s, accessors[%u]: expected indices below %" PRIu64 ", found %u in triangle %"
-                      PRIu64,
-                      gltf->reader->path, primitive->indices, gltf->pass.vertex_count, found,
-                      triangle);
+    return strl__fail(
+        err, STRL_ERR_FORMAT,
+        "%s, accessors[%u]: expected indices below %" PRIu64 ", found %u in triangle %" PRIu64,
+        gltf->reader->path, primitive->indices, gltf->pass.vertex_count, found, triangle);
 }
 
 static strl_status add_indexed(strl__gltf *gltf, const strl__gltf_primitive *primitive,

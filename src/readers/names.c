@@ -121,7 +121,8 @@ strl_status strl__names_add(strl__names *names, const char *text, size_t length,
                   3 * names->slot_count * sizeof *names->slots;
     if (held > names->limit_bytes || names->count >= UINT32_MAX - 1)
         return strl__fail(err, STRL_ERR_LIMIT,
-                          "expected at most %zu bytes of names, found more than %zu names",
+                          "expected at most %zu bytes of names, found more than %zu names: more --memory "
+                          "may help",
                           names->limit_bytes, names->count);
     if (!strl__grow(&names->items, &names->capacity, names->count + 1, sizeof *names->items) ||
         !grow_slots(names))
