@@ -1,4 +1,5 @@
-"""Writes glTF files and says which triangles they hold, with nothing of the reader in it: the standard library alone."""
+"""Writes glTF files and says which triangles they hold, with nothing of the reader in it: the standard library
+alone."""
 import base64
 import json
 import math
@@ -34,7 +35,8 @@ class Model:
     def accessor(self, rows, component, buffer=0, stride=None, **more):
         """rows: tuples, or numbers for scalars."""
         rows = [row if isinstance(row, (tuple, list)) else (row,) for row in rows]
-        return self.accessor_of(pack(rows, component, stride), len(rows), len(rows[0]), component, buffer, stride, **more)
+        return self.accessor_of(pack(rows, component, stride), len(rows), len(rows[0]), component, buffer, stride,
+                                **more)
 
     def accessor_of(self, data, count, components, component, buffer=0, stride=None, **more):
         return self.add("accessors", {"bufferView": self.view(data, stride, buffer), "componentType": component,

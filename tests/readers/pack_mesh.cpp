@@ -1,8 +1,8 @@
 /* What the tests of the glTF reader compress, with the libraries' own encoders, from standard input to standard output:
  *
  *   pack_mesh attributes|triangles|indices COUNT STRIDE        raw elements
- *   pack_mesh octahedral|quaternion|exponential COUNT STRIDE   floats, 4 an element (exponential: STRIDE / 4), filtered,
- *                                                              then packed as attributes
+ *   pack_mesh octahedral|quaternion|exponential COUNT STRIDE   floats, 4 an element (exponential: STRIDE / 4),
+ *                                                              filtered, then packed as attributes
  *   pack_mesh draco edgebreaker|sequential FACES COLOURS       corners: 3 floats of position, 3 of normal, and with
  *                                                              COLOURS = 1 four bytes of colour; the number of points
  *                                                              goes to standard error */
@@ -55,7 +55,8 @@ static int pack_meshopt(const std::string &kind, size_t count, size_t stride)
             indices[i] = index;
         }
         const bool list = kind == "triangles";
-        packed.resize(list ? meshopt_encodeIndexBufferBound(count, 65536) : meshopt_encodeIndexSequenceBound(count, 65536));
+        packed.resize(list ? meshopt_encodeIndexBufferBound(count, 65536)
+                           : meshopt_encodeIndexSequenceBound(count, 65536));
         packed.resize(list ? meshopt_encodeIndexBuffer(packed.data(), packed.size(), indices.data(), count)
                            : meshopt_encodeIndexSequence(packed.data(), packed.size(), indices.data(), count));
     } else {
@@ -91,7 +92,8 @@ static int pack_draco(const std::string &method, uint32_t faces, bool colours)
         return 1;
     draco::Encoder encoder;
     draco::EncoderBuffer packed;
-    encoder.SetEncodingMethod(method == "edgebreaker" ? draco::MESH_EDGEBREAKER_ENCODING : draco::MESH_SEQUENTIAL_ENCODING);
+    encoder.SetEncodingMethod(method == "edgebreaker" ? draco::MESH_EDGEBREAKER_ENCODING
+                                                      : draco::MESH_SEQUENTIAL_ENCODING);
     if (!encoder.EncodeMeshToBuffer(*mesh, &packed).ok())
         return 1;
     fprintf(stderr, "%u\n", mesh->num_points());

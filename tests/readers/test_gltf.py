@@ -16,8 +16,8 @@ HALF = math.sqrt(0.5)
 def grid(size):
     """A bumpy sheet: positions and indices."""
     points = [(x / 8, y / 8, (x * 7 + y * 3) % 5 / 16) for y in range(size) for x in range(size)]
-    faces = [i for y in range(size - 1) for x in range(size - 1) for i in
-             (y * size + x, y * size + x + 1, (y + 1) * size + x, y * size + x + 1, (y + 1) * size + x + 1, (y + 1) * size + x)]
+    faces = [y * size + x + corner for y in range(size - 1) for x in range(size - 1)
+             for corner in (0, 1, size, 1, size + 1, size)]
     return points, faces
 
 
@@ -131,13 +131,15 @@ def corners_that_are_not_finite_are_counted(folder):
 
 
 def quantised_positions_are_normalized_where_the_accessor_says_so(folder):
-    cases = [(w.U16, True, 65535), (w.I16, True, 32767), (w.U8, True, 255), (w.I8, True, 127), (w.I16, False, 1), (w.U8, False, 1)]
+    cases = [(w.U16, True, 65535), (w.I16, True, 32767), (w.U8, True, 255), (w.I8, True, 127),
+             (w.I16, False, 1), (w.U8, False, 1)]
     for component, normalized, most in cases:
         rows = [(0, 0, 0), (100, 3, 0), (120, 90, 7), (1, 2, 3)]
         if component in (w.I8, w.I16):
             rows = [(-x, y, z) for x, y, z in rows]
         model = w.Model()
-        position = model.accessor(rows, component, stride=8 if component in (w.U16, w.I16) else 4, normalized=normalized)
+        stride = 8 if component in (w.U16, w.I16) else 4
+        position = model.accessor(rows, component, stride=stride, normalized=normalized)
         mesh = model.mesh({"attributes": {"POSITION": position}, "indices": model.accessor(QUAD_INDICES, w.U8)})
         model.scene(model.node(mesh=mesh, scale=[most] * 3))
         model.json["extensionsRequired"] = model.json["extensionsUsed"] = ["KHR_mesh_quantization"]
@@ -205,7 +207,8 @@ def buffers_lie_beside_the_model_or_in_its_text(folder):
         return model
 
     wanted = w.triangles(points, faces)
-    make().gltf(f"{folder}/beside.gltf", [("points%20%C3%A9.bin", "points é.bin"), ("sub/./faces.bin", "sub/faces.bin")])
+    names = [("points%20%C3%A9.bin", "points é.bin"), ("sub/./faces.bin", "sub/faces.bin")]
+    make().gltf(f"{folder}/beside.gltf", names)
     result = expect(f"{folder}/beside.gltf", wanted, format="gltf")
     assert result["bytes"] > os.path.getsize(f"{folder}/beside.gltf") + 12 * len(points)
     make().gltf(f"{folder}/literal.gltf", [("100%25.bin", "100%25.bin"), ("a.bin", "a.bin")])
@@ -259,7 +262,8 @@ def materials_become_srgb_and_keep_alpha_by_their_mode(folder):
     rough = {"pbrMetallicRoughness": {"baseColorFactor": factor}}
     glossy = {"extensions": {"KHR_materials_pbrSpecularGlossiness": {"diffuseFactor": factor}}, "alphaMode": "BLEND"}
     materials = [({"name": "red", **rough}, 1), ({"name": "red", "alphaMode": "BLEND", **rough}, 0.4),
-                 ({"alphaMode": "MASK", **rough}, 0), ({"alphaMode": "MASK", "alphaCutoff": 0.3, **rough}, 1), (glossy, 0.4)]
+                 ({"alphaMode": "MASK", **rough}, 0), ({"alphaMode": "MASK", "alphaCutoff": 0.3, **rough}, 1),
+                 (glossy, 0.4)]
     names = ["red", "red (material 1)", "material 2", "material 3", "material 4"]
     model = w.Model()
     position = model.accessor(QUAD[:3], w.FLOAT)
@@ -267,7 +271,8 @@ def materials_become_srgb_and_keep_alpha_by_their_mode(folder):
     model.scene(model.node(mesh=model.mesh(*primitives, {"attributes": {"POSITION": position}})))
     model.glb(f"{folder}/materials.glb")
     result = expect(f"{folder}/materials.glb", w.triangles(QUAD[:3]) * 6)
-    assert result["materials"] == [[n, w.rgba(*factor[:3], a)] for n, (_, a) in zip(names, materials)] + [["", 0xffffffff]], result
+    wanted = [[name, w.rgba(*factor[:3], alpha)] for name, (_, alpha) in zip(names, materials)]
+    assert result["materials"] == wanted + [["", 0xffffffff]], result
     assert [t["material"] for t in result["triangles"]] == list(range(6))
 
 
@@ -358,8 +363,8 @@ def unknown_chunks_extras_and_padding_are_passed_over(folder):
 def names_that_are_not_utf8_are_read(folder):
     model = w.Model()
     model.plain(QUAD, QUAD_INDICES, node={"name": "L?ngs"})
-    text = json.dumps({**model.json, "buffers": [{"byteLength": len(model.buffers[0])}]}).encode().replace(b"L?ngs", b"L\xe4ngs")
-    model.glb(f"{folder}/latin.glb", json_text=text)
+    text = json.dumps({**model.json, "buffers": [{"byteLength": len(model.buffers[0])}]}).encode()
+    model.glb(f"{folder}/latin.glb", json_text=text.replace(b"L?ngs", b"L\xe4ngs"))
     expect(f"{folder}/latin.glb", w.triangles(QUAD, QUAD_INDICES), parts=["L?ngs"])
 
 
@@ -421,7 +426,8 @@ def meshopt_filters_are_undone(folder):
     turns = [(0, 0, 0, 1), (0, HALF, 0, HALF), (0.5, 0.5, 0.5, 0.5), (HALF, 0, HALF, 0)]
     for stride, component in ((4, w.I8), (8, w.I16)):
         model = w.Model()
-        position = model.add("accessors", {"bufferView": compressed(model, "exponential", 4, 12, w.pack(points, w.FLOAT),
+        position = model.add("accessors", {"bufferView": compressed(model, "exponential", 4, 12,
+                                                                    w.pack(points, w.FLOAT),
                                                                     filter_name="EXPONENTIAL"),
                                            "componentType": w.FLOAT, "type": "VEC3", "count": 4})
         normal = model.add("accessors", {"bufferView": compressed(model, "octahedral", 4, stride,
@@ -433,7 +439,8 @@ def meshopt_filters_are_undone(folder):
                                            "componentType": w.I16, "type": "VEC4", "count": 4, "normalized": True})
         mesh = model.mesh({"attributes": {"POSITION": position, "NORMAL": normal},
                            "indices": model.accessor(QUAD_INDICES, w.U16)})
-        model.scene(model.node(mesh=mesh, extensions={"EXT_mesh_gpu_instancing": {"attributes": {"ROTATION": rotation}}}))
+        instancing = {"EXT_mesh_gpu_instancing": {"attributes": {"ROTATION": rotation}}}
+        model.scene(model.node(mesh=mesh, extensions=instancing))
         save_compressed(model, f"{folder}/filters.glb")
         result = read(f"{folder}/filters.glb")
         assert result.get("count") == 8, result

@@ -54,8 +54,9 @@ def chunks_that_lie_are_refused(folder):
     quad().glb(f"{folder}/whole.glb")
     data = bytearray(open(f"{folder}/whole.glb", "rb").read())
     json_bytes, = struct.unpack_from("<I", data, 12)
-    cases = [(4, 1, "expected a GLB of version 2, found 1"), (8, len(data) + 1, "announces"), (8, 3, "announces 3 bytes"),
-             (12, 0xffffffff, "byte 12: expected a chunk of 4294967295 bytes"), (16, 0x11111111, "expected a chunk of JSON"),
+    cases = [(4, 1, "expected a GLB of version 2, found 1"), (8, len(data) + 1, "announces"),
+             (8, 3, "announces 3 bytes"), (12, 0xffffffff, "byte 12: expected a chunk of 4294967295 bytes"),
+             (16, 0x11111111, "expected a chunk of JSON"),
              (20 + json_bytes, 0x7fffffff, "expected a chunk of 2147483647 bytes"),
              (20 + json_bytes + 4, 0x22222222, "expected a uri or a binary chunk")]
     for at, value, sentence in cases:
@@ -74,10 +75,13 @@ def what_does_not_fit_its_buffer_is_refused(folder):
     cases = [(("accessors", 0, "byteOffset"), 1, "end after the"), (("accessors", 0, "count"), 5, "accessors[0]"),
              (("accessors", 0, "count"), 4294967295, "accessors[0]"), (("accessors", 0, "count"), 1 << 40, "count"),
              (("accessors", 0, "byteOffset"), most, "accessors[0]"), (("accessors", 0, "count"), -1, "not negative"),
-             (("accessors", 0, "count"), 1.5, "whole number"), (("accessors", 0, "bufferView"), 9, "bufferViews, found 9"),
+             (("accessors", 0, "count"), 1.5, "whole number"),
+             (("accessors", 0, "bufferView"), 9, "bufferViews, found 9"),
              (("bufferViews", 0, "byteLength"), 1 << 40, "bufferViews[0]"),
-             (("bufferViews", 0, "byteOffset"), most, "bufferViews[0]"), (("bufferViews", 0, "buffer"), 3, "buffers, found 3"),
-             (("bufferViews", 0, "byteStride"), 4096, "byteStride"), (("bufferViews", 0, "byteStride"), 2048, "2048 apart"),
+             (("bufferViews", 0, "byteOffset"), most, "bufferViews[0]"),
+             (("bufferViews", 0, "buffer"), 3, "buffers, found 3"),
+             (("bufferViews", 0, "byteStride"), 4096, "byteStride"),
+             (("bufferViews", 0, "byteStride"), 2048, "2048 apart"),
              (("accessors", 0, "componentType"), 5124, "componentType"), (("accessors", 0, "type"), "VEC5", "type"),
              (("accessors", 0, "type"), "VEC2", "POSITION"), (("accessors", 1, "componentType"), 5126, "indices"),
              (("meshes", 0, "primitives", 0, "attributes", "POSITION"), 7, "accessors, found 7"),
@@ -101,8 +105,10 @@ def indices_beyond_the_vertices_are_refused(folder):
 def bad_graphs_are_refused(folder):
     cases = [([{"children": [1]}, {"children": [0]}], [0], "cycle"), ([{"children": [0]}], [0], "cycle"),
              ([{"children": [2]}, {"children": [2]}, {}], [0, 1], "both have node 2"),
-             ([{"children": [1, 1]}, {}], [0], "both have node 1"), ([{"children": [5]}], [0], "one of 1 nodes, found 5"),
-             ([{}, {}], [0, 0], "there twice"), ([{"children": [1]}, {}], [1], "the child of another"), ([{}], [3], "found 3"),
+             ([{"children": [1, 1]}, {}], [0], "both have node 1"),
+             ([{"children": [5]}], [0], "one of 1 nodes, found 5"),
+             ([{}, {}], [0, 0], "there twice"), ([{"children": [1]}, {}], [1], "the child of another"),
+             ([{}], [3], "found 3"),
              ([{"mesh": 4}], [0], "meshes, found 4"), ([{"children": "all"}], [0], "a list"),
              ([{"matrix": [1, 2, 3]}], [0], "16 numbers"), ([{"translation": [1, "x", 3]}], [0], "3 numbers")]
     for nodes, roots, sentence in cases:
@@ -127,19 +133,21 @@ def transforms_that_overflow_drop_their_triangles(folder):
     model.json["scenes"] = [{"nodes": [0]}]
     model.glb(f"{folder}/inf.glb")
     assert mesh and read(f"{folder}/inf.glb")["nonfinite"] == 2
-    model.glb(f"{folder}/nan.glb", json_text=json.dumps({**model.json, "buffers": [{"byteLength": len(model.buffers[0])}]})
-              .replace("1e+300", "NaN"))
+    text = json.dumps({**model.json, "buffers": [{"byteLength": len(model.buffers[0])}]})
+    model.glb(f"{folder}/nan.glb", json_text=text.replace("1e+300", "NaN"))
     refuse(f"{folder}/nan.glb", "expected JSON")
     model = w.Model()
     translation = model.accessor([(0, 0, 0), (float("nan"), 0, 0)], w.FLOAT)
-    model.plain(QUAD, QUAD_INDICES, node={"extensions": {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": translation}}}})
+    instancing = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": translation}}}
+    model.plain(QUAD, QUAD_INDICES, node={"extensions": instancing})
     model.glb(f"{folder}/instance.glb")
     result = read(f"{folder}/instance.glb")
     assert (result["count"], result["nonfinite"]) == (2, 2), result
 
 
 def sparse_elements_that_are_not_in_order_are_refused(folder):
-    for indices, sentence in (([2, 1], "growing indices below 4, found 1 at 1"), ([1, 1], "found 1 at 1"), ([1, 4], "found 4 at 1"),
+    for indices, sentence in (([2, 1], "growing indices below 4, found 1 at 1"), ([1, 1], "found 1 at 1"),
+                              ([1, 4], "found 4 at 1"),
                               ([0, 1, 2, 3, 3], "expected at most 4 elements, found 5")):
         model = quad()
         model.json["accessors"][0]["sparse"] = {
@@ -163,10 +171,13 @@ def buffers_that_are_not_there_are_refused(folder):
     w.save(f"{folder}/a.bin", b"\0" * 20)
     refuse(f"{folder}/beside.gltf", "expected 60 bytes, found 20")
     for uri, sentence in (("http://example.org/a.bin", "a file beside the model"), ("/etc/passwd", "a file beside"),
-                          ("file:///etc/passwd", "a file beside"), ("\\\\host\\a.bin", "a file beside"), ("a%00.bin", "a zero"),
+                          ("file:///etc/passwd", "a file beside"), ("\\\\host\\a.bin", "a file beside"),
+                          ("a%00.bin", "a zero"),
                           ("", "a file beside"), (".", "found a folder"), ("data:;base64,AA", "letters"),
-                          ("data:;base64," + "!" * 100, "expected base64"), ("data:text/plain," + "x" * 100, "in base64"),
-                          ("data:;base64" + "x" * 100, "with a comma"), ("data:;base64,AAAA=" + "A" * 100, "found a data URI of 3")):
+                          ("data:;base64," + "!" * 100, "expected base64"),
+                          ("data:text/plain," + "x" * 100, "in base64"),
+                          ("data:;base64" + "x" * 100, "with a comma"),
+                          ("data:;base64,AAAA=" + "A" * 100, "found a data URI of 3")):
         model.json["buffers"] = [{"byteLength": 60, "uri": uri}]
         w.save(f"{folder}/uri.gltf", json.dumps(model.json).encode())
         refuse(f"{folder}/uri.gltf", sentence)
@@ -175,7 +186,8 @@ def buffers_that_are_not_there_are_refused(folder):
 def extensions_that_must_be_understood_are_refused_by_name(folder):
     changed(("extensionsRequired",), ["KHR_materials_unlit", "VENDOR_shapes"]).glb(f"{folder}/required.glb")
     refuse(f"{folder}/required.glb", "requires the extension VENDOR_shapes")
-    for asset, sentence in (({"version": "1.0"}, "found version 1.0"), ({"version": "2.0", "minVersion": "2.1"}, "version 2.1"),
+    for asset, sentence in (({"version": "1.0"}, "found version 1.0"),
+                            ({"version": "2.0", "minVersion": "2.1"}, "version 2.1"),
                             ({}, "version unknown")):
         changed(("asset",), asset).glb(f"{folder}/asset.glb")
         refuse(f"{folder}/asset.glb", sentence)
@@ -186,13 +198,17 @@ def extensions_that_must_be_understood_are_refused_by_name(folder):
 
 
 def bad_json_is_refused_with_its_place(folder):
-    cases = [("[]", "byte 0: expected the '{'"), ("{", "expected a name"), ('{"asset"', "a colon"), ('{"asset": }', "a value"),
-             ('{"nodes": [}', "a value"), ('{"nodes": [{]}', "JSON"), ('{"nodes": [{} {}]}', "a comma"), ('{"nodes": [{},]}', "a value"),
+    cases = [("[]", "byte 0: expected the '{'"), ("{", "expected a name"), ('{"asset"', "a colon"),
+             ('{"asset": }', "a value"),
+             ('{"nodes": [}', "a value"), ('{"nodes": [{]}', "JSON"), ('{"nodes": [{} {}]}', "a comma"),
+             ('{"nodes": [{},]}', "a value"),
              ('{"asset": {"version": "2.0"}} x', "the end"), ('{"asset": {"version": "2.0}}', "the end of a string"),
              ('{"nodes": [{} 2]}', "a comma"),
-             ('{"nodes": [{"mesh": 1 2}]}', "expected JSON in its nodes"), ("{\"nodes\": [" + "[" * 300, "nests more than"),
+             ('{"nodes": [{"mesh": 1 2}]}', "expected JSON in its nodes"),
+             ("{\"nodes\": [" + "[" * 300, "nests more than"),
              ('{"anything": ' + '{"a":' * 300, "nests more than"), ('{"nodes": [{"a": \x00}]}', "JSON"),
-             ('{"nodes": [{}], "nodes": [{}]}', "stand in it twice"), ('{"nodes": [3]}', "nodes[0]: expected an object"),
+             ('{"nodes": [{}], "nodes": [{}]}', "stand in it twice"),
+             ('{"nodes": [3]}', "nodes[0]: expected an object"),
              ('{"scene": -1}', "an index"), ("{}", "expected an asset")]
     for text, sentence in cases:
         w.save(f"{folder}/bad.gltf", text.encode())
@@ -219,8 +235,8 @@ def compressed_views_that_lie_are_refused(folder):
     packed, _ = pack("attributes", 4, 12, data=w.pack(QUAD, w.FLOAT))
     model = quad()
     at = model.view(packed)
-    good = {"buffer": 0, "byteOffset": model.json["bufferViews"][at]["byteOffset"], "byteLength": len(packed), "byteStride": 12,
-            "count": 4, "mode": "ATTRIBUTES"}
+    good = {"buffer": 0, "byteOffset": model.json["bufferViews"][at]["byteOffset"], "byteLength": len(packed),
+            "byteStride": 12, "count": 4, "mode": "ATTRIBUTES"}
     model.json["bufferViews"][0] = {"buffer": 0, "byteLength": 48, "extensions": {"EXT_meshopt_compression": good}}
     model.glb(f"{folder}/meshopt.glb")
     assert read(f"{folder}/meshopt.glb")["count"] == 2
@@ -229,7 +245,8 @@ def compressed_views_that_lie_are_refused(folder):
              ({"mode": "NOTHING"}, "EXT_meshopt_compression knows"), ({"filter": "OCTAHEDRAL"}, "do not fit"),
              ({"filter": "QUATERNION"}, "do not fit"), ({"count": 3}, "do not fit"), ({"count": 1 << 61}, "do not fit"),
              ({"count": 1 << 31}, "decompressed", "--memory"), ({"byteLength": 1 << 40}, "end after the buffer"),
-             ({"byteLength": 9}, "damaged"), ({"byteLength": 0}, "damaged"), ({"byteOffset": 0}, "damaged"), ({"buffer": 5}, "found 5")]
+             ({"byteLength": 9}, "damaged"), ({"byteLength": 0}, "damaged"), ({"byteOffset": 0}, "damaged"),
+             ({"buffer": 5}, "found 5")]
     for change, *sentence in cases:
         wrong = copy.deepcopy(model)
         wrong.json["bufferViews"][0]["extensions"]["EXT_meshopt_compression"].update(change)
