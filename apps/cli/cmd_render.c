@@ -279,7 +279,7 @@ static int parse(strl_cli_args *args, render_options *o)
     };
     const strl_cli_usage usage = {
         .positional = "MODEL", .least = 1, .most = 1, .options = options, .option_count = STRL_CLI_COUNT_OF(options),
-        .notes = "MODEL is a container, or with --full also a PLY, STL or OBJ file. In the lines of --stats "
+        .notes = "MODEL is a container, or with --full also a PLY, STL, OBJ or glTF file. In the lines of --stats "
                  "max_error_px is the\n"
                  "largest pixel error of what was drawn, and null where the eye is inside a node's box: no pixel "
                  "error\n"

@@ -15,7 +15,8 @@
 #define INPUT_BYTES_MAX ((uint64_t)1 << 20)
 
 /* The most certain signature first. */
-static const strl__format *const formats[] = {&strl__format_ply, &strl__format_stl,
+static const strl__format *const formats[] = {&strl__format_glb, &strl__format_ply,
+                                              &strl__format_gltf, &strl__format_stl,
                                               &strl__format_obj};
 
 static bool has_extension(const char *path, const char *extension)
@@ -59,8 +60,8 @@ static strl_status recognise(strl_reader *reader, strl_error *err)
     char found[32];
     show_start(&reader->input, found, sizeof found);
     return strl__fail(err, STRL_ERR_UNSUPPORTED,
-                      "%s: expected a PLY, STL or OBJ file by its first bytes or its name's "
-                      "ending, found one that begins with '%s'",
+                      "%s: expected a PLY, STL, OBJ or glTF file by its first bytes or its "
+                      "name's ending, found one that begins with '%s'",
                       reader->path, found);
 }
 
@@ -107,9 +108,9 @@ strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__forma
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a reader", desc->path);
     reader->format = format;
     reader->memory_bytes = memory_bytes;
-    size_t names_bytes = (size_t)(desc->names_bytes ? desc->names_bytes : memory_bytes / 16);
-    strl__names_init(&reader->parts, names_bytes);
-    strl__names_init(&reader->materials, names_bytes);
+    uint64_t names_bytes = desc->names_bytes ? desc->names_bytes : memory_bytes / 8;
+    strl__names_init(&reader->parts, (size_t)names_bytes);
+    strl__names_init(&reader->materials, (size_t)(names_bytes / 2));
     strl_status status = open_file(reader, desc, err);
     if (!status)
         status = open_format(reader, err);
@@ -150,8 +151,10 @@ void strl_reader_info_get(const strl_reader *reader, strl_reader_info *info)
     *info = (strl_reader_info){
         .format = reader->format->name,
         .default_up = reader->format->default_up,
+        .default_unit = reader->format->default_unit,
         .triangles_hint = reader->triangles_hint,
-        .file_bytes = reader->opened.bytes,
+        .hint_is_exact = reader->hint_is_exact,
+        .file_bytes = reader->all_bytes ? reader->all_bytes : reader->opened.bytes,
     };
 }
 
@@ -235,19 +238,29 @@ strl_status strl_reader_next(strl_reader *reader, strl_triangle *triangles, size
     return reader->failure.status;
 }
 
-strl_status strl_reader_rewind(strl_reader *reader, strl_error *err)
+strl_status strl__reader_check_unchanged(strl_file *file, const strl_file_info *opened,
+                                         strl_error *err)
 {
     strl_file_info now;
-    strl_status status = strl_file_stat(reader->file, &now, err);
+    strl_status status = strl_file_stat(file, &now, err);
     if (status)
         return status;
-    if (now.bytes != reader->opened.bytes || now.modified_ns != reader->opened.modified_ns)
+    if (now.bytes != opened->bytes || now.modified_ns != opened->modified_ns)
         return strl__fail(err, STRL_ERR_IO,
                           "%s has changed while it was read: it had %" PRIu64
                           " bytes, now it has %" PRIu64 " and a time of change %s",
-                          reader->path, reader->opened.bytes, now.bytes,
-                          now.modified_ns != reader->opened.modified_ns ? "of its own"
-                                                                        : "as before");
+                          strl_file_path(file), opened->bytes, now.bytes,
+                          now.modified_ns != opened->modified_ns ? "of its own" : "as before");
+    return STRL_OK;
+}
+
+strl_status strl_reader_rewind(strl_reader *reader, strl_error *err)
+{
+    strl_status status = strl__reader_check_unchanged(reader->file, &reader->opened, err);
+    if (!status && reader->format->check_unchanged)
+        status = reader->format->check_unchanged(reader, err);
+    if (status)
+        return status;
     reader->started = reader->ended = reader->failed = false;
     reader->drops = (strl_reader_drops){0};
     strl__batch_reset(&reader->batch);
@@ -256,7 +269,8 @@ strl_status strl_reader_rewind(strl_reader *reader, strl_error *err)
 
 void strl_reader_rest(strl_reader *reader)
 {
-    reader->vertex_count = reader->vertices.count;
+    if (reader->vertices.count)
+        reader->listed_vertices = reader->vertices.count;
     release_tables(reader);
     strl__input_rest(&reader->input);
     reader->prepared = reader->started = false;
@@ -270,7 +284,7 @@ void strl_reader_drops_get(const strl_reader *reader, strl_reader_drops *drops)
 
 uint64_t strl_reader_vertex_count(const strl_reader *reader)
 {
-    return reader->vertices.count ? reader->vertices.count : reader->vertex_count;
+    return reader->listed_vertices ? reader->listed_vertices : reader->vertices.count;
 }
 
 uint32_t strl_reader_missing_count(const strl_reader *reader)
@@ -285,7 +299,10 @@ const char *strl_reader_missing(const strl_reader *reader, uint32_t index)
 
 uint64_t strl_reader_bytes_done(const strl_reader *reader)
 {
-    return reader->started ? strl__input_offset(&reader->input) : 0;
+    if (!reader->started)
+        return 0;
+    return reader->format->bytes_done ? reader->format->bytes_done(reader)
+                                      : strl__input_offset(&reader->input);
 }
 
 uint32_t strl_reader_part_count(const strl_reader *reader)

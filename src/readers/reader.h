@@ -38,17 +38,20 @@ typedef struct strl_reader_desc {
     const char *path;         /* UTF-8; borrowed during the call of open */
     const char *scratch_dir;  /* an existing folder for spill files, which close removes; borrowed during open */
     uint64_t memory_bytes;    /* budget of all the reader holds but names; 0 = 256 MiB; the least is 8 MiB */
-    uint64_t names_bytes;     /* budget of the names of parts, and of those of materials; 0 = a 16th of memory_bytes */
+    uint64_t names_bytes;     /* budget of the names of parts; those of materials have half as much; 0 = an eighth of memory_bytes */
 } strl_reader_desc;
 
 typedef enum strl_axis { STRL_AXIS_X, STRL_AXIS_Y, STRL_AXIS_Z } strl_axis;
 
 /* Facts known at opening. */
 typedef struct strl_reader_info {
-    const char *format;       /* "ply", "stl", "obj"; static */
-    strl_axis default_up;     /* y for OBJ, z for PLY and STL */
+    const char *format;       /* "ply", "stl", "obj", "gltf", "glb"; static */
+    strl_axis default_up;     /* y for OBJ and glTF, z for PLY and STL */
+    const char *default_unit; /* "m" for glTF, else NULL = unknown; static */
     uint64_t triangles_hint;  /* a guess for progress bars (faces announced, or from the file's size); 0 = unknown */
-    uint64_t file_bytes;
+    bool hint_is_exact;       /* no more triangles than that will be read (glTF: all placements, checked); it may be
+                                 far more than the file has bytes */
+    uint64_t file_bytes;      /* with the files that hold what this one names (glTF's buffers) */
 } strl_reader_info;
 
 /* Recognises the format by content, then by name. Fails with one sentence that names file, place, expected and found. */
@@ -56,7 +59,8 @@ strl_status strl_reader_open(const strl_reader_desc *desc, strl_reader **reader,
 void strl_reader_info_get(const strl_reader *reader, strl_reader_info *info);
 /* Up to `capacity` next triangles into `triangles`; *count 0 = the end. A broken file fails here: nothing after is read. */
 strl_status strl_reader_next(strl_reader *reader, strl_triangle *triangles, size_t capacity, size_t *count, strl_error *err);
-/* Back to the first triangle. Fails where the file has changed (size or time of change). */
+/* Back to the first triangle. Fails where the file, or a buffer's file beside it, has changed (size or time of
+ * change). */
 strl_status strl_reader_rewind(strl_reader *reader, strl_error *err);
 /* Gives back what reading takes, tables and windows, until rewind: of many files that are open one is read. Facts, drops and
  * names stay; next gives nothing. */
@@ -72,7 +76,7 @@ const char *strl_reader_missing(const strl_reader *reader, uint32_t index);
 /* Bytes of the file consumed so far in this pass, for progress. */
 uint64_t strl_reader_bytes_done(const strl_reader *reader);
 
-/* Parts (OBJ o/g, STL solids; a file without any has one, unnamed) and materials (one default, white, where absent) as
+/* Parts (OBJ o/g, STL solids, glTF nodes with a mesh; a file without any has one, unnamed) and materials (one default, white, where absent) as
  * known after a whole pass; indices are stable over passes. Names are borrowed UTF-8 until close. */
 uint32_t strl_reader_part_count(const strl_reader *reader);
 const char *strl_reader_part_name(const strl_reader *reader, uint32_t part);

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Every nasty PLY, STL and OBJ is built, with what was dropped counted, or refused with one sentence: soon, in little
+"""Every nasty PLY, STL, OBJ and glTF is built, with what was dropped counted, or refused with one sentence: soon, in little
 memory, without a signal, and with nothing left behind."""
 import json
 import os
@@ -45,7 +45,7 @@ def main():
     problems, built, refused = [], 0, 0
     with tempfile.TemporaryDirectory() as archive_folder, tempfile.TemporaryDirectory() as work:
         unpack(archive, archive_folder)
-        paths = models(archive_folder, (".ply", ".stl", ".obj"))
+        paths = models(archive_folder, (".ply", ".stl", ".obj", ".gltf", ".glb"))
         assert len(paths) > 100, f"only {len(paths)} files in {archive}"
         for path in paths:
             problem, was_built = problem_of(path, work)

@@ -1,6 +1,5 @@
 /* The builder `clusters`: stages in order, and the container from what they left. */
 #include <inttypes.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "base/fail.h"
@@ -114,8 +113,7 @@ static strl_status write_container(const strl_hierarchy *hierarchy, strl_error *
     strl_container_writer_desc desc = {.path = context->desc->output, .scratch_dir = context->scratch_dir,
                                        .part_dir = context->part_dir};
     strl_container_writer *writer = NULL;
-    if (context->desc->unit)
-        snprintf(desc.info.unit, sizeof desc.info.unit, "%s", context->desc->unit);
+    memcpy(desc.info.unit, ingest->unit, sizeof desc.info.unit);
     desc.info.up_axis = (uint32_t)ingest->up;
     desc.info.has_colour = shows_colour(ingest);
     desc.info.triangles_in = result->triangles_in;

@@ -1,6 +1,8 @@
 #include "build/ingest/ingest.h"
 
 #include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
@@ -10,6 +12,24 @@
 #define LEAST_READER_BYTES (8u << 20)
 /* Of a few nodes a level, what is used up and waits for a checkpoint is a large share of all. */
 #define KEEP_TRIANGLES 65536u
+
+/* Stored, never applied: what inputs say of themselves must agree, unless the caller says it. */
+static strl_status take_axes(const strl_build_context *context, const strl_reader_info *info, uint32_t input,
+                             strl_ingest *ingest, strl_error *err)
+{
+    const strl_build_desc *desc = context->desc;
+    const char *unit = desc->unit ? desc->unit : info->default_unit ? info->default_unit : "";
+    strl_axis up = desc->up_axis ? (strl_axis)(desc->up_axis - 1) : info->default_up;
+    if (input > 0 && up != ingest->up)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "%s and %s disagree about the up axis (%c and %c): say --up",
+                          desc->inputs[0], desc->inputs[input], 'x' + (int)ingest->up, 'x' + (int)up);
+    if (input > 0 && strcmp(unit, ingest->unit) != 0)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "%s and %s disagree about the unit (%s and %s): say --unit", desc->inputs[0],
+                          desc->inputs[input], *ingest->unit ? ingest->unit : "unknown", *unit ? unit : "unknown");
+    ingest->up = up;
+    snprintf(ingest->unit, sizeof ingest->unit, "%s", unit);
+    return STRL_OK;
+}
 
 static strl_status open_readers(strl_build_context *context, strl_reader **readers, strl_ingest *ingest, strl_error *err)
 {
@@ -25,14 +45,7 @@ static strl_status open_readers(strl_build_context *context, strl_reader **reade
             break;
         strl_reader_rest(readers[i]);
         strl_reader_info_get(readers[i], &info);
-        if (context->desc->up_axis)
-            ingest->up = (strl_axis)(context->desc->up_axis - 1);
-        else if (i == 0)
-            ingest->up = info.default_up;
-        else if (ingest->up != info.default_up)
-            status = strl__fail(err, STRL_ERR_ARGUMENT, "%s and %s disagree about the up axis (%c and %c): say --up",
-                                context->desc->inputs[0], context->desc->inputs[i], 'x' + (int)ingest->up,
-                                'x' + (int)info.default_up);
+        status = take_axes(context, &info, i, ingest, err);
     }
     return status;
 }
@@ -52,6 +65,9 @@ static void note_drops(strl_build_context *context, strl_reader *const *readers)
 
 /* Scratch of a build, most of it spilled triangles and base meshes. */
 #define SCRATCH_BYTES_OF_TRIANGLE 80u
+
+/* Of one input, for sums that do not overflow; no disk holds their scratch. */
+#define MOST_TRIANGLES ((uint64_t)1 << 48)
 
 /* Before anything is written: a build that cannot end should not begin. */
 static strl_status check_disk(const strl_build_context *context, uint64_t triangles, strl_error *err)
@@ -77,14 +93,26 @@ strl_status strl__ingest_check_memory(const strl_build_context *context, uint64_
                       " triangles needs, %" PRIu64 "M", context->memory_bytes >> 20, triangles, (least >> 20) + 1);
 }
 
+static uint64_t expected_triangles(const strl_reader_info *info)
+{
+    /* A file may announce more than it has room for: nothing tells of a triangle in less than a byte, unless one is read
+     * many times over. */
+    return info->hint_is_exact || info->triangles_hint < info->file_bytes ? info->triangles_hint : info->file_bytes;
+}
+
+/* Also refuses what is known not to fit the disk: parts that are used again and again can be far more triangles than a
+ * reading would end with soon. */
 static strl_status tell_estimate(strl_build_context *context, strl_reader *const *readers, strl_error *err)
 {
     strl_build_estimate estimate = {0};
+    uint64_t certain = 0;
     for (uint32_t i = 0; i < context->desc->input_count; i++) {
         strl_reader_info info;
         strl_reader_info_get(readers[i], &info);
-        /* A file may announce more than it has room for: nothing tells of a triangle in less than a byte. */
-        estimate.triangles += info.triangles_hint < info.file_bytes ? info.triangles_hint : info.file_bytes;
+        uint64_t triangles = expected_triangles(&info);
+        triangles = triangles < MOST_TRIANGLES ? triangles : MOST_TRIANGLES;
+        estimate.triangles += triangles;
+        certain += info.hint_is_exact ? triangles : 0;
     }
     strl__build_expect(context, estimate.triangles);
     estimate.seconds = context->estimate.seconds_left;
@@ -92,7 +120,7 @@ static strl_status tell_estimate(strl_build_context *context, strl_reader *const
     strl_status status = strl_path_free_bytes(context->scratch_dir, &estimate.scratch_free_bytes, err);
     if (!status && context->desc->estimate)
         context->desc->estimate(context->desc->context, &estimate);
-    return status;
+    return status ? status : check_disk(context, certain, err);
 }
 
 strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, strl_error *err)

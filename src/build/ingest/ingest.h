@@ -51,6 +51,7 @@ typedef struct strl_ingest {
     unsigned curve_shift;     /* lattice coordinates lose so many bits on the curve, which has 21 of each axis */
     float leaf_error;         /* lattice units: what quantisation moves a point at most */
     strl_axis up;
+    char unit[16];            /* "" = unknown */
     bool has_normals, has_colours;
     bool lacks_normals;       /* some corner has none */
     uint64_t triangle_count;  /* kept */

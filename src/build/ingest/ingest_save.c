@@ -22,6 +22,7 @@ static void write_numbers(const strl_ingest *ingest, strl_writer *writer)
     strl_writer_f64(writer, ingest->step);
     strl_writer_f32(writer, ingest->leaf_error);
     strl_writer_u8(writer, (uint8_t)ingest->up);
+    strl_writer_bytes(writer, ingest->unit, sizeof ingest->unit);
     strl_writer_u8(writer, (uint8_t)(ingest->has_normals | ingest->has_colours << 1 | ingest->lacks_normals << 2));
     strl_writer_u64(writer, ingest->triangle_count);
     strl_writer_u32(writer, ingest->cell_count);
@@ -95,8 +96,12 @@ static bool read_numbers(strl_cursor *cursor, strl_ingest *ingest)
         ingest->origin[k] = strl_cursor_f64(cursor);
     ingest->step = strl_cursor_f64(cursor);
     ingest->leaf_error = strl_cursor_f32(cursor);
-    unsigned up = strl_cursor_u8(cursor), flags = strl_cursor_u8(cursor);
+    unsigned up = strl_cursor_u8(cursor);
+    const uint8_t *unit = strl_cursor_take(cursor, sizeof ingest->unit);
+    unsigned flags = strl_cursor_u8(cursor);
     ingest->up = (strl_axis)(up % 3);
+    if (unit)
+        memcpy(ingest->unit, unit, sizeof ingest->unit - 1);
     ingest->has_normals = flags & 1;
     ingest->has_colours = flags >> 1 & 1;
     ingest->lacks_normals = flags >> 2 & 1;
