@@ -18,7 +18,7 @@
 static const strl__format *const formats[] = {&strl__format_ply, &strl__format_stl,
                                               &strl__format_obj};
 
-static bool has_extension(const char *path, const char *extension)
+bool strl__has_extension(const char *path, const char *extension)
 {
     size_t length = strlen(path), wanted = strlen(extension);
     if (length <= wanted || path[length - wanted - 1] != '.')
@@ -48,19 +48,23 @@ static strl_status recognise(strl_reader *reader, strl_error *err)
     strl_status status = strl__input_status(&reader->input, err);
     if (status)
         return status;
+    const bool foreign = strl__assimp_extension(reader->path) != NULL;
     for (size_t i = 0; i < sizeof formats / sizeof *formats && !reader->format; i++)
-        if (formats[i]->recognises(&reader->input, reader->opened.bytes))
+        if (!(foreign && formats[i]->weak) &&
+            formats[i]->recognises(&reader->input, reader->opened.bytes))
             reader->format = formats[i];
     for (size_t i = 0; i < sizeof formats / sizeof *formats && !reader->format; i++)
-        if (has_extension(reader->path, formats[i]->name))
+        if (strl__has_extension(reader->path, formats[i]->name))
             reader->format = formats[i];
+    if (!reader->format && foreign)
+        reader->format = &strl__format_assimp;
     if (reader->format)
         return STRL_OK;
     char found[32];
     show_start(&reader->input, found, sizeof found);
     return strl__fail(err, STRL_ERR_UNSUPPORTED,
                       "%s: expected a PLY, STL or OBJ file by its first bytes or its name's "
-                      "ending, found one that begins with '%s'",
+                      "ending, or a name's ending that assimp knows, found one that begins with '%s'",
                       reader->path, found);
 }
 
@@ -90,6 +94,7 @@ static strl_status open_format(strl_reader *reader, strl_error *err)
     if (!reader->state)
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a reader", reader->path);
     strl__input_seek(&reader->input, 0, 1);
+    reader->default_up = reader->format->default_up;
     return reader->format->open(reader, err);
 }
 
@@ -107,11 +112,13 @@ strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__forma
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a reader", desc->path);
     reader->format = format;
     reader->memory_bytes = memory_bytes;
+    reader->child = desc->child;
     strl__names_init(&reader->parts, (size_t)(memory_bytes / 16));
     strl__names_init(&reader->materials, (size_t)(memory_bytes / 16));
     strl_status status = open_file(reader, desc, err);
     if (!status)
         status = open_format(reader, err);
+    reader->child = (strl_reader_child){0};
     if (!status)
         *out = reader;
     else
@@ -148,7 +155,7 @@ void strl_reader_info_get(const strl_reader *reader, strl_reader_info *info)
 {
     *info = (strl_reader_info){
         .format = reader->format->name,
-        .default_up = reader->format->default_up,
+        .default_up = reader->default_up,
         .triangles_hint = reader->triangles_hint,
         .file_bytes = reader->opened.bytes,
     };
@@ -253,6 +260,11 @@ void strl_reader_drops_get(const strl_reader *reader, strl_reader_drops *drops)
     *drops = reader->drops;
 }
 
+void strl_reader_costs_get(const strl_reader *reader, strl_reader_costs *costs)
+{
+    *costs = reader->costs;
+}
+
 uint64_t strl_reader_vertex_count(const strl_reader *reader)
 {
     return reader->vertices.count;
@@ -270,7 +282,10 @@ const char *strl_reader_missing(const strl_reader *reader, uint32_t index)
 
 uint64_t strl_reader_bytes_done(const strl_reader *reader)
 {
-    return reader->started ? strl__input_offset(&reader->input) : 0;
+    if (!reader->started)
+        return 0;
+    return reader->format->bytes_done ? reader->format->bytes_done(reader)
+                                      : strl__input_offset(&reader->input);
 }
 
 uint32_t strl_reader_part_count(const strl_reader *reader)
