@@ -8,8 +8,10 @@
 
 #define FBX_UNIT_METRES 0.01 /* its lengths are in centimetres times a factor */
 
-/* Formats whose importers leave z up. */
-static const char *const z_up[] = {"3mf", "amf", "dxf", "off", "raw"};
+/* Formats with z up whose importers leave it so; others turn y up, or have it up. */
+static const char *const z_up[] = {"3mf", "amf", "blend", "cob", "enff", "nff", "off", "raw", "smd", "vta"};
+/* Whose importers scale to metres. */
+static const char *const metric[] = {"dae", "ifc", "ifczip", "step", "stp", "zae"};
 
 /* A number under a key of the scene's; false where there is none. */
 static bool find_number(const struct aiScene *scene, const char *key, double *value)
@@ -32,17 +34,25 @@ static bool find_number(const struct aiScene *scene, const char *key, double *va
     return false;
 }
 
+static bool is_among(const char *word, const char *const *words, size_t count)
+{
+    for (size_t i = 0; i < count; i++)
+        if (strcmp(word, words[i]) == 0)
+            return true;
+    return false;
+}
+
 void import_traits_directions(const struct aiScene *scene, const char *extension, import_facts *facts)
 {
     double value;
-    facts->up = 1;
-    facts->unit_metres = 0;
-    for (size_t i = 0; i < sizeof z_up / sizeof *z_up; i++)
-        if (strcmp(extension, z_up[i]) == 0)
-            facts->up = 2;
-    if (strcmp(extension, "dae") == 0 || strcmp(extension, "zae") == 0)
-        facts->unit_metres = 1; /* the importer scales by the file's unit and turns y up */
-    if (strcmp(extension, "fbx") == 0 && find_number(scene, "UnitScaleFactor", &value) && value > 0 && isfinite(value))
+    facts->up = is_among(extension, z_up, sizeof z_up / sizeof *z_up) ? 2 : 1;
+    facts->unit_metres = is_among(extension, metric, sizeof metric / sizeof *metric) ? 1 : 0;
+    if (strcmp(extension, "fbx") != 0)
+        return;
+    /* Told and not applied by the importer: as we do. */
+    if (find_number(scene, "UpAxis", &value) && value >= 0 && value <= 2)
+        facts->up = (unsigned)value;
+    if (find_number(scene, "UnitScaleFactor", &value) && value > 0 && isfinite(value))
         facts->unit_metres = value * FBX_UNIT_METRES;
 }
 
