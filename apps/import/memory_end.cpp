@@ -9,7 +9,8 @@ extern "C" {
 #include "output.h"
 }
 
-namespace {
+namespace
+{
 
 /* operator new has no other argument than a size: this is the program's only global. */
 int stream_descriptor = -1;
@@ -33,7 +34,8 @@ extern "C" const char *__asan_default_options(void)
 
 #else
 
-namespace {
+namespace
+{
 
 [[noreturn]] void end_program(std::size_t size)
 {

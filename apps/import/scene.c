@@ -37,7 +37,7 @@ typedef struct scene_walk {
 typedef bool (*visit)(scene_walk *walk, const level *at, void *context);
 
 __attribute__((format(printf, 3, 4))) static bool refuse(scene_walk *walk, enum strl_import_reason reason,
-                                                          const char *format, ...)
+                                                         const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
@@ -192,8 +192,8 @@ typedef struct placed_mesh {
 
 static void place_normals(placed_mesh *placed)
 {
-    const double (*m)[4] = placed->placement;
-    double (*n)[3] = placed->normals;
+    const double(*m)[4] = placed->placement;
+    double(*n)[3] = placed->normals;
     for (int row = 0; row < 3; row++)
         for (int column = 0; column < 3; column++) {
             int r1 = (row + 1) % 3, r2 = (row + 2) % 3, c1 = (column + 1) % 3, c2 = (column + 2) % 3;
@@ -271,7 +271,8 @@ static void tell_mesh(scene_walk *walk, const level *at, const struct aiMesh *me
                           .has_normals = mesh->mNormals != NULL,
                           .has_colours = mesh->mColors[0] != NULL};
     place_normals(&placed);
-    import_output_begin(walk->output, find_material(walk, mesh->mMaterialIndex), placed.has_normals, placed.has_colours);
+    import_output_begin(walk->output, find_material(walk, mesh->mMaterialIndex), placed.has_normals,
+                        placed.has_colours);
     tell_faces(walk, &placed);
 }
 
@@ -328,7 +329,8 @@ static bool write_scene(scene_walk *walk, const char *extension)
     return !import_output_failed(walk->output);
 }
 
-bool import_scene_write(const struct aiScene *scene, const char *extension, import_output *output, import_refusal *refusal)
+bool import_scene_write(const struct aiScene *scene, const char *extension, import_output *output,
+                        import_refusal *refusal)
 {
     scene_walk walk = {.scene = scene, .output = output, .refusal = refusal};
     refusal->sentence[0] = 0;

@@ -39,15 +39,16 @@
 #define CHILD_IS_SANITIZED 0
 #endif
 
-/* What the importer lists, less what Stroll reads itself, raw data, and names that mean too much. */
+/* What assimp 5 lists, less what Stroll reads itself, and xml, which may be anything. */
 static const char *const extensions[] = {
-    "3d",   "3ds",    "3mf",      "ac",       "ac3d", "acc",  "amf",  "ase",  "ask",      "assbin",
-    "b3d",  "blend",  "bsp",      "bvh",      "cob",  "csm",  "dae",  "dxf",  "enff",     "fbx",
-    "hmp",  "ifc",    "ifczip",   "iqm",      "irr",  "irrmesh", "lwo", "lws", "lxo",     "m3d",
-    "md2",  "md3",    "md5anim",  "md5camera", "md5mesh", "mdc", "mdl", "mesh", "mesh.xml", "mot",
-    "ms3d", "ndo",    "nff",      "off",      "ogex", "pk3",  "pmx",  "prj",  "q3o",      "q3s",
-    "raw",  "scn",    "sib",      "smd",      "step", "stp",  "ter",  "uc",   "vta",      "x",
-    "x3d",  "x3db",   "xgl",      "zae",      "zgl",
+    "3d",     "3ds",  "3mf",      "ac",  "ac3d",   "acc",     "amf",       "ase",     "ask",
+    "assbin", "b3d",  "blend",    "bsp", "bvh",    "cob",     "csm",       "dae",     "dxf",
+    "enff",   "fbx",  "hmp",      "ifc", "ifczip", "iqm",     "irr",       "irrmesh", "lwo",
+    "lws",    "lxo",  "m3d",      "md2", "md3",    "md5anim", "md5camera", "md5mesh", "mdc",
+    "mdl",    "mesh", "mesh.xml", "mot", "ms3d",   "ndo",     "nff",       "off",     "ogex",
+    "pk3",    "pmx",  "prj",      "q3o", "q3s",    "raw",     "scn",       "sib",     "smd",
+    "step",   "stp",  "ter",      "uc",  "vta",    "x",       "x3d",       "x3db",    "xgl",
+    "zae",    "zgl",
 };
 
 const char *strl__assimp_extension(const char *path)
@@ -84,13 +85,13 @@ static char *find_importer(const char *named, bool *found)
 static strl_status fail_not_found(const strl_reader *reader, strl_error *err)
 {
     char *folder = strl_program_folder();
-    strl_status status =
-        strl__fail(err, STRL_ERR_UNSUPPORTED,
-                   "%s: .%s files are read by the program " STRL_IMPORTER
-                   ", which is neither in %.100s nor in " STRL_LIBEXEC_DIR
-                   ": build Stroll where libassimp-dev is installed, or name the program by "
-                   "STROLL_IMPORT",
-                   reader->path, strl__assimp_extension(reader->path), folder ? folder : "its folder");
+    strl_status status = strl__fail(
+        err, STRL_ERR_UNSUPPORTED,
+        "%s: .%s files are read by the program " STRL_IMPORTER
+        ", which is neither in %.100s nor in " STRL_LIBEXEC_DIR
+        ": build Stroll where libassimp-dev is installed, or name the program by "
+        "STROLL_IMPORT",
+        reader->path, strl__assimp_extension(reader->path), folder ? folder : "its folder");
     strl__free(folder);
     return status;
 }
@@ -102,10 +103,10 @@ typedef struct import_run {
     const strl_reader_child *child;
     strl_process *process;
     uint64_t memory_bytes, cpu_seconds, deadline_ns;
-    uint64_t own_rss_bytes;  /* of this process, at most, meanwhile */
+    uint64_t own_rss_bytes; /* of this process, at most, meanwhile */
     uint64_t spool_bytes, spool_most;
     uint8_t start[STRL__IMPORT_START_BYTES]; /* of the stream */
-    uint8_t *buffer;         /* COPY_BYTES */
+    uint8_t *buffer;                         /* COPY_BYTES */
 } import_run;
 
 static strl_status start_child(import_run *run, strl_error *err)
@@ -114,7 +115,8 @@ static strl_status start_child(import_run *run, strl_error *err)
     bool found;
     char *program = find_importer(run->child->importer, &found);
     /* A name that begins with a dash must not be taken for an option. */
-    char *path = reader->path[0] == '-' ? strl_path_join(".", reader->path) : strl__strdup(reader->path);
+    char *path =
+        reader->path[0] == '-' ? strl_path_join(".", reader->path) : strl__strdup(reader->path);
     strl_status status = STRL_OK;
     if (!program || !path)
         status = strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", reader->path);
@@ -143,13 +145,14 @@ static strl_status fail_time(const import_run *run, bool cpu, strl_error *err)
                       run->reader->path, seconds, cpu ? " of processor time" : "");
 }
 
-static strl_status fail_memory(const import_run *run, strl_error *err)
+/* why: in the importer's words, may be empty. */
+static strl_status fail_memory(const import_run *run, const char *why, strl_error *err)
 {
     return strl__fail(err, STRL_ERR_MEMORY,
                       "%s: importing it by assimp takes more than %" PRIu64
-                      "M of memory, which is what is left for it: give more by --memory, or convert "
-                      "it to PLY, OBJ or glTF",
-                      run->reader->path, run->memory_bytes >> 20);
+                      "M of memory, which is what is left for it%s%s: give more by --memory, or "
+                      "convert it to PLY, OBJ or glTF",
+                      run->reader->path, run->memory_bytes >> 20, *why ? "; " : "", why);
 }
 
 static strl_status check_cancel(const import_run *run, strl_error *err)
@@ -167,10 +170,11 @@ static strl_status check_start(import_run *run, strl_error *err)
     strl__import_facts facts;
     uint64_t free_bytes;
     if (memcmp(run->start, STRL_IMPORT_MAGIC, STRL_IMPORT_MAGIC_BYTES) != 0)
-        return strl__fail(err, STRL_ERR_FORMAT,
-                          "%s: the stream of triangles that was imported from it is broken: expected "
-                          "the word " STRL_IMPORT_MAGIC " at byte 0",
-                          reader->path);
+        return strl__fail(
+            err, STRL_ERR_FORMAT,
+            "%s: the stream of triangles that was imported from it is broken: expected "
+            "the word " STRL_IMPORT_MAGIC " at byte 0",
+            reader->path);
     if (!strl__import_facts_parse(run->start, &facts))
         return STRL_OK; /* an error, or what the scan refuses */
     strl_status status = strl_path_free_bytes(reader->scratch_dir, &free_bytes, err);
@@ -211,7 +215,8 @@ static strl_status listen(import_run *run, strl_error *err)
     strl_status status = STRL_OK;
     while (!status && !ended) {
         size_t got = 0;
-        status = strl_process_read(run->process, STEP_NS, run->buffer, COPY_BYTES, &got, &ended, err);
+        status =
+            strl_process_read(run->process, STEP_NS, run->buffer, COPY_BYTES, &got, &ended, err);
         if (!status)
             status = check_cancel(run, err);
         if (!status && strl_clock_ns() > run->deadline_ns)
@@ -230,8 +235,9 @@ static strl_status fail_end(import_run *run, const strl_process_end *end, strl_e
     const char *path = run->reader->path, *said = strl_process_complaint(run->process);
     if (end->cpu_exhausted)
         return fail_time(run, true, err);
-    if (strstr(said, "bad_alloc") || strstr(said, "annot allocate memory") || strstr(said, "failed to map segment"))
-        return fail_memory(run, err);
+    if (strstr(said, "bad_alloc") || strstr(said, "annot allocate memory") ||
+        strstr(said, "failed to map segment"))
+        return fail_memory(run, said, err);
     if (end->signal)
         return strl__fail(err, STRL_ERR_FORMAT,
                           "%s: assimp, which imports it, was ended by signal %d (%s): the file is "
@@ -249,12 +255,16 @@ static strl_status judge(import_run *run, strl_error *err)
     strl_process_end end;
     if (!strl_process_wait(run->process, END_SECONDS * (uint64_t)NS_PER_S, &end))
         return fail_time(run, false, err);
-    run->reader->costs = (strl_reader_costs){run->spool_bytes, end.peak_rss_bytes + run->own_rss_bytes};
+    run->reader->costs =
+        (strl_reader_costs){run->spool_bytes, end.peak_rss_bytes + run->own_rss_bytes};
     if (end.signal)
         return fail_end(run, &end, err);
-    strl_status status = strl__import_scan(run->reader, err);
+    strl_error told = {0};
+    strl_status status = strl__import_scan(run->reader, &told);
     if (status == STRL_ERR_MEMORY && state->error_told)
-        return fail_memory(run, err);
+        return fail_memory(run, told.message + strlen(run->reader->path) + 2, err);
+    if (err)
+        *err = told;
     /* An error that the stream tells says more than a status; a broken stream less. */
     return end.exit_status && !state->error_told ? fail_end(run, &end, err) : status;
 }
@@ -292,7 +302,8 @@ static strl_status assimp_open(strl_reader *reader, strl_error *err)
     import_run run = {.reader = reader, .child = &reader->child};
     if (!reader->scratch_dir)
         return strl__fail(err, STRL_ERR_ARGUMENT,
-                          "%s: its triangles need a scratch folder, and none was given", reader->path);
+                          "%s: its triangles need a scratch folder, and none was given",
+                          reader->path);
     strl_status status = strl_file_create_nameless(reader->scratch_dir, &state->spool, err);
     state->owns_spool = true;
     run.buffer = strl__alloc(COPY_BYTES, 1);
@@ -301,8 +312,7 @@ static strl_status assimp_open(strl_reader *reader, strl_error *err)
     if (!status)
         status = run_child(&run, err);
     strl__free(run.buffer);
-    reader->default_up = state->facts.up;
-    reader->triangles_hint = state->facts.triangles;
+    strl__import_note_facts(reader);
     return status;
 }
 

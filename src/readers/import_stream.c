@@ -28,10 +28,11 @@ static strl_status expected(strl_reader *reader, const char *what, strl_error *e
     strl_status failed = strl__input_status(&state->input, err);
     if (failed)
         return failed;
-    return strl__fail(err, STRL_ERR_FORMAT,
-                      "%s: the stream of triangles that was imported from it is broken: expected %s "
-                      "at byte %" PRIu64,
-                      reader->path, what, state->record_at);
+    return strl__fail(
+        err, STRL_ERR_FORMAT,
+        "%s: the stream of triangles that was imported from it is broken: expected %s "
+        "at byte %" PRIu64,
+        reader->path, what, state->record_at);
 }
 
 /* The importer's own words; control characters and bytes beyond ASCII would make them unreadable. */
@@ -160,8 +161,8 @@ strl_status strl__import_scan(strl_reader *reader, strl_error *err)
 
 /* ---- records ---- */
 
-static strl_status add_name(strl_reader *reader, strl__names *names, const char *text, size_t length,
-                            uint32_t *index, strl_error *err)
+static strl_status add_name(strl_reader *reader, strl__names *names, const char *text,
+                            size_t length, uint32_t *index, strl_error *err)
 {
     strl_status status = strl__names_add(names, text, length, index, err);
     return status ? strl__fail_context(err, status, "%s", reader->path) : STRL_OK;
@@ -182,8 +183,8 @@ static strl_status take_part(strl_reader *reader, strl_cursor payload, strl_erro
 /* Materials of one name may differ in colour; a name stands for one colour here, so a later one
  * takes its number into its name. Every pass names them alike, because the first one's colour is
  * there already. */
-static strl_status name_material(strl_reader *reader, const char *text, size_t length, uint32_t rgba,
-                                 uint32_t *index, strl_error *err)
+static strl_status name_material(strl_reader *reader, const char *text, size_t length,
+                                 uint32_t rgba, uint32_t *index, strl_error *err)
 {
     strl__import *state = reader->state;
     strl__names *names = &reader->materials;
@@ -193,8 +194,8 @@ static strl_status name_material(strl_reader *reader, const char *text, size_t l
     if (status)
         return status;
     if (*index < known && names->items[*index].rgba != rgba) {
-        int used = snprintf(name, sizeof name, "%.*s #%zu", (int)(length < 1000 ? length : 1000), text,
-                            state->material_count + 1);
+        int used = snprintf(name, sizeof name, "%.*s #%zu", (int)(length < 1000 ? length : 1000),
+                            text, state->material_count + 1);
         known = names->count;
         status = add_name(reader, names, name, (size_t)used, index, err);
     }
@@ -226,7 +227,8 @@ static strl_status take_material(strl_reader *reader, strl_cursor payload, strl_
 }
 
 /* The material of a block; the first block without one makes the plain one. */
-static strl_status find_material(strl_reader *reader, uint32_t number, uint32_t *index, strl_error *err)
+static strl_status find_material(strl_reader *reader, uint32_t number, uint32_t *index,
+                                 strl_error *err)
 {
     strl__import *state = reader->state;
     if (number < state->material_count) {
@@ -235,8 +237,9 @@ static strl_status find_material(strl_reader *reader, uint32_t number, uint32_t 
     }
     if (number != STRL_IMPORT_NO_MATERIAL)
         return expected(reader, "a block of a material that came before it", err);
-    strl_status status = state->plain_known ? STRL_OK
-                                            : name_material(reader, "", 0, 0xffffffffu, &state->plain, err);
+    strl_status status = state->plain_known
+                             ? STRL_OK
+                             : name_material(reader, "", 0, 0xffffffffu, &state->plain, err);
     state->plain_known = !status;
     *index = state->plain;
     return status;
@@ -312,7 +315,8 @@ static void load_corner(const import_block *block, uint32_t vertex, strl__corner
     bool finite = block->normals != NULL;
     for (unsigned k = 0; k < 3; k++) {
         corner->normal[k] =
-            block->normals ? strl__load_f32(block->normals + 12 * (size_t)vertex + 4 * k, false) : 0;
+            block->normals ? strl__load_f32(block->normals + 12 * (size_t)vertex + 4 * k, false)
+                           : 0;
         finite = finite && __builtin_isfinite(corner->normal[k]);
     }
     if (!finite)
@@ -422,6 +426,28 @@ strl_status strl__import_fill(strl_reader *reader, strl_error *err)
     }
 }
 
+/* The name of a length; NULL where there is none so long. */
+static const char *unit_name(double metres)
+{
+    static const struct {
+        const char *name;
+        double metres;
+    } units[] = {{"um", 1e-6}, {"mm", 0.001},  {"cm", 0.01},   {"dm", 0.1},    {"m", 1},
+                 {"km", 1000}, {"in", 0.0254}, {"ft", 0.3048}, {"yd", 0.9144}, {"mi", 1609.344}};
+    for (size_t i = 0; i < sizeof units / sizeof *units; i++)
+        if (metres > units[i].metres * 0.999999 && metres < units[i].metres * 1.000001)
+            return units[i].name;
+    return NULL;
+}
+
+void strl__import_note_facts(strl_reader *reader)
+{
+    const strl__import *state = reader->state;
+    reader->default_up = state->facts.up;
+    reader->default_unit = unit_name(state->facts.unit_metres);
+    reader->triangles_hint = state->facts.triangles;
+}
+
 uint64_t strl__import_bytes_done(const strl_reader *reader)
 {
     const strl__import *state = reader->state;
@@ -445,8 +471,7 @@ static strl_status import_open(strl_reader *reader, strl_error *err)
     strl__import *state = reader->state;
     state->spool = reader->file;
     strl_status status = strl__import_scan(reader, err);
-    reader->default_up = state->facts.up;
-    reader->triangles_hint = state->facts.triangles;
+    strl__import_note_facts(reader);
     return status;
 }
 

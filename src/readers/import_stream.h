@@ -26,9 +26,10 @@ typedef struct strl__import {
     bool owns_spool;
     strl__input input; /* over the spool */
     strl__import_facts facts;
-    uint32_t *materials;      /* from the stream's numbers to the reader's; owned */
+    uint32_t *materials; /* from the stream's numbers to the reader's; owned */
     size_t material_count, material_capacity;
-    uint32_t part, plain;     /* indices of the current part, and of the material of blocks without one */
+    uint32_t part,
+        plain; /* indices of the current part, and of the material of blocks without one */
     bool part_known, plain_known;
     bool error_told;    /* the stream ends in the importer's own words */
     uint64_t record_at; /* where the record being read begins */
@@ -42,6 +43,9 @@ bool strl__import_facts_parse(const uint8_t *start, strl__import_facts *facts);
  * of the records alone: every stream that is cut off, and every error that it tells, is found
  * before the first triangle. Sets state->facts. */
 strl_status strl__import_scan(strl_reader *reader, strl_error *err);
+
+/* Tells the reader what the facts say. */
+void strl__import_note_facts(strl_reader *reader);
 
 /* Of a strl__format whose state is a strl__import. */
 strl_status strl__import_prepare(strl_reader *reader, strl_error *err);

@@ -48,6 +48,7 @@ struct strl_reader {
     uint64_t memory_bytes;
     strl_reader_child child; /* borrowed, during open */
     strl_axis default_up;
+    const char *default_unit; /* static; NULL = unknown */
     strl_file *file;       /* owned */
     strl_file_info opened; /* as it was at opening */
     uint64_t triangles_hint;

@@ -156,6 +156,7 @@ void strl_reader_info_get(const strl_reader *reader, strl_reader_info *info)
     *info = (strl_reader_info){
         .format = reader->format->name,
         .default_up = reader->default_up,
+        .default_unit = reader->default_unit,
         .triangles_hint = reader->triangles_hint,
         .file_bytes = reader->opened.bytes,
     };

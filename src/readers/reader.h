@@ -56,6 +56,7 @@ typedef enum strl_axis { STRL_AXIS_X, STRL_AXIS_Y, STRL_AXIS_Z } strl_axis;
 typedef struct strl_reader_info {
     const char *format;       /* "ply", "stl", "obj", "assimp" (all others); static */
     strl_axis default_up;     /* y for OBJ, z for PLY and STL; what assimp makes of the others, mostly y */
+    const char *default_unit; /* NULL = unknown; what assimp tells of FBX, COLLADA and IFC; static */
     uint64_t triangles_hint;  /* a guess for progress bars (faces announced, or from the file's size); 0 = unknown */
     uint64_t file_bytes;
 } strl_reader_info;

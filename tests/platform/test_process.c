@@ -92,7 +92,8 @@ static void the_last_line_of_errors_is_kept(void **state)
     /* More than a pipe holds: a child that complains must not have to wait for us. */
     strl_process *process =
         start_shell("i=0; while [ $i -lt 9000 ]; do echo a line of complaint >&2; i=$((i+1)); done; "
-                    "printf 'the\\tlast one\\n\\n' >&2", 0, 0);
+                    "printf 'the\\tlast one\\n\\n' >&2",
+                    0, 0);
     assert_int_equal(read_output(process, text, sizeof text), 0);
     assert_true(strl_process_wait(process, MOST_WAIT, &end));
     assert_string_equal(strl_process_complaint(process), "the?last one");

@@ -17,8 +17,8 @@
 #define IS_SANITIZED false
 #endif
 
-static char importer[PATH_MAX];    /* the script, or "" for the real one */
-static strl_reader_child child;    /* what the tests ask for */
+static char importer[PATH_MAX]; /* the script, or "" for the real one */
+static strl_reader_child child; /* what the tests ask for */
 
 static void write_script(const char *lines)
 {
@@ -143,7 +143,8 @@ static void a_lying_stream_is_one_sentence(void **state)
     (void)state;
     write_stream(500);
     assert_import_fails("exec cat /dev/zero", STRL_ERR_FORMAT, "is broken");
-    assert_import_fails("cat stream; exec cat /dev/zero", STRL_ERR_FORMAT, "more than the 100000 bytes that it announces");
+    assert_import_fails("cat stream; exec cat /dev/zero", STRL_ERR_FORMAT,
+                        "more than the 100000 bytes that it announces");
     assert_import_fails("head -c 10000 stream", STRL_ERR_FORMAT, "is broken: expected a");
     assert_import_fails("head -c 20 stream", STRL_ERR_FORMAT, "is broken: expected a");
     assert_import_fails(":", STRL_ERR_FORMAT, "is broken: expected the word");
@@ -349,6 +350,37 @@ static void collada_arrives(void **state)
     free_result(&result);
 }
 
+/* A quad that is z up, in metres, moved by its node. */
+static const char fbx[] =
+    "; FBX 7.4.0 project file\nFBXHeaderExtension: {\nFBXHeaderVersion: 1003\nFBXVersion: 7400\n}\n"
+    "GlobalSettings: {\nVersion: 1000\nProperties70: {\nP: \"UpAxis\", \"int\", \"Integer\", \"\",2\n"
+    "P: \"UnitScaleFactor\", \"double\", \"Number\", \"\",100\n}\n}\n"
+    "Objects: {\nGeometry: 1, \"Geometry::tri\", \"Mesh\" {\nVertices: *12 {\na: 0,0,0,1,0,0,1,0,1,0,0,1\n}\n"
+    "PolygonVertexIndex: *4 {\na: 0,1,2,-4\n}\nGeometryVersion: 124\n}\nModel: 2, \"Model::wall\", \"Mesh\" {\n"
+    "Version: 232\nProperties70: {\nP: \"Lcl Translation\", \"Lcl Translation\", \"\", \"A\",5,6,7\n}\n}\n}\n"
+    "Connections: {\nC: \"OO\",2,0\nC: \"OO\",1,2\n}\n";
+
+static void fbx_arrives_with_its_axis_and_unit(void **state)
+{
+    (void)state;
+    strl_reader *reader;
+    strl_reader_info info;
+    read_result result;
+    if (!find_real_importer())
+        skip();
+    write_test_text("Wall.FBX", fbx);
+    read_foreign("Wall.FBX", &result, &reader);
+    strl_reader_info_get(reader, &info);
+    assert_int_equal(info.default_up, STRL_AXIS_Z);
+    assert_string_equal(info.default_unit, "m");
+    assert_int_equal(result.count, 2);
+    const double first[9] = {5, 6, 7, 6, 6, 7, 6, 6, 8};
+    assert_positions(&result.triangles[0], first);
+    assert_string_equal(strl_reader_part_name(reader, 0), "wall");
+    strl_reader_close(reader);
+    free_result(&result);
+}
+
 static void other_formats_arrive(void **state)
 {
     (void)state;
@@ -356,19 +388,27 @@ static void other_formats_arrive(void **state)
         const char *name, *text;
         uint64_t triangles;
     } files[] = {
-        {"quad.ac", "AC3Db\nMATERIAL \"m\" rgb 1 0 0 amb 1 1 1 emis 0 0 0 spec 0 0 0 shi 0 trans 0\nOBJECT world\nkids 1\n"
-                    "OBJECT poly\nname \"quad\"\nnumvert 4\n0 0 0\n1 0 0\n1 1 0\n0 1 0\nnumsurf 1\nSURF 0x20\nmat 0\nrefs 4\n"
-                    "0 0 0\n1 1 0\n2 1 1\n3 0 1\nkids 0\n", 2},
-        {"two.dxf", "0\nSECTION\n2\nENTITIES\n0\n3DFACE\n8\n0\n10\n0\n20\n0\n30\n0\n11\n1\n21\n0\n31\n0\n12\n1\n22\n1\n32\n0\n"
-                    "13\n0\n23\n1\n33\n0\n0\nENDSEC\n0\nEOF\n", 2},
-        {"one.amf", "<?xml version=\"1.0\"?><amf unit=\"millimeter\"><object id=\"1\"><mesh><vertices>"
-                    "<vertex><coordinates><x>0</x><y>0</y><z>0</z></coordinates></vertex>"
-                    "<vertex><coordinates><x>1</x><y>0</y><z>0</z></coordinates></vertex>"
-                    "<vertex><coordinates><x>0</x><y>1</y><z>0</z></coordinates></vertex></vertices>"
-                    "<volume><triangle><v1>0</v1><v2>1</v2><v3>2</v3></triangle></volume></mesh></object></amf>", 1},
-        {"one.x3d", "<?xml version=\"1.0\"?><X3D version=\"3.0\" profile=\"Interchange\"><Scene><Shape><IndexedFaceSet "
-                    "coordIndex=\"0 1 2 3 -1\"><Coordinate point=\"0 0 0 1 0 0 1 1 0 0 1 0\"/></IndexedFaceSet></Shape>"
-                    "</Scene></X3D>", 2},
+        {"quad.ac",
+         "AC3Db\nMATERIAL \"m\" rgb 1 0 0 amb 1 1 1 emis 0 0 0 spec 0 0 0 shi 0 trans 0\nOBJECT world\nkids 1\n"
+         "OBJECT poly\nname \"quad\"\nnumvert 4\n0 0 0\n1 0 0\n1 1 0\n0 1 0\nnumsurf 1\nSURF 0x20\nmat 0\nrefs 4\n"
+         "0 0 0\n1 1 0\n2 1 1\n3 0 1\nkids 0\n",
+         2},
+        {"two.dxf",
+         "0\nSECTION\n2\nENTITIES\n0\n3DFACE\n8\n0\n10\n0\n20\n0\n30\n0\n11\n1\n21\n0\n31\n0\n12\n1\n22\n1\n32\n0\n"
+         "13\n0\n23\n1\n33\n0\n0\nENDSEC\n0\nEOF\n",
+         2},
+        {"one.amf",
+         "<?xml version=\"1.0\"?><amf unit=\"millimeter\"><object id=\"1\"><mesh><vertices>"
+         "<vertex><coordinates><x>0</x><y>0</y><z>0</z></coordinates></vertex>"
+         "<vertex><coordinates><x>1</x><y>0</y><z>0</z></coordinates></vertex>"
+         "<vertex><coordinates><x>0</x><y>1</y><z>0</z></coordinates></vertex></vertices>"
+         "<volume><triangle><v1>0</v1><v2>1</v2><v3>2</v3></triangle></volume></mesh></object></amf>",
+         1},
+        {"one.x3d",
+         "<?xml version=\"1.0\"?><X3D version=\"3.0\" profile=\"Interchange\"><Scene><Shape><IndexedFaceSet "
+         "coordIndex=\"0 1 2 3 -1\"><Coordinate point=\"0 0 0 1 0 0 1 1 0 0 1 0\"/></IndexedFaceSet></Shape>"
+         "</Scene></X3D>",
+         2},
     };
     if (!find_real_importer())
         skip();
@@ -396,7 +436,8 @@ static void broken_files_are_refused_in_assimps_words(void **state)
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         write_test_text(names[i], "This is no model at all, and whoever says so is right.\n");
         strl_status status = open_foreign(names[i], &reader, &err);
-        if (status != STRL_ERR_FORMAT || !strstr(err.message, names[i]) || !strstr(err.message, "assimp cannot import it: "))
+        if (status != STRL_ERR_FORMAT || !strstr(err.message, names[i]) ||
+            !strstr(err.message, "assimp cannot import it: "))
             fail_msg("%s: %d, '%s'", names[i], status, err.message);
     }
     assert_nothing_left();
@@ -446,6 +487,7 @@ int main(void)
         cmocka_unit_test(nobody_else_reads_our_formats),
         cmocka_unit_test(off_arrives),
         cmocka_unit_test(collada_arrives),
+        cmocka_unit_test(fbx_arrives_with_its_axis_and_unit),
         cmocka_unit_test(other_formats_arrive),
         cmocka_unit_test(broken_files_are_refused_in_assimps_words),
         cmocka_unit_test(too_little_memory_is_told),

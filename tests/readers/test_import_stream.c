@@ -237,9 +237,10 @@ static void blocks_that_do_not_add_up_are_refused(void **state)
     (void)state;
     /* flags, vertices, faces, corners; then what is there: positions of 3 vertices and 3 corners. */
     static const uint32_t heads[][4] = {
-        {0, 3, 1, 4},  {0, 2, 1, 3},          {0, 0, 1, 3},     {0, 3, 0, 0},    {0, 3, 2, 3},          {16, 3, 1, 3},
-        {1, 3, 1, 3},  {2, 3, 1, 3},          {4, 3, 1, 3},     {8, 3, 1, 3},    {0, 0xffffffff, 1, 3}, {0, 3, 1, 0xffffffff},
-        {0, 3, 0x55555556, 2}, {0, 16385, 1, 3}, {0, 3, 5462, 16386}, {0, 4, 1, 3},
+        {0, 3, 1, 4},          {0, 2, 1, 3},     {0, 0, 1, 3},          {0, 3, 0, 0},
+        {0, 3, 2, 3},          {16, 3, 1, 3},    {1, 3, 1, 3},          {2, 3, 1, 3},
+        {4, 3, 1, 3},          {8, 3, 1, 3},     {0, 0xffffffff, 1, 3}, {0, 3, 1, 0xffffffff},
+        {0, 3, 0x55555556, 2}, {0, 16385, 1, 3}, {0, 3, 5462, 16386},   {0, 4, 1, 3},
     };
     const float positions[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
     const uint16_t corners[] = {0, 1, 2};

@@ -26,11 +26,11 @@
 #define COMPLAINT_BYTES 200u
 
 struct strl_process {
-    pid_t id;     /* 0 = waited for */
-    int output;   /* -1 = ended */
-    int errors;   /* -1 = ended */
+    pid_t id;   /* 0 = waited for */
+    int output; /* -1 = ended */
+    int errors; /* -1 = ended */
     uint64_t cpu_seconds;
-    strl_process_end end; /* once id is 0 */
+    strl_process_end end;        /* once id is 0 */
     char text[ERROR_TEXT_BYTES]; /* the last of standard error */
     size_t text_bytes;
     char complaint[COMPLAINT_BYTES + 1];
@@ -97,8 +97,8 @@ static void become(const child_plan *plan)
     setpgid(0, 0); /* so that what the program starts can be killed with it */
     reset_signals();
     bool good = prctl(PR_SET_PDEATHSIG, SIGKILL) == 0 && getppid() == plan->parent &&
-                prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 && dup2(plan->input, 0) == 0 && dup2(plan->output, 1) == 1 &&
-                dup2(plan->errors, 2) == 2;
+                prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 && dup2(plan->input, 0) == 0 &&
+                dup2(plan->output, 1) == 1 && dup2(plan->errors, 2) == 2;
     if (good) {
         mark_descriptors();
         good = set_limits(plan->desc);
@@ -156,7 +156,8 @@ static int spawn(strl_process *process, const strl_process_desc *desc)
 {
     int output[2] = {-1, -1}, errors[2] = {-1, -1}, report[2] = {-1, -1}, code = 0;
     int input = open("/dev/null", O_RDONLY | O_CLOEXEC);
-    bool good = input >= 0 && raise_above_standard(&input) && open_pipe(output) && open_pipe(errors) && open_pipe(report);
+    bool good =
+        input >= 0 && raise_above_standard(&input) && open_pipe(output) && open_pipe(errors) && open_pipe(report);
     const child_plan plan = {desc, input, output[1], errors[1], report[1], getpid()};
     pid_t id = good ? fork() : -1;
     if (id == 0)
@@ -210,7 +211,8 @@ static void take_errors(strl_process *process)
             process->text_bytes /= 2;
             memmove(process->text, process->text + process->text_bytes, process->text_bytes);
         }
-        ssize_t got = read(process->errors, process->text + process->text_bytes, ERROR_TEXT_BYTES - process->text_bytes);
+        ssize_t got =
+            read(process->errors, process->text + process->text_bytes, ERROR_TEXT_BYTES - process->text_bytes);
         if (got > 0)
             process->text_bytes += (size_t)got;
         else if (got == 0 || (errno != EAGAIN && errno != EINTR))
@@ -224,14 +226,15 @@ static void take_errors(strl_process *process)
 static void listen_for(strl_process *process, bool output, uint64_t deadline_ns)
 {
     uint64_t now = strl_clock_ns(), left = deadline_ns > now ? deadline_ns - now : 0;
-    struct pollfd polled[2] = {{.fd = process->errors, .events = POLLIN}, {.fd = output ? process->output : -1, .events = POLLIN}};
+    struct pollfd polled[2] = {{.fd = process->errors, .events = POLLIN},
+                               {.fd = output ? process->output : -1, .events = POLLIN}};
     uint64_t left_ms = (left + NS_PER_MS - 1) / NS_PER_MS;
     poll(polled, 2, left_ms < 1000 ? (int)left_ms : 1000);
     take_errors(process);
 }
 
-strl_status strl_process_read(strl_process *process, uint64_t timeout_ns, void *data, size_t size, size_t *got, bool *ended,
-                              strl_error *err)
+strl_status strl_process_read(strl_process *process, uint64_t timeout_ns, void *data, size_t size, size_t *got,
+                              bool *ended, strl_error *err)
 {
     uint64_t deadline_ns = strl_clock_ns() + timeout_ns;
     *got = 0;
@@ -267,8 +270,8 @@ static void note_end(strl_process *process, int status, const struct rusage *usa
     end->signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
     end->peak_rss_bytes = usage->ru_maxrss > 0 ? (uint64_t)usage->ru_maxrss << 10 : 0;
     uint64_t cpu = (uint64_t)usage->ru_utime.tv_sec + (uint64_t)usage->ru_stime.tv_sec;
-    end->cpu_exhausted = end->signal == SIGXCPU ||
-                         (end->signal == SIGKILL && process->cpu_seconds && cpu >= process->cpu_seconds);
+    end->cpu_exhausted =
+        end->signal == SIGXCPU || (end->signal == SIGKILL && process->cpu_seconds && cpu >= process->cpu_seconds);
 }
 
 bool strl_process_wait(strl_process *process, uint64_t timeout_ns, strl_process_end *end)
