@@ -41,14 +41,14 @@
 
 /* What assimp 5 lists, less what Stroll reads itself, and xml, which may be anything. */
 static const char *const extensions[] = {
-    "3d",     "3ds",  "3mf",      "ac",  "ac3d",   "acc",     "amf",       "ase",     "ask",
-    "assbin", "b3d",  "blend",    "bsp", "bvh",    "cob",     "csm",       "dae",     "dxf",
-    "enff",   "fbx",  "hmp",      "ifc", "ifczip", "iqm",     "irr",       "irrmesh", "lwo",
-    "lws",    "lxo",  "m3d",      "md2", "md3",    "md5anim", "md5camera", "md5mesh", "mdc",
-    "mdl",    "mesh", "mesh.xml", "mot", "ms3d",   "ndo",     "nff",       "off",     "ogex",
-    "pk3",    "pmx",  "prj",      "q3o", "q3s",    "raw",     "scn",       "sib",     "smd",
-    "step",   "stp",  "ter",      "uc",  "vta",    "x",       "x3d",       "x3db",    "xgl",
-    "zae",    "zgl",
+    "3d",        "3ds",     "3mf",  "ac",    "ac3d", "acc",      "amf",    "ase",
+    "ask",       "assbin",  "b3d",  "blend", "bsp",  "bvh",      "cob",    "csm",
+    "dae",       "dxf",     "enff", "fbx",   "hmp",  "ifc",      "ifczip", "iqm",
+    "irr",       "irrmesh", "lwo",  "lws",   "lxo",  "md2",      "md3",    "md5anim",
+    "md5camera", "md5mesh", "mdc",  "mdl",   "mesh", "mesh.xml", "mot",    "ms3d",
+    "ndo",       "nff",     "off",  "ogex",  "pk3",  "pmx",      "prj",    "q3o",
+    "q3s",       "raw",     "scn",  "sib",   "smd",  "step",     "stp",    "ter",
+    "uc",        "vta",     "x",    "x3d",   "x3db", "xgl",      "zae",    "zgl",
 };
 
 const char *strl__assimp_extension(const char *path)

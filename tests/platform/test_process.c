@@ -148,6 +148,19 @@ static void closing_kills_with_all_descendants(void **state)
     assert_true(waitpid(-1, NULL, WNOHANG) < 0 && errno == ECHILD);
 }
 
+static void what_a_child_leaves_running_is_killed(void **state)
+{
+    (void)state;
+    char text[64];
+    strl_process_end end;
+    strl_process *process = start_shell("sleep 1000 >/dev/null 2>&1 & echo $!", 0, 0);
+    read_output(process, text, sizeof text);
+    assert_true(strl_process_wait(process, MOST_WAIT, &end));
+    assert_int_equal(end.exit_status, 0);
+    assert_true(is_gone(atoi(text)));
+    strl_process_close(process);
+}
+
 static void a_child_dies_with_us(void **state)
 {
     (void)state;
@@ -237,6 +250,7 @@ int main(void)
         cmocka_unit_test(the_last_line_of_errors_is_kept),
         cmocka_unit_test(waiting_ends_in_time),
         cmocka_unit_test(closing_kills_with_all_descendants),
+        cmocka_unit_test(what_a_child_leaves_running_is_killed),
         cmocka_unit_test(a_child_dies_with_us),
         cmocka_unit_test(nothing_is_inherited),
         cmocka_unit_test(limits_hold),

@@ -465,6 +465,13 @@ static void too_little_memory_is_told(void **state)
     assert_int_equal(open_foreign("grid.off", &reader, &err), STRL_ERR_MEMORY);
     assert_non_null(strstr(err.message, "grid.off: importing it by assimp takes more than 28M of memory"));
     assert_non_null(strstr(err.message, "give more by --memory"));
+    /* Less than the importer itself takes. */
+    for (unsigned megabytes = 1; megabytes <= 20; megabytes += 3) {
+        child.memory_bytes = (uint64_t)megabytes << 20;
+        strl_status status = open_foreign("grid.off", &reader, &err);
+        if (status != STRL_ERR_MEMORY || !strstr(err.message, "grid.off: "))
+            fail_msg("%u MiB: %d, '%s'", megabytes, status, err.message);
+    }
     child = (strl_reader_child){0};
     read_result result;
     read_foreign("grid.off", &result, &reader);

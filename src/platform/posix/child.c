@@ -262,14 +262,21 @@ strl_status strl_process_read(strl_process *process, uint64_t timeout_ns, void *
 
 /* ---- ending ---- */
 
-static void note_end(strl_process *process, int status, const struct rusage *usage)
+/* Of a child that has ended, but was not waited for: until then its number stands for its group too, and cannot become
+ * another's. */
+static void note_end(strl_process *process)
 {
     strl_process_end *end = &process->end;
+    struct rusage usage = {0};
+    int status = 0;
+    kill(-process->id, SIGKILL);
+    while (wait4(process->id, &status, 0, &usage) < 0 && errno == EINTR)
+        ;
     process->id = 0;
     end->exit_status = WIFEXITED(status) ? WEXITSTATUS(status) : 0;
     end->signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
-    end->peak_rss_bytes = usage->ru_maxrss > 0 ? (uint64_t)usage->ru_maxrss << 10 : 0;
-    uint64_t cpu = (uint64_t)usage->ru_utime.tv_sec + (uint64_t)usage->ru_stime.tv_sec;
+    end->peak_rss_bytes = usage.ru_maxrss > 0 ? (uint64_t)usage.ru_maxrss << 10 : 0;
+    uint64_t cpu = (uint64_t)usage.ru_utime.tv_sec + (uint64_t)usage.ru_stime.tv_sec;
     end->cpu_exhausted =
         end->signal == SIGXCPU || (end->signal == SIGKILL && process->cpu_seconds && cpu >= process->cpu_seconds);
 }
@@ -278,12 +285,11 @@ bool strl_process_wait(strl_process *process, uint64_t timeout_ns, strl_process_
 {
     uint64_t deadline_ns = strl_clock_ns() + timeout_ns;
     while (process->id) {
-        int status;
-        struct rusage usage;
-        pid_t id = wait4(process->id, &status, WNOHANG, &usage);
-        if (id == process->id) {
-            note_end(process, status, &usage);
-        } else if (id < 0 && errno == ECHILD) { /* a host that ignores SIGCHLD: nobody knows how it ended */
+        siginfo_t info = {0};
+        int found = waitid(P_PID, (id_t)process->id, &info, WEXITED | WNOHANG | WNOWAIT);
+        if (found == 0 && info.si_pid == process->id) {
+            note_end(process);
+        } else if (found < 0 && errno == ECHILD) { /* a host that ignores SIGCHLD: nobody knows how it ended */
             process->id = 0;
             process->end.exit_status = 255;
         } else if (strl_clock_ns() >= deadline_ns) {
