@@ -15,8 +15,10 @@ typedef struct strl_process strl_process;
 
 typedef struct strl_process_desc {
     const char *const *arguments; /* [0] is the program's path, which is not searched for; ends in NULL; borrowed */
-    uint64_t address_bytes;       /* of address space; 0 = as we have. Programs built with a sanitizer cannot live with one */
+    uint64_t address_bytes;       /* of address space; 0 = as we have */
     uint64_t cpu_seconds;         /* of processor time; 0 = as we have */
+    bool is_sanitized;            /* built with a sanitizer, which takes terabytes of address space and a file of its own:
+                                     without the limits of these two */
 } strl_process_desc;
 
 /* How a child ended. */

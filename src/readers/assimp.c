@@ -125,8 +125,9 @@ static strl_status start_child(import_run *run, strl_error *err)
     if (!status) {
         const char *const arguments[] = {program, path, NULL};
         const strl_process_desc desc = {.arguments = arguments,
-                                        .address_bytes = CHILD_IS_SANITIZED ? 0 : run->memory_bytes,
-                                        .cpu_seconds = run->cpu_seconds};
+                                        .address_bytes = run->memory_bytes,
+                                        .cpu_seconds = run->cpu_seconds,
+                                        .is_sanitized = CHILD_IS_SANITIZED};
         status = strl_process_start(&desc, &run->process, err);
         if (status)
             strl__fail_context(err, status, "%s", reader->path);

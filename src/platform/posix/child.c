@@ -58,11 +58,11 @@ static bool limit(int resource, uint64_t soft, uint64_t hard)
 
 static bool set_limits(const strl_process_desc *desc)
 {
-    bool good = limit(RLIMIT_CORE, 0, 0) && limit(RLIMIT_FSIZE, 0, 0);
+    bool good = limit(RLIMIT_CORE, 0, 0) && (desc->is_sanitized || limit(RLIMIT_FSIZE, 0, 0));
     /* The soft limit ends the program by a signal that tells why; the hard one those that do not listen. */
     if (desc->cpu_seconds)
         good = good && limit(RLIMIT_CPU, desc->cpu_seconds, desc->cpu_seconds + 1);
-    if (desc->address_bytes)
+    if (desc->address_bytes && !desc->is_sanitized)
         good = good && limit(RLIMIT_AS, desc->address_bytes, desc->address_bytes);
     return good;
 }
