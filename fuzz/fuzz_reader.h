@@ -48,6 +48,7 @@ static inline fuzz_pass fuzz_read_pass(strl_reader *reader)
     fuzz_pass pass = {0};
     strl_triangle triangles[61];
     strl_error err = {0};
+    memset(triangles, 0, sizeof triangles); /* what lies between members is part of the checksum */
     size_t count = 0;
     do {
         pass.status = strl_reader_next(reader, triangles, 61, &count, &err);

@@ -6,6 +6,7 @@
 #include "build_progress.h"
 #include "interrupt.h"
 #include "options.h"
+#include "shared/importer.h"
 #include "units.h"
 
 /* What the build calls back with. */
@@ -151,7 +152,7 @@ static int run(strl_cli_args *args)
         {.name = "compact", .kind = STRL_CLI_FLAG, .value = &desc.compact,
          .help = "for the network: a lattice step of at most a 32nd of the median edge unless --grid is given, normals of 2 x 8 bits"},
         {.name = "up", .kind = STRL_CLI_ENUM, .value = &desc.up_axis, .argument = "auto|x|y|z",
-         .help = "which axis points up; stored, never applied (auto: y for glTF and OBJ, z for PLY and STL)"},
+         .help = "which axis points up; stored, never applied (auto: y for glTF and OBJ, z for PLY and STL, what the importer says for others)"},
         {.name = "unit", .kind = STRL_CLI_ENUM, .value = &unit, .given = &unit_given, .argument = STRL_CLI_UNITS,
          .help = "length unit; stored, never applied (metres for glTF, else unknown)"},
         {.name = "certify", .kind = STRL_CLI_FLAG, .value = &desc.certify,
@@ -172,6 +173,7 @@ static int run(strl_cli_args *args)
     desc.inputs = (const char *const *)inputs.items;
     desc.input_count = (uint32_t)inputs.count;
     desc.jobs = (unsigned)jobs;
+    desc.importer = strl_importer();
     desc.unit = unit_given ? strl_cli_unit_name(unit) : NULL;
     desc.progress = show_progress;
     desc.estimate = show_estimate;

@@ -44,6 +44,7 @@ typedef struct strl_build_desc {
     bool compact;           /* for the network: a coarser lattice where grid is 0, normals of 2 x 8 bits */
     int up_axis;            /* 1 x, 2 y, 3 z; 0 = the inputs' own */
     const char *unit;       /* NULL = unknown */
+    const char *importer;   /* the program that reads foreign formats (readers/reader.h); NULL = as installed */
     bool certify;           /* measure what nodes claim, and claim no more */
     /* A build that is stopped leaves its scratch folder, with the stages that are finished, for a later one that resumes.
      * Not set: nothing is left. */

@@ -207,7 +207,7 @@ static strl_status run_in_scratch(strl_build_context *context, strl_scratch *scr
         status = strl__clusters_run(context, err);
     end_stage(context);
     if (context->spills)
-        context->result->scratch_bytes = strl_spill_set_peak_bytes(context->spills);
+        context->result->scratch_bytes += strl_spill_set_peak_bytes(context->spills);
     strl_spill_set_destroy(context->spills);
     strl_pool_destroy(context->pool);
     strl__free(context->resumed.data);
@@ -252,6 +252,7 @@ strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *
     strl__free(target);
     result->seconds = (double)(strl_clock_ns() - started) * 1e-9;
     result->cpu_seconds = (double)(strl_clock_cpu_ns() - cpu_started) * 1e-9;
-    result->peak_rss_bytes = strl_process_peak_rss_bytes();
+    uint64_t peak = strl_process_peak_rss_bytes();
+    result->peak_rss_bytes = peak > result->peak_rss_bytes ? peak : result->peak_rss_bytes;
     return status;
 }

@@ -16,6 +16,7 @@ typedef struct strl__format {
     strl_axis default_up;
     const char *default_unit; /* NULL: the format does not say */
     size_t state_bytes; /* zeroed, in reader->state */
+    bool weak;          /* its beginning may be another format's: a name's ending says more */
     bool (*recognises)(const strl__input *input,
                        uint64_t file_bytes); /* by the first bytes, which are in the input */
     strl_status (*open)(strl_reader *reader,
@@ -36,6 +37,13 @@ extern const strl__format strl__format_stl;
 extern const strl__format strl__format_obj;
 extern const strl__format strl__format_gltf;
 extern const strl__format strl__format_glb;
+/* Not among those that are recognised: the last resort, by the name's ending alone. */
+extern const strl__format strl__format_assimp;
+
+/* Whether the name ends in a dot and this, in letters of either case. */
+bool strl__has_extension(const char *path, const char *extension);
+/* The ending of a name that tells of a format which assimp reads and Stroll does not; NULL = none. */
+const char *strl__assimp_extension(const char *path);
 
 struct strl_reader {
     const strl__format *format;
@@ -43,6 +51,9 @@ struct strl_reader {
     char *path;        /* owned */
     char *scratch_dir; /* owned; NULL where none was given */
     uint64_t memory_bytes;
+    strl_reader_child child; /* borrowed, during open */
+    strl_axis default_up;
+    const char *default_unit; /* static; NULL = unknown */
     strl_file *file;       /* owned */
     strl_file_info opened; /* as it was at opening */
     uint64_t all_bytes; /* with the files that this one names, where they count; else 0 */
@@ -55,6 +66,7 @@ struct strl_reader {
     strl__names parts, materials;
     strl__names missing; /* sentences: why files that this one names could not be read */
     strl_reader_drops drops;
+    strl_reader_costs costs;
     bool prepared; /* tables and batch are there */
     bool started;  /* the input stands at a face */
     bool ended;    /* the format has no more faces */

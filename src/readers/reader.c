@@ -19,7 +19,7 @@ static const strl__format *const formats[] = {&strl__format_glb, &strl__format_p
                                               &strl__format_gltf, &strl__format_stl,
                                               &strl__format_obj};
 
-static bool has_extension(const char *path, const char *extension)
+bool strl__has_extension(const char *path, const char *extension)
 {
     size_t length = strlen(path), wanted = strlen(extension);
     if (length <= wanted || path[length - wanted - 1] != '.')
@@ -49,19 +49,23 @@ static strl_status recognise(strl_reader *reader, strl_error *err)
     strl_status status = strl__input_status(&reader->input, err);
     if (status)
         return status;
+    const bool foreign = strl__assimp_extension(reader->path) != NULL;
     for (size_t i = 0; i < sizeof formats / sizeof *formats && !reader->format; i++)
-        if (formats[i]->recognises(&reader->input, reader->opened.bytes))
+        if (!(foreign && formats[i]->weak) &&
+            formats[i]->recognises(&reader->input, reader->opened.bytes))
             reader->format = formats[i];
     for (size_t i = 0; i < sizeof formats / sizeof *formats && !reader->format; i++)
-        if (has_extension(reader->path, formats[i]->name))
+        if (strl__has_extension(reader->path, formats[i]->name))
             reader->format = formats[i];
+    if (!reader->format && foreign)
+        reader->format = &strl__format_assimp;
     if (reader->format)
         return STRL_OK;
     char found[32];
     show_start(&reader->input, found, sizeof found);
     return strl__fail(err, STRL_ERR_UNSUPPORTED,
-                      "%s: expected a PLY, STL, OBJ or glTF file by its first bytes or its "
-                      "name's ending, found one that begins with '%s'",
+                      "%s: expected a PLY, STL, OBJ or glTF file by its first bytes or its name's "
+                      "ending, or a name's ending that assimp knows, found one that begins with '%s'",
                       reader->path, found);
 }
 
@@ -91,6 +95,8 @@ static strl_status open_format(strl_reader *reader, strl_error *err)
     if (!reader->state)
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a reader", reader->path);
     strl__input_seek(&reader->input, 0, 1);
+    reader->default_up = reader->format->default_up;
+    reader->default_unit = reader->format->default_unit;
     return reader->format->open(reader, err);
 }
 
@@ -111,9 +117,11 @@ strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__forma
     uint64_t names_bytes = desc->names_bytes ? desc->names_bytes : memory_bytes / 8;
     strl__names_init(&reader->parts, (size_t)names_bytes);
     strl__names_init(&reader->materials, (size_t)(names_bytes / 2));
+    reader->child = desc->child;
     strl_status status = open_file(reader, desc, err);
     if (!status)
         status = open_format(reader, err);
+    reader->child = (strl_reader_child){0};
     if (!status)
         *out = reader;
     else
@@ -150,8 +158,8 @@ void strl_reader_info_get(const strl_reader *reader, strl_reader_info *info)
 {
     *info = (strl_reader_info){
         .format = reader->format->name,
-        .default_up = reader->format->default_up,
-        .default_unit = reader->format->default_unit,
+        .default_up = reader->default_up,
+        .default_unit = reader->default_unit,
         .triangles_hint = reader->triangles_hint,
         .hint_is_exact = reader->hint_is_exact,
         .file_bytes = reader->all_bytes ? reader->all_bytes : reader->opened.bytes,
@@ -280,6 +288,11 @@ void strl_reader_rest(strl_reader *reader)
 void strl_reader_drops_get(const strl_reader *reader, strl_reader_drops *drops)
 {
     *drops = reader->drops;
+}
+
+void strl_reader_costs_get(const strl_reader *reader, strl_reader_costs *costs)
+{
+    *costs = reader->costs;
 }
 
 uint64_t strl_reader_vertex_count(const strl_reader *reader)

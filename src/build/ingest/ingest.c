@@ -8,6 +8,7 @@
 #include "base/memory.h"
 #include "build/ingest/internal.h"
 #include "platform/file.h"
+#include "platform/thread.h"
 
 #define LEAST_READER_BYTES (8u << 20)
 /* Of a few nodes a level, what is used up and waits for a checkpoint is a large share of all. */
@@ -31,6 +32,36 @@ static strl_status take_axes(const strl_build_context *context, const strl_reade
     return STRL_OK;
 }
 
+/* For the child that reads a foreign format while this process waits, all of the budget that is left; this process
+ * grows by no more than the reserve meanwhile. */
+#define CHILD_RESERVE_BYTES (8u << 20)
+
+static bool go_on(void *context)
+{
+    return strl__build_report(context, 0, 0, NULL) == STRL_OK;
+}
+
+static strl_reader_child plan_child(strl_build_context *context)
+{
+    uint64_t held = strl_process_rss_bytes() + CHILD_RESERVE_BYTES;
+    return (strl_reader_child){
+        .importer = context->desc->importer,
+        .memory_bytes = context->memory_bytes > held ? context->memory_bytes - held : CHILD_RESERVE_BYTES,
+        .go_on = go_on,
+        .context = context,
+    };
+}
+
+static void note_costs(strl_build_context *context, const strl_reader *reader)
+{
+    strl_build_result *result = context->result;
+    strl_reader_costs costs;
+    strl_reader_costs_get(reader, &costs);
+    result->scratch_bytes += costs.scratch_bytes;
+    if (costs.child_rss_bytes > result->peak_rss_bytes)
+        result->peak_rss_bytes = costs.child_rss_bytes;
+}
+
 static strl_status open_readers(strl_build_context *context, strl_reader **readers, strl_ingest *ingest, strl_error *err)
 {
     strl_status status = STRL_OK;
@@ -38,13 +69,15 @@ static strl_status open_readers(strl_build_context *context, strl_reader **reade
     for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
         strl_reader_desc desc = {.path = context->desc->inputs[i], .scratch_dir = context->scratch_dir,
                                  .memory_bytes = share < LEAST_READER_BYTES ? LEAST_READER_BYTES : share,
-                                 .names_bytes = context->memory_bytes / 6};
+                                 .names_bytes = context->memory_bytes / 6,
+                                 .child = plan_child(context)};
         strl_reader_info info;
         status = strl_reader_open(&desc, &readers[i], err);
         if (status)
             break;
         strl_reader_rest(readers[i]);
         strl_reader_info_get(readers[i], &info);
+        note_costs(context, readers[i]);
         status = take_axes(context, &info, i, ingest, err);
     }
     return status;
@@ -129,12 +162,12 @@ strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, st
     bucket_set buckets = {0};
     pair_spills pairs = {0};
     *ingest = (strl_ingest){0};
+    strl__build_stage(context, "survey");
     strl_reader **readers = strl__alloc_zero(context->desc->input_count, sizeof *readers);
     strl_status status = readers ? open_readers(context, readers, ingest, err)
                                  : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u inputs", context->desc->input_count);
     if (status)
         goto done;
-    strl__build_stage(context, "survey");
     status = tell_estimate(context, readers, err);
     if (status)
         goto done;
