@@ -1,9 +1,12 @@
 # make          builds build/stroll
 # make demo     installs what is missing, builds, makes the demo model and walks through it
+# make install  builds and installs: make install PREFIX=/usr DESTDIR=/tmp/stage
 # make test     installs what is missing and runs the whole suite
 # make format-check, make clean
 
-.PHONY: all build deps demo test format-check clean
+PREFIX ?= /usr/local
+
+.PHONY: all build deps demo install test format-check clean
 
 all: build
 
@@ -19,6 +22,12 @@ demo:
 	@tools/install-deps build run
 	@$(MAKE) --no-print-directory build
 	@tools/demo
+
+install:
+	@tools/install-deps --check build
+	@cmake --preset release --log-level=WARNING -DCMAKE_INSTALL_PREFIX=$(PREFIX)
+	@cmake --build build --target stroll_package
+	@cmake --install build
 
 test: deps
 	@python3 tools/run_tests.py

@@ -5,7 +5,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "bench.h"
-#include "build/build.h"
+#include "stroll/build.h"
 #include "container/treelet.h"
 #include "geometry/payload.h"
 #include "jobs/pool.h"

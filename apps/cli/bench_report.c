@@ -8,6 +8,7 @@
 #include "base/fail.h"
 #include "bench.h"
 #include "platform/thread.h"
+#include "stroll/version.h"
 
 #if defined(__clang__)
 #define COMPILER "clang " __clang_version__

@@ -4,7 +4,7 @@
 #ifndef STRL_CLI_BUILD_PROGRESS_H
 #define STRL_CLI_BUILD_PROGRESS_H
 
-#include "build/build.h"
+#include "stroll/build.h"
 #include "progress.h"
 
 #ifdef __cplusplus

@@ -2,7 +2,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "build/build.h"
+#include "stroll/build.h"
 #include "build_progress.h"
 #include "interrupt.h"
 #include "options.h"

@@ -177,14 +177,6 @@ static json_t *tree_to_json(const strl_tree *tree, const tree_facts *facts)
     return object;
 }
 
-static uint64_t triangles_of(const strl_container *container)
-{
-    uint64_t triangles = 0;
-    for (uint32_t i = 0; i < strl_container_get_info(container)->tree_count; i++)
-        triangles += strl_container_tree(container, i)->triangle_count;
-    return triangles;
-}
-
 static void format_id(const strl_container_info *info, char text[33])
 {
     for (int i = 0; i < 16; i++)
@@ -224,8 +216,8 @@ static void header_to_json(json_t *object, const strl_container *container)
     put_count(object, "parts", info->part_count);
     put_count(object, "materials", info->material_count);
     put_count(object, "placements", info->placement_count);
-    put_count(object, "triangles", triangles_of(container));
-    json_object_set_new(object, "bytes_per_triangle", json_real(share(info->file_bytes, triangles_of(container))));
+    put_count(object, "triangles", strl_container_triangle_count(container));
+    json_object_set_new(object, "bytes_per_triangle", json_real(share(info->file_bytes, strl_container_triangle_count(container))));
 }
 
 static void print_header(const char *path, const strl_container *container)
@@ -234,7 +226,7 @@ static void print_header(const char *path, const strl_container *container)
     char id[33];
     format_id(info, id);
     printf("%s: version %" PRIu32 ", model %s\n", path, info->version, id);
-    uint64_t triangles = triangles_of(container);
+    uint64_t triangles = strl_container_triangle_count(container);
     printf("  %" PRIu64 " bytes, %" PRIu64 " triangle%s, %.2f bytes a triangle\n", info->file_bytes, triangles,
            strl_cli_plural(triangles), share(info->file_bytes, triangles));
     char unit[sizeof info->unit];

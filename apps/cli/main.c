@@ -6,6 +6,7 @@
 
 #include "commands.h"
 #include "options.h"
+#include "stroll/version.h"
 
 static void print_help(FILE *out)
 {

@@ -1,8 +1,8 @@
-/* A renderer turns a draw list into pixels. It holds copies of the nodes' vertices and indices within a hard byte budget
- * and knows nothing of where a list comes from. Image rows go from top to bottom.
+/* A renderer turns a draw list into pixels. It holds copies of the nodes' vertices and indices within a
+ * hard byte budget and knows nothing of where a list comes from. Image rows go from top to bottom.
  *
- * Call order: create -> (draw -> finish | read | present)* -> destroy. One thread at a time; a renderer that made its own
- * context makes it current in every call and leaves it current. */
+ * Call order: create -> (draw -> finish | read | present)* -> destroy. One thread at a time; a renderer
+ * that made its own context makes it current in every call and leaves it current. */
 #ifndef STROLL_RENDER_H
 #define STROLL_RENDER_H
 
@@ -69,29 +69,37 @@ typedef struct strl_render_stats {
     uint64_t gpu_bytes;      /* all buffers of nodes now; never above gpu_memory_bytes */
 } strl_render_stats;
 
-/* Fails with STRL_ERR_UNSUPPORTED where the system has no such context, with STRL_ERR_LIMIT where the image is larger than
- * it can draw. */
-strl_status strl_renderer_create(const strl_renderer_desc *desc, strl_renderer **renderer, strl_error *err);
-void strl_renderer_destroy(strl_renderer *renderer); /* NULL is legal */
+/* Fails with STRL_ERR_UNSUPPORTED where the system has no such context, with STRL_ERR_LIMIT where the image
+ * is larger than it can draw, with STRL_ERR_ARGUMENT where the image is not between 1x1 and 16384x16384 or
+ * the budget is below the least. */
+STRL_API strl_status strl_renderer_create(const strl_renderer_desc *desc, strl_renderer **renderer, strl_error *err);
+STRL_API void strl_renderer_destroy(strl_renderer *renderer); /* NULL is legal */
 
-strl_backend strl_renderer_backend(const strl_renderer *renderer);
+STRL_API strl_backend strl_renderer_backend(const strl_renderer *renderer);
 /* One line for people: the system's name of its renderer. Borrowed. */
-const char *strl_renderer_device(const strl_renderer *renderer);
-strl_status strl_renderer_resize(strl_renderer *renderer, uint32_t width, uint32_t height, strl_error *err);
+STRL_API const char *strl_renderer_device(const strl_renderer *renderer);
+/* The image has to be drawn anew. Fails as strl_renderer_create does. */
+STRL_API strl_status strl_renderer_resize(strl_renderer *renderer, uint32_t width, uint32_t height, strl_error *err);
 
-/* Draws the visible items. The camera's size is the renderer's. options and stats may be NULL. Does not wait for the GPU. */
-strl_status strl_renderer_draw(strl_renderer *renderer, const strl_camera *camera, const strl_draw_list *list,
-                               const strl_draw_options *options, strl_render_stats *stats, strl_error *err);
+/* Draws the visible items. The camera's size is the renderer's. options and stats may be NULL. Does not wait for
+ * the GPU. Fails with STRL_ERR_ARGUMENT where camera or list are not what stroll/frame.h says, with STRL_ERR_LIMIT
+ * where one node alone does not fit the budget; the image is undefined then. */
+STRL_API strl_status strl_renderer_draw(strl_renderer *renderer, const strl_camera *camera, const strl_draw_list *list,
+                                        const strl_draw_options *options, strl_render_stats *stats, strl_error *err);
 /* Waits until everything drawn is there. */
-void strl_renderer_finish(strl_renderer *renderer);
+STRL_API void strl_renderer_finish(strl_renderer *renderer);
 
-/* Copies the last image: sRGB-encoded RGBA8, width * height * 4 bytes. Alpha is the share of samples that a triangle covers. */
-strl_status strl_renderer_read_colour(strl_renderer *renderer, uint8_t *rgba, strl_error *err);
+/* These fail with STRL_ERR_ARGUMENT where nothing has been drawn at this size yet.
+ *
+ * Copies the last image: sRGB-encoded RGBA8, width * height * 4 bytes. Alpha is the share of samples that a
+ * triangle covers. */
+STRL_API strl_status strl_renderer_read_colour(strl_renderer *renderer, uint8_t *rgba, strl_error *err);
 /* Copies its depth: width * height distances along the view direction in world units, +infinity where there is only
  * background. With supersample it is that of the sample next to the pixel's centre (above and right of it). */
-strl_status strl_renderer_read_depth(strl_renderer *renderer, float *depth, strl_error *err);
+STRL_API strl_status strl_renderer_read_depth(strl_renderer *renderer, float *depth, strl_error *err);
 /* Copies the last image to the window of the current context (framebuffer 0), scaled to it. Does not swap. */
-strl_status strl_renderer_present(strl_renderer *renderer, uint32_t window_width, uint32_t window_height, strl_error *err);
+STRL_API strl_status strl_renderer_present(strl_renderer *renderer, uint32_t window_width, uint32_t window_height,
+                                           strl_error *err);
 
 #ifdef __cplusplus
 }

@@ -14,6 +14,11 @@ const char *strl_status_name(strl_status status)
     return index < sizeof names / sizeof *names ? names[index] : "unknown status";
 }
 
+strl_status strl_error_set(strl_error *err, strl_status status, const char *sentence)
+{
+    return strl__fail(err, status, "%s", sentence ? sentence : "");
+}
+
 strl_status strl__fail(strl_error *err, strl_status status, const char *format, ...)
 {
     if (err) {

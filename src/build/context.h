@@ -3,11 +3,12 @@
 #define STRL_BUILD_CONTEXT_H
 
 #include "base/cursor.h"
-#include "build/build.h"
 #include "build/progress.h"
 #include "geometry/progressive.h"
+#include "jobs/pool.h"
 #include "readers/reader.h"
 #include "store/spill.h"
+#include "stroll/build.h"
 
 typedef struct strl_build_context {
     const strl_build_desc *desc;

@@ -5,6 +5,7 @@
 #include "base/fail.h"
 #include "build/checkpoint.h"
 #include "platform/file.h"
+#include "stroll/version.h"
 
 static void write_text(strl_writer *writer, const char *text)
 {

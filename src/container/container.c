@@ -8,15 +8,6 @@
 #include "base/hash.h"
 #include "container/opened.h"
 
-strl_status strl__opened_fail(const strl_container *container, strl_status status, strl_error *err)
-{
-    if (status == STRL_OK || !err || !container->name ||
-        strncmp(err->message, container->name, strlen(container->name)) == 0)
-        return status;
-    strl__fail_context(err, status, "%s", container->name);
-    return status;
-}
-
 static strl_status read_header(strl_container *container, strl_error *err)
 {
     uint8_t bytes[STRL__HEADER_BYTES];
@@ -62,7 +53,7 @@ static strl_status read_trees(strl_container *container, strl_error *err)
     return status;
 }
 
-static strl_status open_named(strl_source *source, const char *name, strl_container **container, strl_error *err)
+strl_status strl_container_open(strl_source *source, strl_container **container, strl_error *err)
 {
     *container = NULL;
     strl_container *made = strl__alloc_zero(1, sizeof *made);
@@ -71,15 +62,11 @@ static strl_status open_named(strl_source *source, const char *name, strl_contai
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to open a container");
     }
     made->source = source;
-    strl_status status = STRL_OK;
-    if (name && !(made->name = strl__strdup(name)))
-        status = strl__fail(err, STRL_ERR_MEMORY, "no memory to open %s", name);
-    if (status == STRL_OK)
-        status = read_header(made, err);
+    strl_status status = read_header(made, err);
     if (status == STRL_OK)
         status = read_trees(made, err);
     if (status != STRL_OK) {
-        strl__opened_fail(made, status, err);
+        strl_source_fail(source, status, err);
         strl_container_close(made);
         return status;
     }
@@ -91,17 +78,12 @@ static strl_status open_named(strl_source *source, const char *name, strl_contai
     return STRL_OK;
 }
 
-strl_status strl_container_open(strl_source *source, strl_container **container, strl_error *err)
-{
-    return open_named(source, NULL, container, err);
-}
-
 strl_status strl_container_open_path(const char *path, strl_container **container, strl_error *err)
 {
     strl_source *source;
     *container = NULL;
     strl_status status = strl_source_open_file(path, 0, &source, err);
-    return status == STRL_OK ? open_named(source, path, container, err) : status;
+    return status == STRL_OK ? strl_container_open(source, container, err) : status;
 }
 
 void strl_container_close(strl_container *container)
@@ -114,7 +96,6 @@ void strl_container_close(strl_container *container)
     strl__page_table_deinit(&container->materials);
     strl__free(container->trees);
     strl__opened_forget_meshes(container);
-    strl__free(container->name);
     strl_source_close(container->source);
     strl__free(container);
 }
@@ -122,6 +103,14 @@ void strl_container_close(strl_container *container)
 const strl_container_info *strl_container_get_info(const strl_container *container)
 {
     return &container->header.info;
+}
+
+uint64_t strl_container_triangle_count(const strl_container *container)
+{
+    uint64_t triangles = 0;
+    for (uint32_t i = 0; i < container->header.info.tree_count; i++)
+        triangles += container->trees[i].facts.triangle_count;
+    return triangles;
 }
 
 const strl_tree *strl_container_tree(const strl_container *container, uint32_t tree)

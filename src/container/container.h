@@ -1,5 +1,6 @@
-/* The container: one .stroll file, format version 1 (docs/format.md is normative). This header: what a file holds, and the
- * blocking reader for tools. The walk uses the same decoders through container/treelet.h without ever waiting. */
+/* The container: one .stroll file, format version 1 (docs/format.md is normative). This header adds to stroll/container.h what
+ * a file holds below the facts, and the rest of the blocking reader. The walk uses the same decoders through
+ * container/treelet.h without ever waiting. */
 #ifndef STRL_CONTAINER_CONTAINER_H
 #define STRL_CONTAINER_CONTAINER_H
 
@@ -9,7 +10,7 @@
 #include "base/memory.h"
 #include "geometry/progressive.h"
 #include "source/source.h"
-#include "stroll/error.h"
+#include "stroll/container.h"
 
 #define STRL_NONE UINT32_MAX
 /* Nodes of one treelet: node i is record i % STRL_TREELET_NODES of treelet i / STRL_TREELET_NODES of its tree. */
@@ -79,51 +80,15 @@ typedef struct strl_tree {
     float leaf_geometric;    /* lattice units: half a cell's diagonal and what ingest adds */
 } strl_tree;
 
-typedef struct strl_container_info {
-    uint32_t version;
-    uint8_t model_id[16]; /* from the content: equal for equal input and options */
-    uint64_t file_bytes;
-    char unit[16];    /* "m", "mm", ..., "" = unknown */
-    uint32_t up_axis; /* 0 x, 1 y, 2 z */
-    bool has_colour;  /* some vertex or material is not white */
-    double bounds[6]; /* of all placements, world units: min xyz, max xyz; filled in by the writer */
-    uint32_t tree_count, part_count, material_count;
-    uint64_t placement_count;
-    uint64_t triangles_in; /* triangles that the readers announced */
-    uint64_t dropped_nonfinite, dropped_degenerate, dropped_lines, dropped_points;
-    uint64_t closed_hint; /* 1 where the input is watertight (every edge in an even number of triangles) */
-} strl_container_info;
-
-/* tree and row-major affine 3x4, model to world */
-typedef struct strl_placement {
-    uint32_t tree;
-    double transform[12];
-} strl_placement;
-
-typedef struct strl_container strl_container;
-
-/* Reads at most 128 KiB. Owns the source from then on, also on failure. One thread at a time. */
-strl_status strl_container_open(strl_source *source, strl_container **container, strl_error *err);
-/* A path, opened as a file source with inline reads. */
-strl_status strl_container_open_path(const char *path, strl_container **container, strl_error *err);
-void strl_container_close(strl_container *container);
-
-const strl_container_info *strl_container_get_info(const strl_container *container);  /* borrowed */
 const strl_tree *strl_container_tree(const strl_container *container, uint32_t tree); /* borrowed; NULL out of range */
 strl_source *strl_container_source(strl_container *container);                        /* borrowed */
 
 /* Blocking calls, for tools. A few treelets are cached. */
 strl_status strl_container_node(strl_container *container, uint32_t tree, uint32_t node, strl_node *record,
                                 strl_error *err);
-strl_status strl_container_placement(strl_container *container, uint64_t index, strl_placement *placement,
-                                     strl_error *err);
 /* Reads and decodes a node's mesh into arena; the page's checksum is checked. Meshes that it is decoded by are decoded too,
  * and kept along one way from the root: to go through nodes in the order of their ids costs about twice their own decoding. */
 strl_status strl_container_mesh(strl_container *container, uint32_t tree, const strl_node *record, strl_arena *arena,
                                 strl_pm *mesh, strl_error *err);
-/* Copies a name (cut to fit, zero-terminated). */
-strl_status strl_container_part(strl_container *container, uint32_t part, char *name, size_t size, strl_error *err);
-strl_status strl_container_material(strl_container *container, uint32_t material, char *name, size_t size,
-                                    uint32_t *rgba, strl_error *err);
 
 #endif

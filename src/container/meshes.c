@@ -103,7 +103,7 @@ strl_status strl_container_mesh(strl_container *container, uint32_t tree, const 
     strl_status status = alone ? STRL_OK : keep_parent(container, tree, record, &depth, err);
     if (status == STRL_OK)
         status = decode(container, record, alone ? NULL : &container->kept[depth], arena, mesh, err);
-    return strl__opened_fail(container, status, err);
+    return strl_source_fail(container->source, status, err);
 }
 
 void strl__opened_forget_meshes(strl_container *container)

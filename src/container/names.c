@@ -84,7 +84,7 @@ static strl_status get_name(strl_container *container, strl__table *table, uint3
                        "table of %s: item %" PRIu32 " of %" PRIu32 " bytes is not a name in UTF-8 of at most %u bytes",
                        table->name, index, bytes, STRL__MAX_NAME_BYTES);
     if (status != STRL_OK)
-        return strl__opened_fail(container, status, err);
+        return strl_source_fail(container->source, status, err);
     if (head_bytes)
         memcpy(head, item, head_bytes);
     copy_cut(item + head_bytes, bytes - head_bytes, name, size);

@@ -127,5 +127,5 @@ strl_status strl_container_node(strl_container *container, uint32_t tree, uint32
     strl_status status = get_treelet(container, tree, node / STRL_TREELET_NODES, &treelet, err);
     if (status == STRL_OK)
         *record = treelet->nodes[node % STRL_TREELET_NODES];
-    return strl__opened_fail(container, status, err);
+    return strl_source_fail(container->source, status, err);
 }

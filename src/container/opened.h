@@ -31,7 +31,6 @@ typedef struct strl__kept_mesh {
 
 struct strl_container {
     strl_source *source; /* owned */
-    char *name;          /* owned; NULL where it was not opened by a path */
     strl__header header;
     strl__opened_tree *trees; /* [tree_count], owned */
     strl__table placements, parts, materials;
@@ -43,8 +42,6 @@ struct strl_container {
     strl__kept_mesh kept[STRL_DECODE_CHAIN]; /* by their depth in a chain */
 };
 
-/* Puts the file's name before the sentence, unless it is there. Returns status. */
-strl_status strl__opened_fail(const strl_container *container, strl_status status, strl_error *err);
 void strl__opened_forget_nodes(strl_container *container);
 void strl__opened_forget_meshes(strl_container *container);
 

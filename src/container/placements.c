@@ -37,5 +37,5 @@ strl_status strl_container_placement(strl_container *container, uint64_t index, 
     strl_status status = strl__page_table_get(&container->placements, container->source, index, &item, &bytes, err);
     if (status == STRL_OK)
         status = decode(container, index, item, bytes, placement, err);
-    return strl__opened_fail(container, status, err);
+    return strl_source_fail(container->source, status, err);
 }

@@ -133,7 +133,7 @@ strl_status strl_source_open_delayed(strl_source *inner, uint64_t delay_ns, unsi
     delayed_source *self = strl__alloc_zero(1, sizeof *self);
     if (!self)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to delay a source");
-    self->base = (strl_source){&klass, inner->bytes};
+    self->base = (strl_source){&klass, inner->bytes, inner->name};
     self->inner = inner;
     self->delay_ns = delay_ns;
     self->fail_every = fail_every;

@@ -48,7 +48,7 @@ void strl__read_queue_cancel(strl__read_queue *queue, uint64_t token);
 void strl__read_queue_clear(strl__read_queue *queue);
 bool strl__read_queue_answer(strl__read_queue *queue, strl_source_result *result);
 
-/* Where a queued read's bytes come from; called on whichever thread serves. */
+/* Where a queued read's bytes come from: strl_source_class.read; called on whichever thread serves. */
 typedef strl_status (*strl__fetch_fn)(strl_source *source, uint64_t offset, void *data, size_t size, strl_error *err);
 /* Serves the most urgent waiting read; false when none waits. */
 bool strl__read_queue_serve(strl__read_queue *queue, strl_source *source, strl__fetch_fn fetch);

@@ -2,6 +2,7 @@
 #include "source/source.h"
 
 #include <inttypes.h>
+#include <string.h>
 
 #include "base/fail.h"
 
@@ -36,6 +37,13 @@ strl_status strl_source_read(strl_source *source, uint64_t offset, void *data, s
 {
     strl_status status = check_range(source, offset, size, err);
     return status == STRL_OK ? source->klass->read(source, offset, data, size, err) : status;
+}
+
+strl_status strl_source_fail(const strl_source *source, strl_status status, strl_error *err)
+{
+    if (status == STRL_OK || !err || !source->name || strstr(err->message, source->name))
+        return status;
+    return strl__fail_context(err, status, "%.300s", source->name);
 }
 
 void strl_source_close(strl_source *source)

@@ -1,5 +1,5 @@
-/* Where a container's bytes come from: file, memory, HTTP later. A walk polls and never waits; it cannot tell sources
- * apart. A source belongs to one thread (the walk's) and may use threads of its own behind this interface. */
+/* What is behind stroll/source.h: a walk polls a source and never waits; it cannot tell sources apart. A
+ * source belongs to one thread (the walk's) and may use threads of its own behind this interface. */
 #ifndef STRL_SOURCE_SOURCE_H
 #define STRL_SOURCE_SOURCE_H
 
@@ -7,9 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "stroll/error.h"
-
-typedef struct strl_source strl_source;
+#include "stroll/source.h"
 
 /* One finished read. */
 typedef struct strl_source_result {
@@ -22,7 +20,7 @@ typedef struct strl_source_result {
 
 /* Implementations fill this in as the first member of their own struct. */
 typedef struct strl_source_class {
-    const char *kind; /* "file", "memory", "delayed", "http" */
+    const char *kind; /* "file", "memory", "callback", "delayed" */
     strl_status (*submit)(strl_source *source, uint64_t token, uint64_t offset, size_t size, float urgency,
                           strl_error *err);
     bool (*poll)(strl_source *source, strl_source_result *result);
@@ -33,7 +31,8 @@ typedef struct strl_source_class {
 
 struct strl_source {
     const strl_source_class *klass;
-    uint64_t bytes; /* size of the whole object */
+    uint64_t bytes;   /* size of the whole object */
+    const char *name; /* of the file, for sentences; owned by the class; NULL = none */
 };
 
 /* Queues a read of [offset, offset + size); higher urgency is served first. The answer comes from strl_source_poll,
@@ -47,12 +46,9 @@ bool strl_source_poll(strl_source *source, strl_source_result *result);
 void strl_source_cancel(strl_source *source, uint64_t token);
 /* Reads and waits: for opening a container and for tools, never for a frame. */
 strl_status strl_source_read(strl_source *source, uint64_t offset, void *data, size_t size, strl_error *err);
-void strl_source_close(strl_source *source); /* NULL is legal; unanswered reads are dropped */
+/* Puts the source's name before the sentence of a failure, unless there is none or it is there. Returns status. */
+strl_status strl_source_fail(const strl_source *source, strl_status status, strl_error *err);
 
-/* A file, read by `threads` threads of the source's own; 0 = reads happen inside strl_source_poll, one a call. */
-strl_status strl_source_open_file(const char *path, unsigned threads, strl_source **source, strl_error *err);
-/* Bytes in memory, borrowed for the life of the source. Reads are answered by the next poll. */
-strl_status strl_source_open_memory(const void *data, size_t size, strl_source **source, strl_error *err);
 /* Wraps another source (owned from then on; still the caller's on failure) and holds each answer back until delay_ns
  * after its submit. strl_source_read is not delayed. fail_every: every n-th answer is a failure (0 = none). For tests
  * and for looking at latency by hand. */

@@ -194,6 +194,8 @@ strl_status strl_walk_open(strl_source *source, const strl_walk_desc *desc, strl
         status = load_trees(walk, err);
     }
     if (status != STRL_OK) {
+        if (walk->source)
+            strl_source_fail(walk->source, status, err);
         strl_walk_close(walk);
         return status;
     }
@@ -323,6 +325,11 @@ bool strl_walk_settled(const strl_walk *walk)
 const strl_walk_stats *strl_walk_get_stats(const strl_walk *walk)
 {
     return &walk->stats;
+}
+
+strl_container *strl_walk_container(strl_walk *walk)
+{
+    return walk->container;
 }
 
 void strl_walk_bounds(const strl_walk *walk, double bounds[6])

@@ -91,6 +91,23 @@ static void context_stands_before_the_innermost_sentence(void **state)
     assert_int_equal(strl__fail(NULL, STRL_ERR_IO, "x"), STRL_ERR_IO);
 }
 
+static void a_sentence_of_somebody_else_is_copied_as_it_stands(void **state)
+{
+    (void)state;
+    strl_error err;
+    char text[1000];
+    memset(text, 'x', sizeof text - 1);
+    text[sizeof text - 1] = 0;
+    assert_int_equal(strl_error_set(&err, STRL_ERR_NETWORK, "100% of %s %n are lost"), STRL_ERR_NETWORK);
+    assert_true(err.status == STRL_ERR_NETWORK);
+    assert_string_equal(err.message, "100% of %s %n are lost");
+    strl_error_set(&err, STRL_ERR_IO, text);
+    assert_int_equal(strlen(err.message), sizeof err.message - 1);
+    strl_error_set(&err, STRL_ERR_IO, NULL);
+    assert_string_equal(err.message, "");
+    assert_int_equal(strl_error_set(NULL, STRL_ERR_IO, "x"), STRL_ERR_IO);
+}
+
 static void the_checksum_is_xxh3(void **state)
 {
     (void)state;
@@ -106,6 +123,7 @@ int main(void)
         cmocka_unit_test(an_arena_keeps_to_its_limit_and_rewinds),
         cmocka_unit_test(the_injected_failure_hits_the_nth_allocation_and_all_after),
         cmocka_unit_test(context_stands_before_the_innermost_sentence),
+        cmocka_unit_test(a_sentence_of_somebody_else_is_copied_as_it_stands),
         cmocka_unit_test(the_checksum_is_xxh3),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "build/build.h"
+#include "stroll/build.h"
 #include "container/container.h"
 
 /* A mesh to be written as a file. Zero-initialise; arrays grow by mesh_file_add_... */

@@ -201,7 +201,7 @@ static uint64_t bytes_read_to_open(const char *path)
     uint64_t read_bytes = 0;
     counting_source *source = calloc(1, sizeof *source);
     assert_ok(strl_source_open_file(path, 0, &source->inner, &err), &err);
-    source->base = (strl_source){&klass, source->inner->bytes};
+    source->base = (strl_source){.klass = &klass, .bytes = source->inner->bytes};
     source->read_bytes = &read_bytes;
     strl_container *container;
     assert_ok(strl_container_open(&source->base, &container, &err), &err);

@@ -93,7 +93,7 @@ static void a_source_that_ends_early_gives_its_own_sentence(void **state)
     for (size_t cut = 0; cut < size; cut++) {
         cut_source *source = calloc(1, sizeof *source);
         assert_non_null(source);
-        *source = (cut_source){{&klass, size}, bytes, cut};
+        *source = (cut_source){{.klass = &klass, .bytes = size}, bytes, cut};
         strl_container *container;
         strl_error err = {0};
         uint64_t digest;

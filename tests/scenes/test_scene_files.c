@@ -13,7 +13,7 @@
 
 #include "base/hash.h"
 #include "base/memory.h"
-#include "build/build.h"
+#include "stroll/build.h"
 #include "mesh_check.h"
 #include "platform/file.h"
 #include "scenes/scene.h"

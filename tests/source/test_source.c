@@ -48,19 +48,36 @@ enum {
     SOURCE_FILE_0,
     SOURCE_FILE_1,
     SOURCE_FILE_4,
+    SOURCE_CALLBACK_0,
+    SOURCE_CALLBACK_3,
     SOURCE_DELAYED_MEMORY,
     SOURCE_DELAYED_FILE,
     SOURCE_KINDS
 };
 
+static strl_status read_content(void *context, uint64_t offset, void *data, size_t size, strl_error *err)
+{
+    (void)err;
+    memcpy(data, (const uint8_t *)context + offset, size);
+    return STRL_OK;
+}
+
+static strl_status open_inner(int kind, unsigned threads, strl_source **source, strl_error *err)
+{
+    const strl_source_callbacks callbacks = {.bytes = BYTES, .context = content, .read = read_content};
+    if (kind == SOURCE_MEMORY || kind == SOURCE_DELAYED_MEMORY)
+        return strl_source_open_memory(content, BYTES, source, err);
+    if (kind == SOURCE_CALLBACK_0 || kind == SOURCE_CALLBACK_3)
+        return strl_source_open_callbacks(&callbacks, threads, source, err);
+    return strl_source_open_file(path, threads, source, err);
+}
+
 static strl_status open_kind(int kind, strl_source **source, strl_error *err)
 {
-    static const unsigned threads[SOURCE_KINDS] = {0, 0, 1, 4, 0, 2};
+    static const unsigned threads[SOURCE_KINDS] = {0, 0, 1, 4, 0, 3, 0, 2};
     strl_source *inner = NULL;
     *source = NULL;
-    bool memory = kind == SOURCE_MEMORY || kind == SOURCE_DELAYED_MEMORY;
-    strl_status status = memory ? strl_source_open_memory(content, BYTES, &inner, err)
-                                : strl_source_open_file(path, threads[kind], &inner, err);
+    strl_status status = open_inner(kind, threads[kind], &inner, err);
     if (status == STRL_OK && kind >= SOURCE_DELAYED_MEMORY) {
         status = strl_source_open_delayed(inner, 2 * MS, 0, source, err);
         if (status != STRL_OK)
@@ -403,6 +420,98 @@ static void every_failed_file_read_is_a_failed_answer(void **state)
     }
 }
 
+/* What a callback was asked, and what it says. */
+typedef struct scripted {
+    strl_status status;
+    const char *sentence; /* NULL = none */
+    unsigned closed;
+} scripted;
+
+static strl_status read_scripted(void *context, uint64_t offset, void *data, size_t size, strl_error *err)
+{
+    const scripted *self = context;
+    memset(data, (int)offset, size);
+    return self->sentence ? strl_error_set(err, self->status, self->sentence) : self->status;
+}
+
+static void close_scripted(void *context)
+{
+    ((scripted *)context)->closed++;
+}
+
+static strl_source *must_open_scripted(scripted *script, unsigned threads)
+{
+    strl_source *source = NULL;
+    const strl_source_callbacks callbacks = {
+        .name = "over there", .bytes = BYTES, .context = script, .read = read_scripted, .close = close_scripted};
+    assert_int_equal(strl_source_open_callbacks(&callbacks, threads, &source, NULL), STRL_OK);
+    assert_string_equal(source->name, "over there");
+    return source;
+}
+
+static void what_a_callback_says_of_a_failure_is_what_is_answered(void **state)
+{
+    (void)state;
+    const struct {
+        strl_status status;
+        const char *sentence, *answered;
+    } cases[] = {{STRL_ERR_NETWORK, "the line is cut", "the line is cut"},
+                 {STRL_ERR_IO, NULL, "the callback could not read 8 bytes at byte 5"},
+                 {STRL_ERR_IO, "", "the callback could not read 8 bytes at byte 5"}};
+    for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+        scripted script = {.status = cases[i].status, .sentence = cases[i].sentence};
+        strl_source *source = must_open_scripted(&script, (unsigned)i);
+        assert_int_equal(strl_source_submit(source, 1, 5, 8, 0, NULL), STRL_OK);
+        strl_source_result result = next_answer(source);
+        assert_int_equal(result.status, cases[i].status);
+        assert_string_equal(result.error.message, cases[i].answered);
+        assert_null(result.data);
+        strl_error err = {STRL_OK, "an older sentence"};
+        assert_int_equal(strl_source_read(source, 5, &(uint64_t){0}, 8, &err), cases[i].status);
+        assert_string_equal(err.message, cases[i].answered);
+        strl_source_close(source);
+        assert_int_equal(script.closed, 1);
+    }
+}
+
+static void a_source_of_callbacks_closes_once_and_only_where_it_was_opened(void **state)
+{
+    (void)state;
+    scripted script = {.status = STRL_OK};
+    strl_source *source = must_open_scripted(&script, 2);
+    for (uint64_t i = 0; i < 50; i++)
+        assert_int_equal(strl_source_submit(source, i, i, 1000, 0, NULL), STRL_OK);
+    strl_source_close(source);
+    assert_int_equal(script.closed, 1);
+    strl_source_callbacks callbacks = {.name = "nowhere", .context = &script, .close = close_scripted};
+    strl_error err;
+    assert_int_equal(strl_source_open_callbacks(&callbacks, 0, &source, &err), STRL_ERR_ARGUMENT);
+    assert_null(source);
+    callbacks.read = read_scripted;
+    for (uint64_t n = 1; n <= 3; n++) { /* the source, its name, its pool */
+        strl__alloc_fail_after(n);
+        assert_int_equal(strl_source_open_callbacks(&callbacks, 2, &source, &err), STRL_ERR_MEMORY);
+        strl__alloc_fail_after(0);
+        assert_null(source);
+    }
+    assert_int_equal(script.closed, 1);
+}
+
+static void a_failure_names_its_source_once(void **state)
+{
+    (void)state;
+    scripted script = {.status = STRL_OK};
+    strl_source *source = must_open_scripted(&script, 0);
+    strl_error err;
+    strl_error_set(&err, STRL_ERR_FORMAT, "byte 3 is wrong");
+    assert_int_equal(strl_source_fail(source, STRL_ERR_FORMAT, &err), STRL_ERR_FORMAT);
+    assert_string_equal(err.message, "over there: byte 3 is wrong");
+    assert_int_equal(strl_source_fail(source, STRL_ERR_FORMAT, &err), STRL_ERR_FORMAT);
+    assert_string_equal(err.message, "over there: byte 3 is wrong");
+    assert_int_equal(strl_source_fail(source, STRL_ERR_FORMAT, NULL), STRL_ERR_FORMAT);
+    strl_source_close(source);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -418,6 +527,9 @@ int main(void)
         cmocka_unit_test(every_nth_delayed_answer_fails),
         cmocka_unit_test(a_file_that_shrinks_is_answered_with_a_failure),
         cmocka_unit_test(a_missing_file_or_a_folder_is_refused),
+        cmocka_unit_test(what_a_callback_says_of_a_failure_is_what_is_answered),
+        cmocka_unit_test(a_source_of_callbacks_closes_once_and_only_where_it_was_opened),
+        cmocka_unit_test(a_failure_names_its_source_once),
         cmocka_unit_test(every_failed_allocation_is_a_clean_failure),
         cmocka_unit_test(every_failed_file_read_is_a_failed_answer),
     };

@@ -15,7 +15,7 @@
 #include <unistd.h>
 #include <cmocka.h>
 
-#include "build/build.h"
+#include "stroll/build.h"
 #include "container/container.h"
 #include "container/writer.h"
 #include "geometry/payload.h"

@@ -54,7 +54,7 @@ watched_source *watched_source_open(strl_source *inner)
                                             watched_cancel, watched_read,   watched_close};
     watched_source *self = strl__alloc_zero(1, sizeof *self);
     assert_non_null(self);
-    self->base = (strl_source){&klass, inner->bytes};
+    self->base = (strl_source){.klass = &klass, .bytes = inner->bytes};
     self->inner = inner;
     self->random = 1;
     return self;

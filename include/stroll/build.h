@@ -1,12 +1,17 @@
-/* Building a container from input files, under a memory budget, out of core from the first byte. */
-#ifndef STRL_BUILD_BUILD_H
-#define STRL_BUILD_BUILD_H
+/* Building a container from input files, under a memory budget, out of core from the first byte. It is in a
+ * library of its own, libstroll_build (CMake: the component build, target stroll::build; pkg-config:
+ * stroll-build), because who walks through models needs none of what reads and partitions them. */
+#ifndef STROLL_BUILD_H
+#define STROLL_BUILD_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "jobs/pool.h"
 #include "stroll/error.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 #define STRL_BUILD_LEAST_MEMORY (64ull << 20)
 #define STRL_ROOT_MAX_TRIANGLES 16384u
@@ -20,7 +25,7 @@ typedef struct strl_build_progress {
     double seconds_left;   /* estimated; 0 = unknown */
     double triangles_per_s; /* of the whole build so far; 0 = unknown */
     uint64_t scratch_bytes; /* on disk now */
-    uint64_t memory_bytes;  /* the budget; the system knows what is used of it (strl_process_rss_bytes) */
+    uint64_t memory_bytes;  /* the budget; the operating system knows what is used of it */
 } strl_build_progress;
 
 /* What a build will take, guessed from the inputs' headers and sizes before they are read. */
@@ -46,16 +51,16 @@ typedef struct strl_build_desc {
     const char *unit;       /* NULL = unknown */
     const char *importer;   /* the program that reads foreign formats (readers/reader.h); NULL = as installed */
     bool certify;           /* measure what nodes claim, and claim no more */
-    /* A build that is stopped leaves its scratch folder, with the stages that are finished, for a later one that resumes.
-     * Not set: nothing is left. */
+    /* A build that is stopped leaves its scratch folder, with the stages that are finished, for a later one
+     * that resumes. Not set: nothing is left. */
     bool keep;
     uint64_t keep_triangles; /* of models of fewer nothing is kept: they are built at once; 0 = 65,536 */
     bool resume; /* goes on with what an earlier build of the same request has left, if anything; keeps, too */
     bool no_dependencies;   /* for measuring what dependencies bring: every group has one member */
     /* Called on the caller's thread, often; false cancels. May be NULL. */
     bool (*progress)(void *context, const strl_build_progress *progress);
-    /* Told on the caller's thread, once for each thing amiss that does not stop the build; the sentence is borrowed for the
-     * call. May be NULL; the result has the counts. */
+    /* Told on the caller's thread, once for each thing amiss that does not stop the build; the sentence is
+     * borrowed for the call. May be NULL; the result has the counts. */
     void (*warn)(void *context, const char *sentence);
     /* Told on the caller's thread, once, before the inputs are read. May be NULL. */
     void (*estimate)(void *context, const strl_build_estimate *estimate);
@@ -89,8 +94,18 @@ typedef struct strl_build_result {
     bool scratch_kept; /* of a failed build: there is something to resume */
 } strl_build_result;
 
-/* Writes desc->output, which appears only when whole. On failure nothing is left of it but what desc->keep asks for, and
- * an older file of that name stays. The bytes are the same whether the build was stopped and resumed, however often, or not. */
-strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err);
+/* Builds the structure of clusters. Works on threads of its own, desc->jobs at most, and returns when they
+ * are done; several builds at a time are legal, of different outputs. What desc points at is borrowed for
+ * the call. result is filled in as far as the build came, also on failure. Fails with STRL_ERR_UNSUPPORTED,
+ * STRL_ERR_FORMAT where an input cannot be read, STRL_ERR_LIMIT where memory or scratch do not suffice,
+ * STRL_ERR_DISK_FULL, STRL_ERR_IO, STRL_ERR_CANCELLED.
+ *
+ * Writes desc->output, which appears only when whole. On failure nothing is left of it but what desc->keep
+ * asks for, and an older file of that name stays. The bytes are the same whether the build was stopped and
+ * resumed, however often, or not. */
+STRL_API strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err);
 
+#ifdef __cplusplus
+}
+#endif
 #endif

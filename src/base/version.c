@@ -1,0 +1,6 @@
+#include "stroll/version.h"
+
+const char *strl_version(void)
+{
+    return STRL_VERSION;
+}
