@@ -9,6 +9,9 @@ namespace strl_panels
 namespace
 {
 
+/* Of the window's height; picks are below. */
+const float parts_share = 0.52f;
+
 const ImU32 mark_colour = IM_COL32(90, 200, 255, 255), ring_colour = IM_COL32(0, 0, 0, 200);
 
 void tooltip(const char *text)
@@ -104,7 +107,7 @@ void part_row(const strl_parts *parts, uint32_t index, strl_gui_controls *contro
 void show_parts(const place &at, const strl_gui_facts *facts, strl_gui_controls *controls)
 {
     const strl_parts *parts = facts->parts;
-    begin_panel(at, "Parts", at.width - margin * at.scale, margin * at.scale, 1, 0, at.height * 0.55f);
+    begin_panel(at, "Parts", at.width - margin * at.scale, margin * at.scale, 1, 0, at.height * parts_share);
     ImGui::SetNextItemWidth(-1);
     ImGui::InputTextWithHint("##search", "search", controls->search, sizeof controls->search);
     asks(controls, "hide", STRL_ACTION_HIDE, STRL_ACTION_SELECTION);
@@ -149,7 +152,7 @@ void show_picks(const place &at, const strl_gui_facts *facts, strl_gui_controls 
     const strl_picked *newest = strl_picks_newest(facts->picks);
     if (!newest)
         return;
-    begin_panel(at, "Pick", at.width - margin * at.scale, at.height - margin * at.scale, 1, 1, 0);
+    begin_panel(at, "Pick", at.width - margin * at.scale, at.height * parts_share + 2 * margin * at.scale, 1, 0, 0);
     ImGui::TextWrapped("%s", newest->part[0] ? newest->part : "(a part without a name)");
     if (begin_table("pick")) {
         row("material", newest->material[0] ? newest->material : "none");

@@ -48,11 +48,20 @@ static bool append(strl_recorder *recorder, const strl_path_frame *frame)
     strl_camera_path *path = &recorder->path;
     if (path->count == MOST_FRAMES ||
         !strl__grow(&path->frames, &recorder->capacity, path->count + 1, sizeof *path->frames)) {
-        strl_recorder_stop(recorder);
+        recorder->state = STRL_RECORDER_IDLE;
         return false;
     }
     path->frames[path->count++] = *frame;
     return true;
+}
+
+void strl_recorder_stop(strl_recorder *recorder)
+{
+    const strl_camera_path *path = &recorder->path;
+    bool records = recorder->state == STRL_RECORDER_RECORDS;
+    recorder->state = STRL_RECORDER_IDLE;
+    if (records && path->count > 0 && memcmp(&path->frames[path->count - 1], &recorder->newest, sizeof recorder->newest))
+        append(recorder, &recorder->newest);
 }
 
 bool strl_recorder_add(strl_recorder *recorder, const strl_camera *camera, double seconds)
@@ -60,6 +69,7 @@ bool strl_recorder_add(strl_recorder *recorder, const strl_camera *camera, doubl
     strl_path_frame now = frame_of(camera), before, mid;
     if (recorder->state != STRL_RECORDER_RECORDS)
         return true;
+    recorder->newest = now;
     if (recorder->path.count == 0)
         return append(recorder, &now);
     before = recorder->path.frames[recorder->path.count - 1];
@@ -73,11 +83,6 @@ bool strl_recorder_add(strl_recorder *recorder, const strl_camera *camera, doubl
             return false;
     }
     return true;
-}
-
-void strl_recorder_stop(strl_recorder *recorder)
-{
-    recorder->state = STRL_RECORDER_IDLE;
 }
 
 bool strl_recorder_replay(strl_recorder *recorder)

@@ -18,7 +18,8 @@ typedef struct strl_recorder {
     strl_recorder_state state;
     strl_camera_path path; /* owned; the last one recorded or read */
     size_t capacity;
-    double clock;  /* cameras since the path began, with fraction */
+    strl_path_frame newest; /* where the camera was last; a path ends there, however short the time since its last camera */
+    double clock;           /* cameras since the path began, with fraction */
     bool last_shown; /* of a replay */
 } strl_recorder;
 

@@ -88,6 +88,16 @@ static strl_status fit_size(strl__viewer *v, bool *drawable, strl_error *err)
     return strl_renderer_resize(v->renderer, v->size[0], v->size[1], err);
 }
 
+/* With the cursor, by which a script knows that all it did before it moved there has been seen. */
+static void tell_rest(strl__viewer *v)
+{
+    double cursor[2];
+    strl_window_cursor(v->window, cursor);
+    if (v->stirred)
+        strl_journal_write(v->journal, "rest", json_pack("{s:[f,f]}", "cursor", cursor[0], cursor[1]));
+    v->stirred = false;
+}
+
 /* Rests when the picture is the wanted one and nothing has happened for a few frames. */
 static double decide_wait(strl__viewer *v, bool drawable)
 {
@@ -95,9 +105,7 @@ static double decide_wait(strl__viewer *v, bool drawable)
     if (!drawable || still) {
         v->resting = true;
         v->clock.last_ns = 0;
-        if (v->stirred)
-            strl_journal_write(v->journal, "rest", json_object());
-        v->stirred = false;
+        tell_rest(v);
         return v->news.state == STRL_OPENER_BUILDS ? BUILD_SECONDS : IDLE_SECONDS;
     }
     v->resting = false;

@@ -285,6 +285,11 @@ double strl_window_text_scale(const strl_window *window)
     return scale > 0.5 && scale < 8 ? scale : 1;
 }
 
+void strl_window_cursor(const strl_window *window, double at[2])
+{
+    memcpy(at, window->cursor, sizeof window->cursor);
+}
+
 bool strl_window_should_close(const strl_window *window)
 {
     return glfwWindowShouldClose(window->handle);

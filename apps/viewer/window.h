@@ -51,6 +51,8 @@ void strl_window_set_title(strl_window *window, const char *title);
 double strl_window_pixel_scale(const strl_window *window);
 /* How many times larger than usual people here want text, in screen units. */
 double strl_window_text_scale(const strl_window *window);
+/* Where the mouse was when the last input was taken, screen units. */
+void strl_window_cursor(const strl_window *window, double at[2]);
 bool strl_window_should_close(const strl_window *window);
 
 /* What the panel keeps for itself from now on: see strl_gui_takes_mouse. */

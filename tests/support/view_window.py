@@ -33,6 +33,15 @@ def read_png(path):
     return rows
 
 
+def write_png(path, rows):
+    """Rows of RGB8 bytes."""
+    def chunk(kind, body):
+        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+    head = struct.pack(">IIBBBBB", len(rows[0]) // 3, len(rows), 8, 2, 0, 0, 0)
+    body = zlib.compress(b"".join(b"\0" + bytes(row) for row in rows), 9)
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", body) + chunk(b"IEND", b""))
+
+
 def unfilter(kind, row, above):
     for i in range(len(row)):
         left, up, corner = (row[i - 3], above[i], above[i - 3]) if i >= 3 else (0, above[i], 0)
@@ -66,8 +75,8 @@ def colourful_share(rows):
 class Display:
     """An X server of its own, with settings and cache of its own. screen: its size."""
 
-    def __init__(self, screen=(800, 600), scale=None):
-        self.screen, self.scale = screen, scale
+    def __init__(self, screen=(800, 600)):
+        self.screen = screen
 
     def __enter__(self):
         self.folder = tempfile.TemporaryDirectory()
@@ -84,9 +93,6 @@ class Display:
                             "XDG_CONFIG_HOME": self.folder.name + "/config",
                             "XDG_CACHE_HOME": self.folder.name + "/cache"}
         self.environment.pop("WAYLAND_DISPLAY", None)
-        if self.scale: # as a desktop tells how large text shall be
-            subprocess.run(["xrdb", "-merge"], input=f"Xft.dpi: {96 * self.scale}\n", text=True,
-                           env=self.environment, check=True)
         # A GL driver that is unloaded leaves memory behind that LeakSanitizer takes for lost; ours shows by its names.
         self.environment["LSAN_OPTIONS"] = "exitcode=0"
         return self
@@ -96,15 +102,15 @@ class Display:
         self.server.wait()
         self.folder.cleanup()
 
-    def shoot(self, width, height):
-        """What the top left of the screen shows, panels included: rows of RGB8 bytes."""
+    def shoot(self, left, top, right, bottom):
+        """What the screen shows there, panels included: rows of RGB8 bytes."""
         data = (pathlib.Path(self.folder.name) / "Xvfb_screen0").read_bytes()
         fields = struct.unpack(">25I", data[:100])
         head, stride, colours = fields[0], fields[12], fields[19]
         start, rows = head + 12 * colours, []
-        for y in range(height):
-            row = data[start + y * stride:start + y * stride + 4 * width]
-            rgb = bytearray(3 * width)
+        for y in range(top, bottom):
+            row = data[start + y * stride + 4 * left:start + y * stride + 4 * right]
+            rgb = bytearray(3 * (right - left))
             rgb[0::3], rgb[1::3], rgb[2::3] = row[2::4], row[1::4], row[0::4]
             rows.append(rgb)
         return rows
@@ -171,8 +177,10 @@ class Viewer:
         self.tool("key", "--delay", "20", *keys)
 
     def point(self, x, y):
+        """Waits until the cursor's place, and so everything that was done before, has been seen and nothing moves."""
+        self.events_seen = len(self.events())
         self.tool("mousemove", str(x + 1), str(y), "mousemove", str(x), str(y))  # it may be there already
-        self.rest()  # the panels have seen in a frame whether the cursor is over them
+        self.event("rest", cursor=[float(x), float(y)])  # and the panels know whether it is over them
 
     def click(self, x, y):
         """A click on the model. Returns what it picked."""
