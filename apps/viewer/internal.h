@@ -52,6 +52,7 @@ typedef struct strl__viewer {
     strl_section section;
     strl_bookmarks bookmarks;
     strl_recorder recorder;
+    bool path_ends; /* with the camera of this frame: what the hand did before the key belongs to the path */
     strl_settings settings;
     strl_opener *opener;
     strl_opener_news news;

@@ -95,7 +95,7 @@ static void end_recording(strl__viewer *v)
 void strl__viewer_toggle_record(strl__viewer *v)
 {
     if (v->recorder.state == STRL_RECORDER_RECORDS) {
-        end_recording(v);
+        v->path_ends = true;
     } else if (v->controls.orthographic) {
         strl__viewer_say(v, "a path has a perspective camera: switch back to it to record one");
     } else {
@@ -170,5 +170,8 @@ bool strl__viewer_move(strl__viewer *v, const strl_window_input *input, double s
         v->camera = strl_navigator_camera(&v->navigator, v->size[0], v->size[1]);
     if (!strl_recorder_add(&v->recorder, &v->camera, seconds))
         strl__viewer_say(v, "the path is as long as one can be: recording has stopped");
+    if (v->path_ends)
+        end_recording(v);
+    v->path_ends = false;
     return goes || falls || replays || v->recorder.state == STRL_RECORDER_RECORDS;
 }
