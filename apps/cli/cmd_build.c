@@ -7,7 +7,7 @@
 #include "interrupt.h"
 #include "options.h"
 #include "shared/importer.h"
-#include "units.h"
+#include "shared/units.h"
 
 /* What the build calls back with. */
 typedef struct build_watch {
@@ -153,7 +153,7 @@ static int run(strl_cli_args *args)
          .help = "for the network: a lattice step of at most a 32nd of the median edge unless --grid is given, normals of 2 x 8 bits"},
         {.name = "up", .kind = STRL_CLI_ENUM, .value = &desc.up_axis, .argument = "auto|x|y|z",
          .help = "which axis points up; stored, never applied (auto: y for glTF and OBJ, z for PLY and STL, what the importer says for others)"},
-        {.name = "unit", .kind = STRL_CLI_ENUM, .value = &unit, .given = &unit_given, .argument = STRL_CLI_UNITS,
+        {.name = "unit", .kind = STRL_CLI_ENUM, .value = &unit, .given = &unit_given, .argument = STRL_UNITS,
          .help = "length unit; stored, never applied (metres for glTF, else unknown)"},
         {.name = "certify", .kind = STRL_CLI_FLAG, .value = &desc.certify,
          .help = "measure each node against older surfaces and claim what was found: errors that are mostly tighter, for 20 to 45 % more time"},
@@ -174,7 +174,7 @@ static int run(strl_cli_args *args)
     desc.input_count = (uint32_t)inputs.count;
     desc.jobs = (unsigned)jobs;
     desc.importer = strl_importer();
-    desc.unit = unit_given ? strl_cli_unit_name(unit) : NULL;
+    desc.unit = unit_given ? strl_unit_name(unit) : NULL;
     desc.progress = show_progress;
     desc.estimate = show_estimate;
     desc.warn = show_warning;
