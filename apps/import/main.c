@@ -13,6 +13,7 @@
 #include "memory_end.h"
 #include "output.h"
 #include "scene.h"
+#include "stroll/version.h"
 
 static int usage(void)
 {

@@ -8,7 +8,7 @@
 #include "base/fail.h"
 #include "base/hash.h"
 #include "base/memory.h"
-#include "build/build.h"
+#include "stroll/build.h"
 #include "container/layout.h"
 #include "platform/file.h"
 #include "platform/output.h"

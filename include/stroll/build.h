@@ -70,7 +70,7 @@ typedef struct strl_build_desc {
 /* The stages that people are told of, in order; all levels are one. */
 enum { STRL_BUILD_STAGES = 7 };
 /* "survey", ...; stage < STRL_BUILD_STAGES. Static. */
-const char *strl_build_stage_name(uint32_t stage);
+STRL_API const char *strl_build_stage_name(uint32_t stage);
 
 /* What a stage took, of this run alone; zero where it was resumed behind it. cpu_seconds: of all threads. */
 typedef struct strl_build_stage {

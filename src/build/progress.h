@@ -9,7 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "build/build.h"
+#include "stroll/build.h"
 
 typedef struct strl_estimate {
     double share; /* of the whole build, 0 to 1; never shrinks */

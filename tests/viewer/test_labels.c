@@ -8,7 +8,7 @@
 #include <string.h>
 #include <cmocka.h>
 
-#include "build/build.h"
+#include "stroll/build.h"
 #include "container/container.h"
 #include "platform/file.h"
 #include "stroll/walk.h"
