@@ -19,7 +19,7 @@ import sanitized
 
 STROLL = os.path.abspath(sys.argv[1])
 MIB = 1 << 20
-TRIANGLES = 1000000
+TRIANGLES = 2000000
 SAMPLES = 10  # parts of each kind that are checked triangle by triangle
 if sanitized.sanitizers(STROLL):
     print("skipped: test_plant writes the same files, and bytes are the same without sanitizers")
