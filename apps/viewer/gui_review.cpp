@@ -89,7 +89,9 @@ void part_row(const strl_parts *parts, uint32_t index, strl_gui_controls *contro
     if (hidden > 0)
         ImGui::PushStyleColor(ImGuiCol_Text, faint);
     ImVec2 at = ImGui::GetCursorScreenPos();
-    if (ImGui::Selectable("##row", selected, ImGuiSelectableFlags_AllowDoubleClick)) {
+    at.y += ImGui::GetStyle().FramePadding.y;
+    if (ImGui::Selectable("##row", selected, ImGuiSelectableFlags_AllowDoubleClick,
+                          ImVec2(0, ImGui::GetFrameHeight()))) {
         strl_requests_add(&controls->requests, STRL_ACTION_SELECT, index);
         if (ImGui::IsMouseDoubleClicked(0))
             strl_requests_add(&controls->requests, STRL_ACTION_LOOK, index);

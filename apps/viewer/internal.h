@@ -10,6 +10,7 @@
 #include "viewer/journal.h"
 #include "viewer/model.h"
 #include "viewer/opener.h"
+#include "viewer/part_index.h"
 #include "viewer/settings.h"
 #include "viewer/viewer.h"
 #include "viewer/window.h"
@@ -47,6 +48,8 @@ typedef struct strl__viewer {
     bool screenshot;       /* of the next frame; a flag, so that a reset in the same frame does not lose it */
     bool falls;            /* the walker is not at rest above the ground */
     strl_parts parts;
+    strl_part_index *index; /* NULL until somebody looks at a part that is not drawn */
+    bool look_waits;        /* for the index */
     uint32_t reveal; /* a row to scroll to in the next frame */
     strl_picks picks;
     strl_section section;
@@ -73,7 +76,8 @@ void strl__viewer_journal_section(strl__viewer *v);
 /* click.c */
 void strl__viewer_click(strl__viewer *v, const strl_click *click);
 strl_pick_filter strl__viewer_filter(const strl__viewer *v);
-void strl__viewer_look(strl__viewer *v); /* at the selection */
+void strl__viewer_look(strl__viewer *v); /* at the selection; now, or once it is known where that is */
+void strl__viewer_poll_index(strl__viewer *v);
 
 /* move.c. Brings the camera up to date. True while something moves by itself. */
 bool strl__viewer_move(strl__viewer *v, const strl_window_input *input, double seconds);

@@ -13,6 +13,8 @@
 #include "platform/file.h"
 #include "stroll/walk.h"
 #include "support/folder.h"
+#include "platform/thread.h"
+#include "viewer/part_index.h"
 #include "viewer/pick.h"
 
 #define BALLS 40
@@ -95,6 +97,29 @@ static void check_labels(strl_container *container, const strl_draw_list *list, 
     }
 }
 
+/* Each ball is where it was written, though most have vanished from what is drawn from afar. */
+static void check_index(strl_container *container, const char *path)
+{
+    strl_part_index *index = NULL;
+    double share;
+    assert_int_equal(strl_part_index_create(path, BALLS, &index, NULL), STRL_OK);
+    while (!strl_part_index_is_done(index, &share))
+        strl_sleep_ns(1000000);
+    assert_int_equal(strl_part_index_status(index, NULL), STRL_OK);
+    for (uint32_t part = 0; part < BALLS; part++) {
+        double bounds[6] = {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY};
+        assert_true(strl_part_index_widen(index, part, bounds));
+        double x = ball_of(container, part) * SPACING;
+        assert_true(fabs(bounds[0] - x + 1) < 1e-4 && fabs(bounds[3] - x - 1) < 1e-4);
+        assert_true(fabs(bounds[2] + 1) < 1e-4 && fabs(bounds[5] - 1) < 1e-4);
+    }
+    double bounds[6];
+    assert_false(strl_part_index_widen(index, BALLS, bounds));
+    strl_part_index_destroy(index);
+    assert_int_equal(strl_part_index_create(path, BALLS, &index, NULL), STRL_OK); /* gone before it has ended */
+    strl_part_index_destroy(index);
+}
+
 static void vertices_know_their_part_at_every_level(void **state)
 {
     (void)state;
@@ -126,6 +151,7 @@ static void vertices_know_their_part_at_every_level(void **state)
         assert_true(fabs(hypot(hypot(0.3, 0.2), pick.point[2]) - 1) < 0.06 + pick.error);
     }
     strl_walk_close(walk);
+    check_index(container, output);
     strl_container_close(container);
     strl_path_remove(input, NULL);
     strl_path_remove(output, NULL);
