@@ -1,8 +1,8 @@
 /* What the files of the viewer's window share.
  *
- * A frame runs: input (window.c) -> what keys and panels ask for (obey.c), what was clicked (click.c), what was dropped
- * (files.c) -> where the camera is (move.c) -> front, picture, panels (frame.c). viewer.c has the loop. All on one thread;
- * only a build (opener.c) has one of its own. */
+ * A frame runs: input (window.c) -> what keys and panels ask for (obey.c), what was clicked (click.c), what was
+ * dropped (files.c) -> where the camera is (move.c) -> front, picture, panels (frame.c). viewer.c has the loop. All on
+ * one thread; builds (opener.c) and the index of parts (part_index.c) have one of their own. */
 #ifndef STRL_VIEWER_INTERNAL_H
 #define STRL_VIEWER_INTERNAL_H
 
@@ -29,7 +29,7 @@ typedef struct strl__frame_clock {
 typedef struct strl__viewer {
     strl_viewer_desc desc; /* completed: no defaults left; path is `path` */
     char path[4096];
-    strl_viewer_desc begun; /* as completed at the start: what has changed since then is remembered */
+    strl_viewer_desc begun;   /* as completed at the start: what has changed since then is remembered */
     strl_viewer_model *model; /* owned; never NULL while the window is open */
     strl_window *window;
     strl_gui *gui;
@@ -37,7 +37,7 @@ typedef struct strl__viewer {
     strl_renderer *renderer;
     strl_navigator navigator;
     strl_gui_controls controls;
-    strl_draw_list list; /* of the last frame; borrowed from the walk until its next */
+    strl_draw_list list;        /* of the last frame; borrowed from the walk until its next */
     strl_camera camera, frozen; /* camera: of the last frame; frozen: the walk's, where controls.frozen */
     double frozen_far;
     uint32_t size[2];
@@ -50,7 +50,7 @@ typedef struct strl__viewer {
     strl_parts parts;
     strl_part_index *index; /* NULL until somebody looks at a part that is not drawn */
     bool look_waits;        /* for the index */
-    uint32_t reveal; /* a row to scroll to in the next frame */
+    uint32_t reveal;        /* a row to scroll to in the next frame */
     strl_picks picks;
     strl_section section;
     strl_bookmarks bookmarks;

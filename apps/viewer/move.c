@@ -88,8 +88,7 @@ static void end_recording(strl__viewer *v)
         return;
     }
     strl__viewer_say(v, "saved %.300s", path);
-    strl_journal_write(v->journal, "path",
-                       json_pack("{s:s,s:i}", "file", path, "frames", (int)v->recorder.path.count));
+    strl_journal_write(v->journal, "path", json_pack("{s:s,s:i}", "file", path, "frames", (int)v->recorder.path.count));
 }
 
 void strl__viewer_toggle_record(strl__viewer *v)

@@ -17,7 +17,7 @@ struct strl_part_index {
     strl_thread *thread;
     char *path;
     uint32_t part_count;
-    double (*bounds)[6]; /* [part_count], world; the thread's until done */
+    double (*bounds)[6];  /* [part_count], world; the thread's until done */
     double (*of_tree)[6]; /* the same in model units, of the tree at work */
     atomic_bool cancelled, done;
     atomic_uint permille;

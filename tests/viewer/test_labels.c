@@ -64,8 +64,12 @@ static int ball_of(strl_container *container, uint32_t part)
 static strl_draw_list settle(strl_walk *walk, double distance)
 {
     strl_draw_list list;
-    const strl_camera camera = {.eye = {BALLS * SPACING / 2, distance, 1}, .target = {BALLS * SPACING / 2, 0, 0},
-                                .up = {0, 0, 1}, .fov_y_deg = 60, .width = 640, .height = 480};
+    const strl_camera camera = {.eye = {BALLS * SPACING / 2, distance, 1},
+                                .target = {BALLS * SPACING / 2, 0, 0},
+                                .up = {0, 0, 1},
+                                .fov_y_deg = 60,
+                                .width = 640,
+                                .height = 480};
     for (int frame = 0; frame < 1000; frame++) {
         assert_int_equal(strl_walk_frame(walk, &camera, &list, NULL), STRL_OK);
         if (strl_walk_settled(walk))
@@ -85,12 +89,14 @@ static void check_labels(strl_container *container, const strl_draw_list *list, 
         for (uint32_t k = 0; k < item->index_count; k++) {
             strl_vertex_label label = item->labels[item->indices[k]];
             int ball = ball_of(container, label.part);
-            double x = item->origin[0] + item->step * (double)(item->anchor[0] + item->vertices[item->indices[k]].position[0]);
+            double x =
+                item->origin[0] + item->step * (double)(item->anchor[0] + item->vertices[item->indices[k]].position[0]);
             assert_true(fabs(x - ball * SPACING) < 1.001 + item->error);
             assert_int_equal(item->labels[item->indices[k - k % 3]].part, label.part);
             char name[64];
             uint32_t rgba;
-            assert_int_equal(strl_container_material(container, label.material, name, sizeof name, &rgba, NULL), STRL_OK);
+            assert_int_equal(strl_container_material(container, label.material, name, sizeof name, &rgba, NULL),
+                             STRL_OK);
             assert_int_equal(name[strlen(name) - 1] - '0', ball % 3);
             seen[ball] = true;
         }
