@@ -48,13 +48,15 @@ static int parse(strl_cli_args *args, strl_viewer_desc *desc)
     static const strl_backend backends[] = {STRL_BACKEND_DEFAULT, STRL_BACKEND_GL45, STRL_BACKEND_GL3};
     int backend = 0;
     const strl_cli_option options[] = {
-        {.name = "size", .kind = STRL_CLI_SIZE, .value = desc->size, .help = "of the window (as it was last, at first 1280x720)"},
+        {.name = "size", .kind = STRL_CLI_SIZE, .value = desc->size,
+         .help = "of the window (as it was last, at first 1280x720)"},
         {.name = "error", .kind = STRL_CLI_REAL, .value = &desc->error_px, .argument = "PX",
          .help = "allowed pixel error (as it was last, at first 1)", .least = 1e-6, .most = 1e6},
         {.name = "memory", .letter = 'm', .kind = STRL_CLI_BYTES, .value = &desc->memory_bytes,
          .help = "decoded nodes held (as it was last, at first 512M)", .least = 1 << 20, .most = 0x1p50},
         {.name = "gpu-memory", .kind = STRL_CLI_BYTES, .value = &desc->gpu_memory_bytes,
-         .help = "buffers of nodes (as it was last, at first 512M)", .least = STRL_RENDERER_LEAST_GPU_BYTES, .most = 0x1p50},
+         .help = "buffers of nodes (as it was last, at first 512M)", .least = STRL_RENDERER_LEAST_GPU_BYTES,
+         .most = 0x1p50},
         {.name = "frames", .kind = STRL_CLI_COUNT, .value = &desc->frames,
          .help = "close the window after N frames and print how long they took (when it is closed)", .least = 1,
          .most = 1e9},
@@ -80,7 +82,8 @@ static int parse(strl_cli_args *args, strl_viewer_desc *desc)
     return stop;
 }
 
-/* DIR/stroll/NAME in the folder that the variable names, else in its default below the home folder. "" = there is none. */
+/* DIR/stroll/NAME in the folder that the variable names, else in its default below the home folder; "" where there is
+ * none. */
 static void user_file(char *path, size_t size, const char *variable, const char *below_home, const char *name)
 {
     const char *folder = getenv(variable), *home = getenv("HOME");

@@ -42,10 +42,10 @@ json_t *strl_bookmarks_write(const strl_bookmarks *bookmarks)
     json_t *array = json_array();
     for (uint32_t i = 0; i < bookmarks->count; i++) {
         const strl_bookmark *b = &bookmarks->items[i];
-        json_array_append_new(array, json_pack("{s:s,s:[f,f,f],s:f,s:f,s:f,s:b}", "name", b->name, "eye", b->pose.eye[0],
-                                               b->pose.eye[1], b->pose.eye[2], "yaw", b->pose.yaw, "pitch",
-                                               b->pose.pitch, "distance", b->pose.distance, "orthographic",
-                                               b->orthographic));
+        json_array_append_new(array,
+                              json_pack("{s:s,s:[f,f,f],s:f,s:f,s:f,s:b}", "name", b->name, "eye", b->pose.eye[0],
+                                        b->pose.eye[1], b->pose.eye[2], "yaw", b->pose.yaw, "pitch", b->pose.pitch,
+                                        "distance", b->pose.distance, "orthographic", b->orthographic));
     }
     return array;
 }

@@ -67,34 +67,79 @@ void strl__viewer_click(strl__viewer *v, const strl_click *click)
     journal_pick(v, &picked);
 }
 
-/* What to look at: the selected parts where they are drawn, else the surroundings of the newest pick. */
-static bool find_bounds(const strl__viewer *v, double bounds[6])
+static void look_at(strl__viewer *v, const double bounds[6])
 {
-    const strl_picked *newest = strl_picks_newest(&v->picks);
-    if (v->parts.selected_count > 0 &&
-        strl_pick_style_bounds(&v->list, v->parts.styles, v->parts.tree.part_count, STRL_PART_MARKED, bounds))
-        return true;
-    if (!newest)
-        return false;
-    for (int i = 0; i < 3; i++) {
-        bounds[i] = newest->pick.point[i] - newest->pick.distance / 8;
-        bounds[3 + i] = newest->pick.point[i] + newest->pick.distance / 8;
-    }
-    return true;
-}
-
-void strl__viewer_look(strl__viewer *v)
-{
-    double bounds[6];
-    if (!find_bounds(v, bounds)) {
-        strl__viewer_say(v, v->parts.selected_count > 0
-                                ? "nothing of the selection is drawn from here: it is hidden, or too small to be seen"
-                                : "nothing is selected: click a part, or a line of the list");
-        return;
-    }
     strl_recorder_stop(&v->recorder);
     if (v->controls.mode == STRL_NAVIGATOR_WALK)
         v->controls.mode = STRL_NAVIGATOR_ORBIT;
     strl_pose pose = strl_navigator_pose_on(&v->navigator, bounds);
     strl_navigator_go(&v->navigator, &pose, STRL__GO_SECONDS);
+}
+
+/* A model of one part, or without any: what lies round the newest pick. */
+static void look_at_pick(strl__viewer *v)
+{
+    const strl_picked *newest = strl_picks_newest(&v->picks);
+    double bounds[6];
+    if (!newest) {
+        strl__viewer_say(v, "nothing is selected: click a part, or a line of the list");
+        return;
+    }
+    for (int i = 0; i < 3; i++) {
+        bounds[i] = newest->pick.point[i] - newest->pick.distance / 8;
+        bounds[3 + i] = newest->pick.point[i] + newest->pick.distance / 8;
+    }
+    look_at(v, bounds);
+}
+
+/* The index is read once; what is not drawn now will be asked for again. */
+static void look_by_index(strl__viewer *v)
+{
+    strl_error err = {0};
+    double bounds[6] = {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY};
+    bool found = false;
+    v->look_waits = false;
+    if (strl_part_index_status(v->index, &err) != STRL_OK) {
+        strl__viewer_say(v, "%s", err.message);
+        return;
+    }
+    for (uint32_t i = 0; i < v->parts.selected_count; i++)
+        found |= strl_part_index_widen(v->index, v->parts.tree.order[v->parts.selected_first + i], bounds);
+    if (found)
+        look_at(v, bounds);
+    else
+        strl__viewer_say(v, "the selection has no triangle");
+}
+
+void strl__viewer_poll_index(strl__viewer *v)
+{
+    double share;
+    if (!v->look_waits || !v->index)
+        return;
+    v->message_end_ns = UINT64_MAX;
+    if (!strl_part_index_is_done(v->index, &share)) {
+        snprintf(v->message, sizeof v->message, "looking for it in the whole model: %.0f %%", 100 * share);
+        return;
+    }
+    v->message_end_ns = 0;
+    v->frames_left = STRL__FRAMES_AFTER_INPUT;
+    look_by_index(v);
+}
+
+void strl__viewer_look(strl__viewer *v)
+{
+    double bounds[6], share;
+    strl_error err = {0};
+    if (v->parts.selected_count == 0) {
+        look_at_pick(v);
+    } else if (v->index && strl_part_index_is_done(v->index, &share)) {
+        look_by_index(v);
+    } else if (strl_pick_style_bounds(&v->list, v->parts.styles, v->parts.tree.part_count, STRL_PART_MARKED, bounds)) {
+        look_at(v, bounds);
+    } else if (v->index || strl_part_index_create(v->path, v->parts.tree.part_count, &v->index, &err) == STRL_OK) {
+        v->look_waits = true;
+        strl__viewer_say(v, "looking for it in the whole model");
+    } else {
+        strl__viewer_say(v, "%s", err.message);
+    }
 }

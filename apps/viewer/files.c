@@ -79,6 +79,9 @@ strl_status strl__viewer_open_model(strl__viewer *v, const char *path, strl_erro
         return strl_name_file(path, status, err);
     }
     set_model(v, model);
+    strl_part_index_destroy(v->index);
+    v->index = NULL;
+    v->look_waits = false;
     strl_parts_deinit(&v->parts);
     v->parts = parts;
     v->controls.search[0] = 0;

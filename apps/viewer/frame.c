@@ -47,8 +47,7 @@ static strl_status select_nodes(strl__viewer *v, strl_error *err)
     else if (!v->controls.frozen)
         v->frozen = (strl_camera){0};
     strl_walk_set_error_px(v->model->walk, v->controls.error_px);
-    strl_status status =
-        strl_walk_frame(v->model->walk, v->controls.frozen ? &v->frozen : &v->camera, &v->list, err);
+    strl_status status = strl_walk_frame(v->model->walk, v->controls.frozen ? &v->frozen : &v->camera, &v->list, err);
     if (status != STRL_OK)
         return strl_name_file(v->path, status, err);
     v->clock.select_ns += strl_walk_get_stats(v->model->walk)->select_ns;

@@ -2,6 +2,7 @@
 #include <cfloat>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <new>
 
 #include <backends/imgui_impl_glfw.h>
@@ -218,7 +219,10 @@ void show_panel(float scale, const strl_gui_facts *facts, strl_gui_controls *con
     ImGui::Begin("Stroll", NULL,
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav);
     format_count(text, sizeof text, facts->model_triangles);
-    ImGui::TextWrapped("%s", facts->model);
+    const char *slash = std::strrchr(facts->model, '/');
+    ImGui::TextWrapped("%s", slash ? slash + 1 : facts->model);
+    if (ImGui::IsItemHovered())
+        ImGui::SetTooltip("%s", facts->model);
     ImGui::TextColored(faint, "%s triangles", text);
     show_controls(facts, controls);
     if (ImGui::CollapsingHeader("bookmarks"))

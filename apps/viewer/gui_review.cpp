@@ -79,7 +79,9 @@ void part_row(const strl_parts *parts, uint32_t index, strl_gui_controls *contro
     ImGui::SameLine(0, ImGui::GetStyle().ItemInnerSpacing.x + node->depth * ImGui::GetFontSize() * 0.8f);
     if (has_children && ImGui::ArrowButton("##open", node->open ? ImGuiDir_Down : ImGuiDir_Right))
         strl_requests_add(&controls->requests, STRL_ACTION_OPEN_NODE, index);
-    if (has_children)
+    else if (!has_children && node->depth > 0) /* in line with those that have an arrow */
+        ImGui::Dummy(ImVec2(ImGui::GetFrameHeight(), ImGui::GetFrameHeight()));
+    if (has_children || node->depth > 0)
         ImGui::SameLine();
     char label[300];
     if (has_children)
@@ -89,7 +91,9 @@ void part_row(const strl_parts *parts, uint32_t index, strl_gui_controls *contro
     if (hidden > 0)
         ImGui::PushStyleColor(ImGuiCol_Text, faint);
     ImVec2 at = ImGui::GetCursorScreenPos();
-    if (ImGui::Selectable("##row", selected, ImGuiSelectableFlags_AllowDoubleClick)) {
+    at.y += ImGui::GetStyle().FramePadding.y;
+    if (ImGui::Selectable("##row", selected, ImGuiSelectableFlags_AllowDoubleClick,
+                          ImVec2(0, ImGui::GetFrameHeight()))) {
         strl_requests_add(&controls->requests, STRL_ACTION_SELECT, index);
         if (ImGui::IsMouseDoubleClicked(0))
             strl_requests_add(&controls->requests, STRL_ACTION_LOOK, index);

@@ -1,8 +1,8 @@
 /* What the files of the viewer's window share.
  *
- * A frame runs: input (window.c) -> what keys and panels ask for (obey.c), what was clicked (click.c), what was dropped
- * (files.c) -> where the camera is (move.c) -> front, picture, panels (frame.c). viewer.c has the loop. All on one thread;
- * only a build (opener.c) has one of its own. */
+ * A frame runs: input (window.c) -> what keys and panels ask for (obey.c), what was clicked (click.c), what was
+ * dropped (files.c) -> where the camera is (move.c) -> front, picture, panels (frame.c). viewer.c has the loop. All on
+ * one thread; builds (opener.c) and the index of parts (part_index.c) have one of their own. */
 #ifndef STRL_VIEWER_INTERNAL_H
 #define STRL_VIEWER_INTERNAL_H
 
@@ -10,6 +10,7 @@
 #include "viewer/journal.h"
 #include "viewer/model.h"
 #include "viewer/opener.h"
+#include "viewer/part_index.h"
 #include "viewer/settings.h"
 #include "viewer/viewer.h"
 #include "viewer/window.h"
@@ -28,7 +29,7 @@ typedef struct strl__frame_clock {
 typedef struct strl__viewer {
     strl_viewer_desc desc; /* completed: no defaults left; path is `path` */
     char path[4096];
-    strl_viewer_desc begun; /* as completed at the start: what has changed since then is remembered */
+    strl_viewer_desc begun;   /* as completed at the start: what has changed since then is remembered */
     strl_viewer_model *model; /* owned; never NULL while the window is open */
     strl_window *window;
     strl_gui *gui;
@@ -36,7 +37,7 @@ typedef struct strl__viewer {
     strl_renderer *renderer;
     strl_navigator navigator;
     strl_gui_controls controls;
-    strl_draw_list list; /* of the last frame; borrowed from the walk until its next */
+    strl_draw_list list;        /* of the last frame; borrowed from the walk until its next */
     strl_camera camera, frozen; /* camera: of the last frame; frozen: the walk's, where controls.frozen */
     double frozen_far;
     uint32_t size[2];
@@ -47,7 +48,9 @@ typedef struct strl__viewer {
     bool screenshot;       /* of the next frame; a flag, so that a reset in the same frame does not lose it */
     bool falls;            /* the walker is not at rest above the ground */
     strl_parts parts;
-    uint32_t reveal; /* a row to scroll to in the next frame */
+    strl_part_index *index; /* NULL until somebody looks at a part that is not drawn */
+    bool look_waits;        /* for the index */
+    uint32_t reveal;        /* a row to scroll to in the next frame */
     strl_picks picks;
     strl_section section;
     strl_bookmarks bookmarks;
@@ -73,7 +76,8 @@ void strl__viewer_journal_section(strl__viewer *v);
 /* click.c */
 void strl__viewer_click(strl__viewer *v, const strl_click *click);
 strl_pick_filter strl__viewer_filter(const strl__viewer *v);
-void strl__viewer_look(strl__viewer *v); /* at the selection */
+void strl__viewer_look(strl__viewer *v); /* at the selection; now, or once it is known where that is */
+void strl__viewer_poll_index(strl__viewer *v);
 
 /* move.c. Brings the camera up to date. True while something moves by itself. */
 bool strl__viewer_move(strl__viewer *v, const strl_window_input *input, double seconds);

@@ -68,8 +68,8 @@ strl_status strl_viewer_model_open(strl_viewer_model *model, const char *path, u
         status = strl_source_open_file(path, READ_THREADS, &source, err);
     if (status == STRL_OK) {
         model->executor = (strl_executor){model->pool, submit};
-        const strl_walk_desc desc = {.memory_bytes = memory_bytes, .error_px = error_px, .executor = &model->executor,
-                                     .labels = true};
+        const strl_walk_desc desc = {
+            .memory_bytes = memory_bytes, .error_px = error_px, .executor = &model->executor, .labels = true};
         status = strl_walk_open(source, &desc, &model->walk, err);
     }
     if (status == STRL_OK)

@@ -13,7 +13,7 @@ typedef struct strl_viewer_model {
     strl_executor executor;
     double bounds[6];
     unsigned up_axis;
-    double unit_metres;  /* 0 = unknown */
+    double unit_metres; /* 0 = unknown */
     uint64_t triangles; /* of the finest level */
 } strl_viewer_model;
 

@@ -88,8 +88,7 @@ static void end_recording(strl__viewer *v)
         return;
     }
     strl__viewer_say(v, "saved %.300s", path);
-    strl_journal_write(v->journal, "path",
-                       json_pack("{s:s,s:i}", "file", path, "frames", (int)v->recorder.path.count));
+    strl_journal_write(v->journal, "path", json_pack("{s:s,s:i}", "file", path, "frames", (int)v->recorder.path.count));
 }
 
 void strl__viewer_toggle_record(strl__viewer *v)
@@ -132,6 +131,18 @@ static bool replay(strl__viewer *v, double seconds)
     return true;
 }
 
+/* A path's cameras are perspective ones: it ends where the visitor turns to another kind. */
+static void record(strl__viewer *v, double seconds)
+{
+    if (v->recorder.state == STRL_RECORDER_RECORDS && v->navigator.orthographic)
+        v->path_ends = true;
+    else if (!strl_recorder_add(&v->recorder, &v->camera, seconds))
+        strl__viewer_say(v, "the path is as long as one can be: recording has stopped");
+    if (v->path_ends)
+        end_recording(v);
+    v->path_ends = false;
+}
+
 /* ---- the hand */
 
 static bool hand_moves(const strl_window_input *input)
@@ -168,10 +179,6 @@ bool strl__viewer_move(strl__viewer *v, const strl_window_input *input, double s
     bool falls = !goes && !replays && v->navigator.mode == STRL_NAVIGATOR_WALK && stand(v, step);
     if (!replays)
         v->camera = strl_navigator_camera(&v->navigator, v->size[0], v->size[1]);
-    if (!strl_recorder_add(&v->recorder, &v->camera, seconds))
-        strl__viewer_say(v, "the path is as long as one can be: recording has stopped");
-    if (v->path_ends)
-        end_recording(v);
-    v->path_ends = false;
+    record(v, seconds);
     return goes || falls || replays || v->recorder.state == STRL_RECORDER_RECORDS;
 }

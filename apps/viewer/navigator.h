@@ -28,11 +28,11 @@ typedef struct strl_navigator {
     double eye[3];
     double yaw, pitch; /* as in a pose */
     double distance;
-    double speed;      /* of flying, world units a second */
+    double speed; /* of flying, world units a second */
     double walk_speed;
     double eye_height; /* of a walker above what lies below, world units */
     double fov_y_deg;
-    bool orthographic; /* as high as a perspective image is at the pivot */
+    bool orthographic;    /* as high as a perspective image is at the pivot */
     uint32_t view_height; /* pixels: what drags are measured in */
     strl_pose from, to;   /* of a transition */
     double gone, going;   /* seconds since it began, in all; going 0 = there is none */

@@ -75,8 +75,8 @@ static void obey_parts(strl__viewer *v, strl_request request)
 void strl__viewer_journal_section(strl__viewer *v)
 {
     strl_journal_write(v->journal, "section",
-                       json_pack("{s:b,s:o,s:f}", "on", v->section.on, "normal",
-                                 strl_journal_vector(v->section.normal), "offset", v->section.offset));
+                       json_pack("{s:b,s:o,s:f}", "on", v->section.on, "normal", strl_journal_vector(v->section.normal),
+                                 "offset", v->section.offset));
 }
 
 static void toggle_section(strl__viewer *v)

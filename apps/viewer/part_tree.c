@@ -188,8 +188,9 @@ strl_status strl_part_tree_init(strl_part_tree *tree, uint32_t part_count, strl_
     tree->names = strl__alloc_zero(part_count, sizeof *tree->names);
     tree->order = strl__alloc_zero(part_count, sizeof *tree->order);
     tree->places = strl__alloc_zero(part_count, sizeof *tree->places);
-    strl_status status = tree->names && tree->order && tree->places ? load_names(tree, name, context, err)
-                                                    : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u parts", part_count);
+    strl_status status = tree->names && tree->order && tree->places
+                             ? load_names(tree, name, context, err)
+                             : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u parts", part_count);
     if (status == STRL_OK) {
         for (uint32_t part = 0; part < part_count; part++)
             tree->order[part] = part;

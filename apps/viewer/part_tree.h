@@ -1,5 +1,5 @@
 /* The parts of a model as a tree of their names, split at '/', and the rows of it that a list shows. Rows are found
- * anew only when the tree is opened, closed or searched, so that a list of many thousand costs what is on the screen. */
+ * anew only when the tree is opened, closed or searched: a list of many thousand costs what is on the screen. */
 #ifndef STRL_VIEWER_PART_TREE_H
 #define STRL_VIEWER_PART_TREE_H
 
@@ -17,7 +17,7 @@ extern "C" {
 
 /* A step of a path. The parts below it are order[first_part ... + part_count] of the tree. */
 typedef struct strl_part_node {
-    uint32_t name;       /* byte in the tree's text: of the last piece of the path, ended by end */
+    uint32_t name; /* byte in the tree's text: of the last piece of the path, ended by end */
     uint32_t name_bytes;
     uint32_t first_part, part_count;
     uint32_t end; /* the node after all that is below this one; its first child, if any, is the next node */
@@ -27,10 +27,10 @@ typedef struct strl_part_node {
 } strl_part_node;
 
 typedef struct strl_part_tree {
-    char *text;      /* owned: all names, each ended by 0 */
+    char *text; /* owned: all names, each ended by 0 */
     size_t text_bytes;
-    uint32_t *names; /* [part_count]: where each part's name begins in text */
-    uint32_t *order; /* [part_count]: parts sorted by path */
+    uint32_t *names;  /* [part_count]: where each part's name begins in text */
+    uint32_t *order;  /* [part_count]: parts sorted by path */
     uint32_t *places; /* [part_count]: where each part stands in order */
     uint32_t part_count;
     strl_part_node *nodes; /* depth first */

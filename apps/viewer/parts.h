@@ -11,8 +11,8 @@ extern "C" {
 
 typedef struct strl_parts {
     strl_part_tree tree;
-    uint8_t *hidden; /* [part_count] by place: not 0 = not drawn */
-    uint8_t *styles; /* [part_count] by part, strl_part_style: hidden before marked */
+    uint8_t *hidden;  /* [part_count] by place: not 0 = not drawn */
+    uint8_t *styles;  /* [part_count] by part, strl_part_style: hidden before marked */
     uint64_t version; /* of styles; grows */
     uint32_t hidden_count;
     uint32_t selected_first, selected_count; /* places; 0 = nothing */

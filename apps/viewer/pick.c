@@ -220,9 +220,9 @@ static void add_point(const strl_draw_item *item, const double local[3], double 
 {
     double model[3];
     for (int i = 0; i < 3; i++)
-        model[i] = item->origin[i] + (item->positions == STRL_POSITIONS_LATTICE
-                                          ? item->step * ((double)item->anchor[i] + local[i])
-                                          : local[i]);
+        model[i] =
+            item->origin[i] +
+            (item->positions == STRL_POSITIONS_LATTICE ? item->step * ((double)item->anchor[i] + local[i]) : local[i]);
     for (int i = 0; i < 3; i++) {
         double world = dot(item->transform + 4 * i, model) + item->transform[4 * i + 3];
         bounds[i] = fmin(bounds[i], world);

@@ -25,10 +25,10 @@ typedef struct strl_pick_filter {
 } strl_pick_filter;
 
 typedef struct strl_pick {
-    double point[3];  /* world */
-    double normal[3]; /* of the triangle, unit, towards where the ray came from */
-    double distance;  /* from the ray's start */
-    double error;     /* the surface is no farther than this from the point, world units, roughly */
+    double point[3];         /* world */
+    double normal[3];        /* of the triangle, unit, towards where the ray came from */
+    double distance;         /* from the ray's start */
+    double error;            /* the surface is no farther than this from the point, world units, roughly */
     uint32_t part, material; /* UINT32_MAX where the list has no labels */
     uint32_t placement, node;
 } strl_pick;

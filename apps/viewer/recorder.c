@@ -60,7 +60,8 @@ void strl_recorder_stop(strl_recorder *recorder)
     const strl_camera_path *path = &recorder->path;
     bool records = recorder->state == STRL_RECORDER_RECORDS;
     recorder->state = STRL_RECORDER_IDLE;
-    if (records && path->count > 0 && memcmp(&path->frames[path->count - 1], &recorder->newest, sizeof recorder->newest))
+    if (records && path->count > 0 &&
+        memcmp(&path->frames[path->count - 1], &recorder->newest, sizeof recorder->newest))
         append(recorder, &recorder->newest);
 }
 

@@ -1,4 +1,4 @@
-/* A path that the visitor takes, to be taken again: cameras at equal times, as `stroll render --path FILE` reads them. */
+/* A path that the visitor takes, to be taken again: cameras at equal times, as `render --path FILE` reads them. */
 #ifndef STRL_VIEWER_RECORDER_H
 #define STRL_VIEWER_RECORDER_H
 
@@ -12,14 +12,19 @@ extern "C" {
 
 #define STRL_RECORDER_RATE 30.0 /* cameras a second */
 
-typedef enum strl_recorder_state { STRL_RECORDER_IDLE, STRL_RECORDER_RECORDS, STRL_RECORDER_REPLAYS } strl_recorder_state;
+typedef enum strl_recorder_state {
+    STRL_RECORDER_IDLE,
+    STRL_RECORDER_RECORDS,
+    STRL_RECORDER_REPLAYS
+} strl_recorder_state;
 
 typedef struct strl_recorder {
     strl_recorder_state state;
     strl_camera_path path; /* owned; the last one recorded or read */
     size_t capacity;
-    strl_path_frame newest; /* where the camera was last; a path ends there, however short the time since its last camera */
-    double clock;           /* cameras since the path began, with fraction */
+    strl_path_frame
+        newest;      /* where the camera was last; a path ends there, however short the time since its last camera */
+    double clock;    /* cameras since the path began, with fraction */
     bool last_shown; /* of a replay */
 } strl_recorder;
 

@@ -14,8 +14,8 @@ typedef struct strl_settings {
     uint64_t memory_bytes, gpu_memory_bytes;
     double text_scale; /* times what the system asks for */
     bool show_parts, orthographic;
-    json_t *root;      /* owned; all of the file */
-    char *path;        /* owned; NULL = nothing is remembered */
+    json_t *root; /* owned; all of the file */
+    char *path;   /* owned; NULL = nothing is remembered */
 } strl_settings;
 
 /* path NULL: nothing is read and nothing will be written. A missing file is no failure. After a failure the file will

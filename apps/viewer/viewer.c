@@ -17,7 +17,7 @@
 #define MOST_SIDE 16384u
 #define MESSAGE_SECONDS 4.0
 #define IDLE_SECONDS 0.5
-#define BUILD_SECONDS 0.1 /* between two looks at a build */
+#define BUILD_SECONDS 0.1 /* between two looks at what another thread does */
 #define AVERAGE_SECONDS 0.5
 
 const char strl_viewer_keys[] =
@@ -106,7 +106,7 @@ static double decide_wait(strl__viewer *v, bool drawable)
         v->resting = true;
         v->clock.last_ns = 0;
         tell_rest(v);
-        return v->news.state == STRL_OPENER_BUILDS ? BUILD_SECONDS : IDLE_SECONDS;
+        return v->news.state == STRL_OPENER_BUILDS || v->look_waits ? BUILD_SECONDS : IDLE_SECONDS;
     }
     v->resting = false;
     v->stirred = true;
@@ -139,6 +139,7 @@ static bool take_wishes(strl__viewer *v, const strl_window_input *input)
             quit = strl__viewer_obey(v, asked[from].items[r]) || quit;
     take_dropped(v, input->dropped);
     strl__viewer_poll_opener(v);
+    strl__viewer_poll_index(v);
     return quit;
 }
 
@@ -240,6 +241,7 @@ static strl_status open_viewer(strl__viewer *v, strl_error *err)
 static void close_viewer(strl__viewer *v)
 {
     strl_opener_destroy(v->opener);
+    strl_part_index_destroy(v->index);
     strl_gui_destroy(v->gui);
     strl_renderer_destroy(v->renderer);
     strl_window_destroy(v->window);

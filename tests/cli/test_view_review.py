@@ -24,6 +24,7 @@ SIZE = (1280, 800)
 EAST, NORTH, HEIGHT = 500000.25, 5400000.5, 312.0  # coordinates as surveyors have them
 UP = (0, 0, 1)
 BETWEEN, PARK = (310, 140, 970, 730), (320, 790)  # of the window: without panels and messages; for the cursor
+BACKGROUND = (30, 33, 38)
 
 
 # ---- the model: boxes with names
@@ -34,7 +35,12 @@ def make_boxes():
     boxes = {"site/ground": ("grass", (-20, -15, -1), (20, 15, 0)),
              "site/house/walls": ("brick", (-4, -3, 0), (4, 3, 5)),
              "site/house/roof": ("tile", (-5, -4, 5), (5, 4, 6.5)),
-             "site/house/chimney": ("brick", (1, -2, 6.5), (2, -1, 8.5))}
+             "site/house/chimney": ("brick", (1, -2, 6.5), (2, -1, 8.5)),
+             "site/house/upper floor": ("wood", (-3.8, -2.8, 2.4), (3.8, 2.8, 2.6)),
+             "site/house/rooms/table": ("wood", (0.5, -1.5, 2.6), (2.5, 0.5, 3.4)),
+             "site/house/rooms/bed": ("linen", (-3, 0.6, 2.6), (-1, 2.6, 3.1)),
+             "site/house/rooms/wall": ("plaster", (-0.4, -2.8, 2.6), (-0.2, 2.8, 4.9)),
+             "site/house/rooms/wardrobe": ("wood", (-3.7, -2.7, 2.6), (-1.2, -2, 4.6))}
     for tree in range(12):
         x, y = -16 + tree % 4 * 10, (-12, -8.5, 10)[tree // 4]
         boxes[f"site/trees/tree {tree:02d}"] = ("leaf", (x, y, 0), (x + 2, y + 2, 3 + tree % 5))
@@ -43,7 +49,8 @@ def make_boxes():
             for name, (material, low, high) in boxes.items()}
 
 
-COLOURS = {"grass": (0.2, 0.45, 0.15), "brick": (0.55, 0.22, 0.15), "tile": (0.3, 0.3, 0.38), "leaf": (0.1, 0.35, 0.1)}
+COLOURS = {"grass": (0.2, 0.45, 0.15), "brick": (0.55, 0.22, 0.15), "tile": (0.3, 0.3, 0.38), "leaf": (0.1, 0.35, 0.1),
+           "wood": (0.45, 0.3, 0.15), "linen": (0.7, 0.7, 0.8), "plaster": (0.75, 0.72, 0.65)}
 CORNERS = [(1, 3, 4, 2), (5, 6, 8, 7), (1, 2, 6, 5), (3, 7, 8, 4), (1, 5, 7, 3), (2, 4, 8, 6)]
 
 
@@ -331,15 +338,61 @@ def check_memory(stroll, display, container, folder):
         viewer.end()
 
 
+def check_scale(stroll, display, container, folder):
+    """Where the desktop wants text twice as large, the panel is twice as wide."""
+    def colour_beside_panel():
+        viewer = Viewer(stroll, display, container, folder, "--frames", "100000", size=SIZE)
+        try:
+            viewer.event("opened")
+            return viewer.wait_for(lambda: find_panel(display), "a panel")
+        finally:
+            viewer.end()
+
+    def find_panel(screen):
+        row = screen.shoot(0, 60, 900, 61)[0]
+        other = [x for x in range(900) if row[3 * x:3 * x + 3] != bytearray(BACKGROUND)]
+        return max(other, default=0) if row[-3:] == bytearray(BACKGROUND) else 0
+
+    folder.mkdir()
+    plain = colour_beside_panel()
+    with X11(display.environment["DISPLAY"]) as hand:
+        hand.set_text_scale(2)
+        large = colour_beside_panel()
+        hand.set_text_scale(1)
+    assert 1.8 < large / plain < 2.2, f"the panel reaches to {plain}, and to {large} where text is twice as large"
+
+
+def take_pictures(session, pictures):
+    """For people and docs/viewer.md: a pick with distance and the parts, and a section."""
+    viewer = session.viewer
+
+    def take(name):
+        viewer.point(960, 700)
+        write_png(pictures / f"{name}.png", session.display.shoot(0, 0, *SIZE))
+
+    session.check_pick(640, 390)
+    viewer.key("v")
+    viewer.event("arrived")
+    viewer.drag(1, 700, 600, 860, 640)
+    viewer.drag(3, 640, 500, 640, 420)
+    viewer.key("BackSpace", "t")
+    viewer.click(610, 330)
+    viewer.click(500, 480)
+    take("viewer_pick")
+    viewer.key("BackSpace")
+    viewer.click(700, 60)
+    viewer.key("k", *["comma"] * 4)
+    take("viewer_section")
+    viewer.key("F1")
+    take("viewer_help")
+    viewer.key("F1", "t", "r")
+    viewer.rest()
+
+
 def run_session(stroll, display, container, boxes, folder, pictures, *options):
     folder.mkdir()
     viewer = Viewer(stroll, display, container, folder, *options, size=SIZE)
     session = Session(viewer, display, boxes)
-
-    def picture(name):
-        if pictures:
-            viewer.rest()
-            write_png(pictures / f"{name}.png", display.shoot(0, 0, *SIZE))
 
     try:
         opened = viewer.event("opened")
@@ -352,6 +405,8 @@ def run_session(stroll, display, container, boxes, folder, pictures, *options):
         check_path(session, stroll, container)
         check_look(session)
         check_walk(session)
+        if pictures:
+            take_pictures(session, pictures)
         check_drop(session, display, folder)
         viewer.quit()
     finally:
@@ -374,6 +429,7 @@ def main():
         with Display((SIZE[0] + 40, SIZE[1] + 40)) as display:
             run_session(stroll, display, container, boxes, folder / "auto", pictures)
             check_memory(stroll, display, container, folder / "again")
+            check_scale(stroll, display, container, folder / "scale")
         with Display((SIZE[0] + 40, SIZE[1] + 40)) as display:
             run_session(stroll, display, container, boxes, folder / "gl3", None, "--backend", "gl3")
     print("view: picks, parts, sections, bookmarks, paths, walking, dropped files and settings work")

@@ -13,8 +13,16 @@
 #include "stroll/render.h"
 #include "viewer/parts.h"
 
-static const char *const names[] = {"house/roof",  "house/wall/north", "tree",          "house/wall/south", "house/wall",
-                                    "house-old",   "House/wall/west",  "house/wall/south", "",             "a//b"};
+static const char *const names[] = {"house/roof",
+                                    "house/wall/north",
+                                    "tree",
+                                    "house/wall/south",
+                                    "house/wall",
+                                    "house-old",
+                                    "House/wall/west",
+                                    "house/wall/south",
+                                    "",
+                                    "a//b"};
 #define PART_COUNT ((uint32_t)(sizeof names / sizeof *names))
 
 static strl_status name_part(void *context, uint32_t part, char *name, size_t size, strl_error *err)

@@ -142,7 +142,8 @@ static void folders_are_made_and_nothing_is_written_without_a_name(void **state)
 
 static strl_camera camera_at(double x)
 {
-    return (strl_camera){.eye = {x, 0, 0}, .target = {x, 5, 0}, .up = {0, 0, 1}, .fov_y_deg = 60, .width = 8, .height = 8};
+    return (strl_camera){
+        .eye = {x, 0, 0}, .target = {x, 5, 0}, .up = {0, 0, 1}, .fov_y_deg = 60, .width = 8, .height = 8};
 }
 
 static void a_path_is_recorded_in_equal_times_and_replayed(void **state)
@@ -179,7 +180,8 @@ static void a_path_is_recorded_in_equal_times_and_replayed(void **state)
     assert_int_equal(again.path.count, recorder.path.count);
 
     assert_true(strl_recorder_replay(&again));
-    assert_true(strl_recorder_next(&again, 100, size, &camera) && camera.eye[0] == 0); /* the first, whatever the time */
+    assert_true(strl_recorder_next(&again, 100, size, &camera) &&
+                camera.eye[0] == 0); /* the first, whatever the time */
     assert_true(strl_recorder_next(&again, 0.5, size, &camera) && fabs(camera.eye[0] - 0.5) < 0.06);
     assert_true(strl_recorder_next(&again, 100, size, &camera) && camera.eye[0] == 2.25);
     assert_false(strl_recorder_next(&again, 0.1, size, &camera));
