@@ -19,7 +19,7 @@
 /* How much of what could be tried is: under a sanitizer, where all takes ten times as long, less. Under ThreadSanitizer
  * only that checkpoints are made and gone on with while workers run. */
 #if defined(__SANITIZE_THREAD__)
-#define CALL_STRIDE 11u
+#define CALL_STRIDE 29u
 #define FAILURE_SHARE 1u
 #elif defined(__SANITIZE_ADDRESS__)
 #define CALL_STRIDE 9u
