@@ -13,7 +13,6 @@ Each curve goes at once to --log (JSON lines) and is not taken again while progr
 does). --write-docs rewrites docs/images/curve_MODEL.svg, bench/curve.csv and the tables of docs/benchmarks.md."""
 import argparse
 import csv
-import hashlib
 import json
 import pathlib
 import statistics
@@ -32,10 +31,6 @@ MOST, LEAST = 0.85, 1 / 2000
 BEGIN, END = "<!-- curve: begin -->", "<!-- curve: end -->"
 COLUMNS = ("model", "program", "asked", "triangles", "rms", "max")
 MEASURES = ("rms", "max")
-
-
-def digest(path):
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:12]
 
 
 def triangles_of(path):
@@ -102,7 +97,7 @@ class Curves:
 
     def take_peer(self, peer, model):
         """Kept whatever became of Stroll since: the peer does not know it."""
-        settings = {**self.settings, "peer": digest(peer)}
+        settings = {**self.settings, "peer": measure.digest(peer)[:12]}
         kept = [record for (_, of), record in self.bench.log.latest().items() if of == model and record["settings"] == settings]
         print(f"curve: {peer} {model}{': kept' if kept else ''}", flush=True)
         if kept and not self.options.again:

@@ -7,13 +7,14 @@ A build is killed (SIGKILL) after a random share of the time that the unstopped 
 comes to its end; then the next begins. Prints a JSON line for each kill and one for all; exits with 1 where bytes differ
 or a build cannot be resumed."""
 import argparse
-import hashlib
 import json
 import os
 import random
 import subprocess
 import sys
 import time
+
+import measure
 
 
 def options():
@@ -26,22 +27,6 @@ def options():
     parser.add_argument("--memory", default="1G")
     parser.add_argument("--jobs")
     return parser.parse_args()
-
-
-def checksum(path):
-    digest = hashlib.sha256()
-    with open(path, "rb") as file:
-        while piece := file.read(1 << 22):
-            digest.update(piece)
-    return digest.hexdigest()
-
-
-def disk_bytes(folder):
-    """Of the scratch files; the unfinished container is none."""
-    try:
-        return sum(entry.stat().st_blocks * 512 for entry in os.scandir(folder) if not entry.name.endswith(".part"))
-    except OSError:
-        return 0
 
 
 class Kills:
@@ -58,7 +43,7 @@ class Kills:
         begin = time.monotonic()
         done = subprocess.run(self.command(), stdout=subprocess.PIPE, check=True)
         self.seconds, self.result = time.monotonic() - begin, json.loads(done.stdout)
-        self.expected = checksum(self.out)
+        self.expected = measure.digest(self.out)
         os.remove(self.out)
 
     def run_once(self, kill, spent):
@@ -89,9 +74,9 @@ class Kills:
                     break
                 kills, here, spent = kills + 1, here + 1, spent + moment
                 print(json.dumps({"kill": kills, "of_build": builds + 1, "after_seconds": round(moment, 2),
-                                  "scratch_bytes": disk_bytes(self.out + ".tmp")}), flush=True)
+                                  "scratch_bytes": measure.disk_bytes(self.out + ".tmp")}), flush=True)
             builds += 1
-            if checksum(self.out) != self.expected:
+            if measure.digest(self.out) != self.expected:
                 sys.exit(f"build {builds}, which was killed {here} times, has other bytes")
             if os.path.exists(self.out + ".tmp"):
                 sys.exit(f"build {builds} left its scratch folder")

@@ -45,10 +45,15 @@ def commit_of(root):
     return done.stdout.strip() or "unknown"
 
 
+def digest(path):
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 def machine(root, program):
     """What every record says. `program` tells two builds apart even where the commit does not."""
     memory_bytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    return {"commit": commit_of(root), "program": hashlib.sha256(program.read_bytes()).hexdigest()[:12],
+    return {"commit": commit_of(root), "program": digest(program)[:12],
             "cpu": cpu_model(), "cores": len(os.sched_getaffinity(0)), "memory_gib": round(memory_bytes / 2**30, 1),
             "system": system_name(), "kernel": platform.release()}
 
@@ -98,23 +103,24 @@ def run(command, cores=None, allowed=(0,), limits=None):
     return outcome
 
 
+def disk_bytes(folder):
+    """What the scratch files of a folder take; an unfinished output (*.part) is none. 0 where it is not there."""
+    try:
+        return sum(entry.stat().st_blocks * 512 for entry in os.scandir(folder) if not entry.name.endswith(".part"))
+    except OSError:
+        return 0
+
+
 class DiskWatch:
-    """The most bytes that the files of a folder took while it was watched; an unfinished output (*.part) is no scratch."""
+    """The most bytes that the scratch files of a folder took while it was watched."""
 
     def __init__(self, folder):
         self.folder, self.most_bytes, self.stop = folder, 0, threading.Event()
         self.thread = threading.Thread(target=self.watch, daemon=True)
 
     def watch(self):
-        while not self.stop.wait(0.05):
-            taken = 0
-            try:
-                for entry in os.scandir(self.folder):
-                    if not entry.name.endswith(".part"):
-                        taken += entry.stat().st_blocks * 512
-            except OSError:
-                continue
-            self.most_bytes = max(self.most_bytes, taken)
+        while not self.stop.wait(0.02):
+            self.most_bytes = max(self.most_bytes, disk_bytes(self.folder))
 
     def __enter__(self):
         self.thread.start()

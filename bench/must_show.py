@@ -20,6 +20,9 @@ models. Parts:
     roots         builds every PLY, STL and OBJ file of DIR: the root's size                      (all files)
     scale         builds of one surface of ever more triangles, under --memory 1G           (isosurface_1m to _372m)
     shapes        builds of other kinds of models, against the first one's rate      (isosurface_10m, shuffled, STL, boxes, scans)
+    claims        builds with and without --certify: claimed over measured, level by level; CPU time     (isosurface_1m, terrain, scans)
+    decode        payloads decoded on one thread, as built by default and with --compact          (models of several kinds)
+    kills         a build killed at random moments and resumed, until --kills of them            (isosurface_10m)
     cap           a build under the system's own limit, which ends a program that passes it       (isosurface_10m)
     walk_cold     a walk under --memory 600M, the file cold and warm                   (isosurface_10m, isosurface_372m)
 
@@ -27,10 +30,9 @@ The largest scene takes 9 GB of --scratch, its build 30 GB more. Parts scale, sh
 they have made (--keep leaves them).
 
 Each record goes at once to --log (JSON lines). What is there of the same program with the same settings is kept, so a
-run that was stopped goes on; --again measures anew. --write-docs rewrites the tables of docs/benchmarks.md from the log
-and the rows of bench/results.csv, so that parts may be measured one after another."""
+run that was stopped goes on; --again measures anew. --write-docs rewrites the tables of docs/benchmarks.md from the log,
+the rows of bench/results.csv and bench/errors.csv, so that parts may be measured one after another."""
 import argparse
-import hashlib
 import json
 import math
 import pathlib
@@ -41,6 +43,7 @@ import time
 
 import counts
 import measure
+import promise_parts
 import scale_parts
 import sheets
 import tables
@@ -57,7 +60,7 @@ WALK_FRAMES_A_FRAME = 5  # 300 where the others have 60: a smooth path
 class Bench:
     def __init__(self, options):
         self.options = options
-        self.stroll = options.stroll.resolve()
+        self.root, self.stroll = ROOT, options.stroll.resolve()
         self.data, self.scratch = options.data, options.scratch
         self.log = measure.Log(options.log, measure.machine(ROOT, self.stroll))
 
@@ -235,7 +238,7 @@ def part_bytes(bench, model):
     digests, container = {}, bench.scratch / f"{model}_jobs.stroll"
     for jobs in (1, 2, 3, 8):
         bench.program("build", bench.input_of(model), "-o", container, "--jobs", jobs)
-        digests[jobs] = hashlib.sha256(container.read_bytes()).hexdigest()
+        digests[jobs] = measure.digest(container)
         container.unlink()
     bench.log.add("bytes", model, {}, digests=digests, holds=len(set(digests.values())) == 1)
 
@@ -338,7 +341,8 @@ PARTS = {"build": (part_build, MODELS), "images": (part_images, MODELS), "psnr":
          "rate": (part_rate, ("isosurface_10m",)), "bytes": (part_bytes, ("isosurface_1m",)),
          "sizes": (part_sizes, ("isosurface_1m", "isosurface_10m", "dragon_scans", "terrain_n49e011", "iso_cthead", "boxes_1m")),
          "dependencies": (part_dependencies, ("isosurface_10m",)),
-         "walk": (part_walk, (("isosurface_1m", "isosurface_10m"),)), "roots": (part_roots, ("",)), **scale_parts.PARTS}
+         "walk": (part_walk, (("isosurface_1m", "isosurface_10m"),)), "roots": (part_roots, ("",)), **scale_parts.PARTS,
+         **promise_parts.PARTS}
 
 
 def models_of(part, chosen):
@@ -390,12 +394,14 @@ def parse_options():
     parser.add_argument("--size", default="1280x720", help="of images (1280x720)")
     parser.add_argument("--pairs", type=int, default=5, help="of builds in part rate (5)")
     parser.add_argument("--runs", type=int, default=3,
-                        help="builds of each model in parts scale and shapes; one of what is over 20 M triangles (3)")
+                        help="builds of each model in parts scale, shapes and claims; one of what is over 20 M triangles (3)")
+    parser.add_argument("--kills", type=int, default=50, help="of builds in part kills (50)")
     parser.add_argument("--again", action="store_true", help="measure what the log has already")
     parser.add_argument("--keep", action="store_true", help="keep the frames, and the scenes that parts delete")
-    parser.add_argument("--write-docs", action="store_true", help="rewrite the tables and the counts from the log")
+    parser.add_argument("--write-docs", action="store_true", help="rewrite the tables, the counts and the errors from the log")
     parser.add_argument("--docs", type=pathlib.Path, default=ROOT / "docs" / "benchmarks.md")
     parser.add_argument("--counts", type=pathlib.Path, default=counts.TABLE)
+    parser.add_argument("--errors", type=pathlib.Path, default=ROOT / "bench" / "errors.csv")
     options = parser.parse_args()
     options.parts = words_of(options.parts)
     for part in options.parts:
@@ -418,6 +424,7 @@ def main():
     if options.write_docs:
         tables.write_docs(options.docs, text)
         put_counts(bench, options.counts)
+        tables.write_errors(options.errors, bench.log.latest())
     return 1 if failures else 0
 
 

@@ -1,4 +1,5 @@
-"""From the records of must_show.py to the Markdown tables of docs/benchmarks.md."""
+"""From the records of must_show.py to the Markdown tables of docs/benchmarks.md, and to bench/errors.csv."""
+import csv
 
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 PATHS = ("orbit", "flythrough")
@@ -77,15 +78,13 @@ def verify_rows(records):
                number(record["seconds"], 1))
 
 
-# Bytes a triangle at most: boxes, whose faces share little, may take half as much again.
-SIZE_LIMITS = {"default": 11, "compact": 4}
-BOXES_SHARE = 1.5
+SIZE_LIMITS = {"default": 11, "compact": 4}  # bytes a triangle at most
 
 
 def size_rows(records):
     for record in records_of(records, "sizes"):
         for name, options in (("default", ""), ("compact", " `--compact`")):
-            side, limit = record[name], SIZE_LIMITS[name] * (BOXES_SHARE if record["model"].startswith("boxes") else 1)
+            side, limit = record[name], SIZE_LIMITS[name]
             yield (record["model"] + options, number(side["bytes_per_triangle"]),
                    f"{number(side['bytes_per_triangle'] <= limit)} ({limit:g})", number(side["dropped"]["degenerate"]),
                    f"{side['step']:.3g}", f"{side['quantisation_error']:.3g}", f"{side['measured']:.3g}",
@@ -175,6 +174,50 @@ def shape_rows(records):
                number(ratios[0]), number(ratios[1]), number(max(ratios) <= shape_limit(model)) + f" ({shape_limit(model)})",
                mebibytes(record["system_peak_rss_bytes"]), number(record["scratch_bytes"] / record["report"]["triangles_in"], 1),
                number(record["bytes_per_triangle"]))
+
+
+def stage_rows(records):
+    """Where a build's time goes, and how many cores work in each stage."""
+    for record in sorted(records_of(records, "scale"), key=lambda record: record["report"]["triangles_in"]):
+        stages = record["report"].get("stages", {})
+        whole = sum(stage["cpu_seconds"] for stage in stages.values())
+        for name, stage in stages.items():
+            yield (record["model"], name, number(stage["seconds"], 2), number(stage["cpu_seconds"], 2),
+                   percent(stage["cpu_seconds"] / whole, 1), number(stage["cpu_seconds"] / max(1e-9, stage["seconds"])))
+
+
+# Of the largest claim of a level over the largest distance measured there.
+LEVEL_LIMITS = {"default": {"": 4}, "certified": {"isosurface": 2, "": 3}}
+
+
+def level_limit(side, model):
+    return next(limit for start, limit in LEVEL_LIMITS[side].items() if model.startswith(start))
+
+
+def claim_rows(records):
+    for record in records_of(records, "claims"):
+        for side, options in (("default", ""), ("certified", ", `--certify`")):
+            figures, limit = record[side], level_limit(side, record["model"])
+            worst = max(figures["levels"])
+            yield (record["model"] + options, " ".join(number(level) for level in figures["levels"]), number(worst),
+                   f"{number(worst <= limit)} ({limit})", number(figures["holds"]), least_to_most(figures["cpu_seconds"]),
+                   number(rate_of(figures, "cpu_seconds"), 3),
+                   number(figures["cpu_seconds"]["median"] / record["default"]["cpu_seconds"]["median"]))
+
+
+def decode_rows(records):
+    for record in records_of(records, "decode"):
+        for side, options in (("default", ""), ("compact", " `--compact`")):
+            figures = record[side]
+            yield (record["model"] + options, number(figures["bytes_per_triangle"]), number(figures["decode_mtri_per_s"], 1),
+                   number(figures["decode_slowest"], 1), number(figures["decode_fastest"], 1),
+                   number(figures["decode_mtri_per_s"] >= 20))
+
+
+def kill_rows(records):
+    for record in records_of(records, "kills"):
+        yield (record["model"], number(record["triangles"]), record["kills"], record["builds"], record["bytes"],
+               number(record["seconds_unstopped"], 1), number(record["most_seconds_lost"], 1))
 
 
 def cap_rows(records):
@@ -286,6 +329,15 @@ TABLES = (
      ("model", "triangles in", "seconds (least to most)", "CPU seconds", "M triangles per CPU second",
       "time a triangle over the first model's", "CPU time a triangle over it", "within (limit)", "peak memory",
       "scratch bytes per triangle", "bytes per triangle"), shape_rows),
+    ("scale", "Where the time of a build goes",
+     ("model", "stage", "seconds", "CPU seconds", "share of CPU time", "cores at work"), stage_rows),
+    ("claims", "Claimed over measured, by level",
+     ("model", "levels 0, 1, ...", "worst", "within (limit)", "verify holds", "CPU seconds (least to most)",
+      "M triangles per CPU second", "over the default's"), claim_rows),
+    ("decode", "Decoding, one thread", ("model", "bytes per triangle", "M triangles/s, median", "least", "most",
+                                        "at least 20"), decode_rows),
+    ("kills", "Killed at random moments and resumed", ("model", "triangles", "kills", "builds", "bytes of the container",
+                                                       "seconds, not stopped", "most seconds lost"), kill_rows),
     ("cap", "Builds under the system's own limit",
      ("model", "`--memory`", "RLIMIT_DATA", "RLIMIT_AS", "built", "peak memory", "seconds",
       "a quarter of the memory ends it"), cap_rows),
@@ -305,6 +357,19 @@ def markdown(records):
         origin = origin_of(records, MEASURES.get(part, (part,)), machines)
         lines += table(part, title, header, list(rows_of(records)), origin)
     return "\n".join(lines + closing_lines(records)).rstrip() + "\n"
+
+
+ERROR_COLUMNS = ("model", "side", "level", "claimed_over_measured")
+
+
+def write_errors(path, records):
+    """One row a level: what no clock changes of part claims."""
+    rows = [(record["model"], side, level, f"{ratio:.4g}") for record in records_of(records, "claims")
+            for side in ("default", "certified") for level, ratio in enumerate(record[side]["levels"])]
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(ERROR_COLUMNS)
+        writer.writerows(rows)
 
 
 def write_docs(path, text, marks=(BEGIN, END)):

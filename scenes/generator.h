@@ -2,6 +2,7 @@
 #ifndef STRL_SCENES_GENERATOR_H
 #define STRL_SCENES_GENERATOR_H
 
+#include "scenes/parts/writer.h"
 #include "scenes/scene_mesh.h"
 #include "scenes/scene.h"
 #include "scenes/tile.h"
@@ -10,7 +11,8 @@
 typedef struct strl__scene_run {
     const strl_scene_desc *desc;
     const strl_scene_progress *progress;
-    strl__scene_mesh *writer;
+    strl__scene_mesh *writer;  /* of a scene of one mesh */
+    strl__parts_writer *parts; /* of a scene of parts */
 } strl__scene_run;
 
 /* Reports progress; STRL_ERR_CANCELLED where the caller wants to stop. */
@@ -21,6 +23,7 @@ strl_status strl__scene_isosurface(strl__scene_run *run, strl_error *err);
 strl_status strl__scene_painted_plane(strl__scene_run *run, strl_error *err);
 strl_status strl__scene_plain_plane(strl__scene_run *run, strl_error *err);
 strl_status strl__scene_boxes(strl__scene_run *run, strl_error *err);
+strl_status strl__scene_plant(strl__scene_run *run, strl_error *err);
 
 /* Everything about an isosurface's extraction that does not depend on the tile. */
 typedef struct strl__isosurface {

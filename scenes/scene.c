@@ -6,11 +6,13 @@
 
 #include "base/fail.h"
 #include "scenes/generator.h"
+#include "scenes/plant/plant.h"
 
 typedef struct scene_entry {
     strl_scene_info info;
     strl_status (*generate)(strl__scene_run *run, strl_error *err);
     strl__scene_mesh_layout layout;
+    bool in_parts; /* writes to run->parts, not to run->writer */
 } scene_entry;
 
 static const scene_entry scenes[] = {
@@ -18,19 +20,29 @@ static const scene_entry scenes[] = {
       "turbulent mixing layer: high genus, many layers, open at its four side walls only (count within 2 %)", 1000,
       4000000000},
      strl__scene_isosurface,
-     STRL__SCENE_MESH_POSITION_NORMAL},
+     STRL__SCENE_MESH_POSITION_NORMAL,
+     false},
     {{"painted-plane",
       "square of jittered triangles with a pattern of sharp edges in vertex colours (count within 2 %)", 1000,
       4000000000},
      strl__scene_painted_plane,
-     STRL__SCENE_MESH_POSITION_COLOUR},
+     STRL__SCENE_MESH_POSITION_COLOUR,
+     false},
     {{"plain-plane", "the same square in one colour", 1000, 4000000000},
      strl__scene_plain_plane,
-     STRL__SCENE_MESH_POSITION_COLOUR},
+     STRL__SCENE_MESH_POSITION_COLOUR,
+     false},
     {{"boxes", "separate boxes of any orientation and size in a cube (count rounded down to whole boxes)", 12,
       3200000000},
      strl__scene_boxes,
-     STRL__SCENE_MESH_POSITION},
+     STRL__SCENE_MESH_POSITION,
+     false},
+    {{"plant",
+      "power plant of named parts, 12 to 100,000 triangles each: pipes, vessels, steel, bolts; also as glTF and OBJ",
+      10000, 4000000000},
+     strl__scene_plant,
+     STRL__SCENE_MESH_POSITION_NORMAL,
+     true},
 };
 
 enum { SCENE_COUNT = sizeof scenes / sizeof scenes[0] };
@@ -72,6 +84,31 @@ static strl_status report_finish(void *context, uint64_t done, uint64_t total, s
     return strl__scene_report(context, "arranging", done, total, err);
 }
 
+static strl_status generate_parts(const scene_entry *entry, strl__scene_run *run, strl_scene_result *result,
+                                  strl_error *err)
+{
+    const strl_scene_desc *desc = run->desc;
+    const strl__parts_desc parts = {.path = desc->path,
+                                    .materials = strl__plant_materials,
+                                    .material_count = STRL__PLANT_MATERIALS,
+                                    .no_normals = desc->no_normals,
+                                    .shuffle = desc->shuffle,
+                                    .seed = desc->seed,
+                                    .memory_bytes = desc->memory_bytes,
+                                    .buffer_bytes = desc->buffer_bytes};
+    strl_status status = strl__parts_writer_create(&parts, &run->parts, err);
+    if (status != STRL_OK)
+        return status;
+    status = entry->generate(run, err);
+    if (status == STRL_OK)
+        status = run->parts->finish(run->parts, report_finish, run, err);
+    if (status == STRL_OK && result)
+        *result =
+            (strl_scene_result){run->parts->vertices, run->parts->triangles, run->parts->bytes, run->parts->parts};
+    run->parts->destroy(run->parts);
+    return status;
+}
+
 static strl_status generate(const scene_entry *entry, strl__scene_run *run, strl_scene_result *result, strl_error *err)
 {
     strl_scene_result made = {0};
@@ -90,6 +127,7 @@ static strl_status generate(const scene_entry *entry, strl__scene_run *run, strl
     if (status == STRL_OK && result) {
         made.vertices = strl__scene_mesh_vertex_count(run->writer);
         made.triangles = strl__scene_mesh_triangle_count(run->writer);
+        made.parts = 1;
         *result = made;
     }
     strl__scene_mesh_destroy(run->writer);
@@ -104,6 +142,7 @@ strl_status strl_scene_write(const strl_scene_desc *desc, const strl_scene_progr
     strl_scene_desc full = *desc;
     full.triangles = desc->triangles ? desc->triangles : 1000000;
     full.memory_bytes = desc->memory_bytes ? desc->memory_bytes : (uint64_t)256 << 20;
+    full.buffer_bytes = desc->buffer_bytes ? desc->buffer_bytes : (uint64_t)256 << 20;
     const scene_entry *entry;
     strl_status status = find_scene(&full, &entry, err);
     if (status != STRL_OK)
@@ -115,7 +154,7 @@ strl_status strl_scene_write(const strl_scene_desc *desc, const strl_scene_progr
     }
     strl__scene_run run = {.desc = &full, .progress = progress};
     if (status == STRL_OK)
-        status = generate(entry, &run, result, err);
+        status = (entry->in_parts ? generate_parts : generate)(entry, &run, result, err);
     strl_pool_destroy(own_pool);
     return status;
 }

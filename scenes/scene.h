@@ -1,4 +1,5 @@
-/* Seeded models for tests and benchmarks, streamed into a binary PLY or STL file of any size in constant memory.
+/* Seeded models for tests and benchmarks, streamed into a binary PLY or STL file, or, where they have parts, into glTF or
+ * OBJ files, of any size in constant memory.
  * The name, the count and the seed fix every byte of the file, on every machine and for every number of threads. */
 #ifndef STRL_SCENES_SCENE_H
 #define STRL_SCENES_SCENE_H
@@ -14,13 +15,16 @@
 typedef struct strl_scene_desc {
     const char *name; /* one of strl_scene_info's names */
     const char
-        *path; /* the output, .ply or .stl; appears, or replaces an older file, when it is whole (platform/output.h) */
+        *path; /* the output, .ply or .stl, of parts .gltf or .obj too; appears, or replaces an older file, when it is
+                * whole (platform/output.h). NAME.gltf comes with NAME_000.bin and so on, NAME.obj with NAME.mtl; the
+                * file that names the others is renamed last */
     uint64_t triangles; /* wanted; 0 = 1,000,000. strl_scene_info says how closely a scene keeps to it */
     uint64_t seed;
     uint64_t memory_bytes; /* budget of the buffers; 0 = 256 MiB */
     strl_pool *pool;       /* borrowed; NULL = the caller's thread alone */
     strl_cancel *cancel;   /* may be NULL */
     bool no_normals;       /* leave nx ny nz out, where the scene has them; STL has none of vertices */
+    uint64_t buffer_bytes; /* most bytes of one .bin of glTF, unless one part is larger; 0 = 256 MiB */
     bool shuffle;          /* vertices and triangles of PLY, triangles of STL, in a random order that the seed fixes */
 } strl_scene_desc;
 
@@ -45,7 +49,8 @@ const strl_scene_info *strl_scene_at(size_t index);
 typedef struct strl_scene_result {
     uint64_t vertices; /* of the surface; STL repeats them in every triangle */
     uint64_t triangles;
-    uint64_t bytes;
+    uint64_t bytes; /* of all files */
+    uint64_t parts;
 } strl_scene_result;
 
 /* Writes the scene. On failure no output and no temporary file is left; an older output keeps its bytes.

@@ -9,6 +9,9 @@ uniform highp int u_orthographic;
 uniform highp vec3 u_sky_up; /* view space, unit */
 uniform highp float u_headlight;
 uniform highp int u_flat;
+#if defined(STRL_ALPHA) && defined(GL_ES)
+uniform highp vec4 u_section; /* ES has no clip distances */
+#endif
 
 layout(location = 0) out highp vec4 out_colour;
 
@@ -28,6 +31,10 @@ void main()
     vec3 normal = v_normal;
     if (u_flat != 0)
         normal = cross(dFdx(v_view), dFdy(v_view));
+#if defined(STRL_ALPHA) && defined(GL_ES)
+    if (dot(u_section.xyz, v_view) + u_section.w < 0.0)
+        discard;
+#endif
 #ifdef STRL_ALPHA
     if (v_colour.a * 64.0 < float(bayer(ivec2(gl_FragCoord.xy))) + 0.5)
         discard;

@@ -21,6 +21,8 @@ uniform highp ivec4 u_base[2];
 uniform highp vec4 u_projection;
 uniform highp int u_orthographic;
 
+uniform highp vec4 u_section; /* view space: drawn is dot(xyz, p) + w >= 0 */
+
 out highp vec3 v_view;
 out highp vec3 v_normal;
 out highp vec4 v_colour;
@@ -57,6 +59,10 @@ void main()
     ivec4 low = ITEM_BASE(0), high = ITEM_BASE(1);
     vec3 local = (low.w & FLAG_FLOAT_POSITIONS) != 0 ? intBitsToFloat(in_position) : exact_sum(low.xyz, high.xyz, in_position);
     vec3 view = vec3(dot(row_x.xyz, local) + row_x.w, dot(row_y.xyz, local) + row_y.w, dot(row_z.xyz, local) + row_z.w);
+
+#ifndef GL_ES
+    gl_ClipDistance[0] = dot(u_section.xyz, view) + u_section.w;
+#endif
 
     vec3 normal = decode_normal(in_normal);
     v_view = view;

@@ -19,11 +19,14 @@ import xml.etree.ElementTree as ElementTree
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
 
+# Loops over failures, shapes and payloads that put no thread to a use which test_build, test_verify and test_walk do not.
+SLOW_UNDER_TSAN = ("test_build_certify", "test_build_faults", "test_build_root", "test_build_cuts", "test_certify",
+                   "test_simplify", "test_simplify_shape", "test_pm_spill", "test_verify_payload", "test_container_hostile",
+                   "test_walk_built")
+# What runs the program from outside as others do that stay: under AddressSanitizer the same code once is enough.
+SLOW_UNDER_ASAN = ("test_outputs", "test_guide", "test_curve", "test_view_review", "test_sentences")
 # Folders of tests/ whose modules start threads or are called from several; none of them needs a GL driver, whose own
 # threads ThreadSanitizer cannot see into.
-# Loops over failures and shapes that put no thread to a use which test_build does not.
-SLOW_UNDER_TSAN = ("test_build_certify", "test_build_faults", "test_build_root", "test_build_cuts", "test_certify",
-                   "test_simplify", "test_simplify_shape")
 THREADED_AREAS = ("platform", "jobs", "store", "source", "container", "build", "walk", "verify")
 
 STAGES = {
@@ -112,6 +115,8 @@ def test(stage, jobs, only):
                         "--output-junit", str(report)]
     if only:
         command += ["-R", only]
+    elif stage == "asan":
+        command += ["-E", "^(" + "|".join(SLOW_UNDER_ASAN) + ")$"]
     good = run(command, STAGES[stage][3])
     counts = Counts()
     if report.exists():

@@ -5,9 +5,9 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "bench.h"
-#include "camera_path.h"
 #include "platform/thread.h"
 #include "render_model.h"
+#include "shared/camera_path.h"
 
 #define PATH_FRAMES 120u
 #define ORBIT_FRAMES 720u /* half a degree from one frame to the next */

@@ -7,12 +7,12 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
-#include "camera_path.h"
 #include "compare_images.h"
 #include "interrupt.h"
 #include "options.h"
 #include "platform/file.h"
 #include "progress.h"
+#include "shared/camera_path.h"
 
 #define LEAST_DEPTH_SHARE 0.999
 #define DEFAULT_PSNR_DB 30.0

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "base/fail.h"
-#include "camera_path.h"
 #include "coarse.h"
 #include "interrupt.h"
 #include "options.h"
@@ -13,7 +12,8 @@
 #include "progress.h"
 #include "render_model.h"
 #include "render_output.h"
-#include "units.h"
+#include "shared/camera_path.h"
+#include "shared/units.h"
 
 #define DEFAULT_FPS 60.0
 #define WALKER_METRES 1.7
@@ -53,7 +53,7 @@ static strl_status probe(void *context, const strl_camera *camera, float *depth,
 static strl_path_site make_site(const strl_render_model *model, prober *looks)
 {
     strl_path_site site = {.up_axis = model->up_axis, .probe = probe, .context = looks};
-    double centre[3], radius, metres = strl_cli_unit_metres(model->unit);
+    double centre[3], radius, metres = strl_unit_metres(model->unit);
     memcpy(site.bounds, model->bounds, sizeof site.bounds);
     strl_path_sphere(site.bounds, centre, &radius);
     site.eye_height = metres > 0 ? WALKER_METRES / metres : radius / 50;
@@ -279,7 +279,7 @@ static int parse(strl_cli_args *args, render_options *o)
     };
     const strl_cli_usage usage = {
         .positional = "MODEL", .least = 1, .most = 1, .options = options, .option_count = STRL_CLI_COUNT_OF(options),
-        .notes = "MODEL is a container, or with --full also a PLY, STL or OBJ file. In the lines of --stats "
+        .notes = "MODEL is a container, or with --full also a PLY, STL, OBJ or glTF file. In the lines of --stats "
                  "max_error_px is the\n"
                  "largest pixel error of what was drawn, and null where the eye is inside a node's box: no pixel "
                  "error\n"

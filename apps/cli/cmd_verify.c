@@ -11,6 +11,7 @@
 #include "options.h"
 #include "platform/file.h"
 #include "progress.h"
+#include "shared/importer.h"
 #include "verify/verify.h"
 
 static bool show_progress(void *context, const char *stage, uint64_t done, uint64_t total)
@@ -242,6 +243,7 @@ static int run(strl_cli_args *args)
     strl_verify_desc desc = {.model = models.items[0],
                              .inputs = (const char *const *)inputs.items,
                              .input_count = (uint32_t)inputs.count,
+                             .importer = strl_importer(),
                              .memory_bytes = memory,
                              .jobs = (unsigned)jobs,
                              .cuts = (uint32_t)cuts,

@@ -2,6 +2,7 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 #include "coarse.h"
 #include "options.h"
@@ -47,18 +48,24 @@ static int parse(strl_cli_args *args, strl_viewer_desc *desc)
     static const strl_backend backends[] = {STRL_BACKEND_DEFAULT, STRL_BACKEND_GL45, STRL_BACKEND_GL3};
     int backend = 0;
     const strl_cli_option options[] = {
-        {.name = "size", .kind = STRL_CLI_SIZE, .value = desc->size, .help = "of the window (1280x720)"},
+        {.name = "size", .kind = STRL_CLI_SIZE, .value = desc->size,
+         .help = "of the window (as it was last, at first 1280x720)"},
         {.name = "error", .kind = STRL_CLI_REAL, .value = &desc->error_px, .argument = "PX",
-         .help = "allowed pixel error (1)", .least = 1e-6, .most = 1e6},
+         .help = "allowed pixel error (as it was last, at first 1)", .least = 1e-6, .most = 1e6},
         {.name = "memory", .letter = 'm', .kind = STRL_CLI_BYTES, .value = &desc->memory_bytes,
-         .help = "decoded nodes held (512M)", .least = 1 << 20, .most = 0x1p50},
+         .help = "decoded nodes held (as it was last, at first 512M)", .least = 1 << 20, .most = 0x1p50},
         {.name = "gpu-memory", .kind = STRL_CLI_BYTES, .value = &desc->gpu_memory_bytes,
-         .help = "buffers of nodes (512M)", .least = STRL_RENDERER_LEAST_GPU_BYTES, .most = 0x1p50},
+         .help = "buffers of nodes (as it was last, at first 512M)", .least = STRL_RENDERER_LEAST_GPU_BYTES,
+         .most = 0x1p50},
         {.name = "frames", .kind = STRL_CLI_COUNT, .value = &desc->frames,
          .help = "close the window after N frames and print how long they took (when it is closed)", .least = 1,
          .most = 1e9},
         {.name = "screenshots", .kind = STRL_CLI_STRING, .value = &desc->screenshots, .argument = "DIR",
-         .help = "where key P saves pictures (the current folder)"},
+         .help = "where pictures and paths are saved (the current folder)"},
+        {.name = "path", .kind = STRL_CLI_STRING, .value = &desc->camera_path, .argument = "FILE",
+         .help = "a camera path to replay at once, as render --path reads it"},
+        {.name = "log", .kind = STRL_CLI_STRING, .value = &desc->journal, .argument = "FILE",
+         .help = "write what is opened, picked and measured, one JSON object a line"},
         {.name = "backend", .kind = STRL_CLI_ENUM, .value = &backend, .argument = "auto|gl45|gl3",
          .help = "what draws (auto)"},
     };
@@ -75,22 +82,41 @@ static int parse(strl_cli_args *args, strl_viewer_desc *desc)
     return stop;
 }
 
+/* DIR/stroll/NAME in the folder that the variable names, else in its default below the home folder; "" where there is
+ * none. */
+static void user_file(char *path, size_t size, const char *variable, const char *below_home, const char *name)
+{
+    const char *folder = getenv(variable), *home = getenv("HOME");
+    int bytes = 0;
+    if (folder && folder[0] == '/') /* others are to be ignored, says the XDG specification */
+        bytes = snprintf(path, size, "%s/stroll%s", folder, name);
+    else if (home && home[0])
+        bytes = snprintf(path, size, "%s/%s/stroll%s", home, below_home, name);
+    if (bytes <= 0 || (size_t)bytes >= size)
+        path[0] = 0;
+}
+
 static int run(strl_cli_args *args)
 {
     session all = {0};
     strl_error err = {0};
-    strl_viewer_desc desc = {.size = {1280, 720}, .error_px = 1, .memory_bytes = 512u << 20,
-                             .gpu_memory_bytes = 512u << 20, .shown = add_frame, .context = &all};
+    char settings[4096], cache[4096];
+    strl_viewer_desc desc = {.shown = add_frame, .context = &all};
     int stop = parse(args, &desc);
     if (stop >= 0)
         return stop;
+    user_file(settings, sizeof settings, "XDG_CONFIG_HOME", ".config", "/viewer.json");
+    user_file(cache, sizeof cache, "XDG_CACHE_HOME", ".cache", "");
+    /* A window that closes by itself is a measurement: it depends on nothing that somebody did before. */
+    desc.settings = settings[0] && desc.frames == 0 ? settings : NULL;
+    desc.cache = cache[0] ? cache : NULL;
     if (strl_viewer_run(&desc, &err) != STRL_OK)
         return strl_cli_fail(&err);
     if (args->quiet)
         return 0;
     if (desc.frames > 0 && all.frames > 0)
         print_session(&all);
-    strl_cli_coarse_report(&all.coarse, desc.memory_bytes);
+    strl_cli_coarse_report(&all.coarse, all.last.memory_bytes);
     return 0;
 }
 

@@ -4,9 +4,9 @@
 
 #include <stdio.h>
 
-#include "camera_path.h"
 #include "platform/output.h"
 #include "render_model.h"
+#include "shared/camera_path.h"
 #include "shared/image.h"
 
 typedef struct strl_render_output_desc {

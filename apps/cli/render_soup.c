@@ -17,6 +17,7 @@
 #include "readers/reader.h"
 #include "render_model.h"
 #include "render_normals.h"
+#include "shared/importer.h"
 
 #define READ_TRIANGLES 4096u
 #define BATCH_VERTICES 65535u
@@ -230,12 +231,20 @@ static strl_status make_batches(soup_load *load, strl_error *err)
     return status == STRL_OK ? close_batch(load, err) : status;
 }
 
+static bool go_on(void *context)
+{
+    strl_cli_progress_update(context, "import", 0, 0, "bytes");
+    return !strl_cli_interrupted();
+}
+
 static strl_status load_soup(soup_model *model, const strl_render_model_desc *desc, strl_error *err)
 {
     soup_load load = {.model = model, .progress = desc->progress};
     strl_reader_info info;
     const char *scratch = getenv("TMPDIR");
-    const strl_reader_desc reading = {.path = desc->path, .scratch_dir = scratch ? scratch : "/tmp"};
+    const strl_reader_desc reading = {.path = desc->path,
+                                      .scratch_dir = scratch ? scratch : "/tmp",
+                                      .child = {.importer = strl_importer(), .go_on = go_on, .context = desc->progress}};
     strl_status status = strl_reader_open(&reading, &load.reader, err);
     if (status != STRL_OK)
         return status;

@@ -1,13 +1,14 @@
-#include "viewer/gui.h"
-
+/* The panels' life, the main one, and what lies over the picture. */
 #include <cfloat>
 #include <cmath>
 #include <cstdio>
+#include <cstring>
 #include <new>
 
 #include <backends/imgui_impl_glfw.h>
 #include <backends/imgui_impl_opengl3.h>
-#include <imgui.h>
+
+#include "viewer/gui_panels.hpp"
 
 extern "C" {
 #include "base/fail.h"
@@ -18,12 +19,45 @@ struct strl_gui {
     float scale;
 };
 
+namespace strl_panels
+{
+
+void row(const char *name, const char *value)
+{
+    ImGui::TableNextRow();
+    ImGui::TableNextColumn();
+    ImGui::TextColored(faint, "%s", name);
+    ImGui::TableNextColumn();
+    ImGui::TextUnformatted(value);
+}
+
+void real_row(const char *name, const char *format, double value)
+{
+    char text[32];
+    std::snprintf(text, sizeof text, format, value);
+    row(name, text);
+}
+
+void heading(const char *text)
+{
+    ImGui::Spacing();
+    ImGui::TextColored(faint, "%s", text);
+    ImGui::Separator();
+}
+
+bool begin_table(const char *name)
+{
+    return ImGui::BeginTable(name, 2, ImGuiTableFlags_SizingStretchSame);
+}
+
+} // namespace strl_panels
+
+using namespace strl_panels;
+
 namespace
 {
 
-const ImVec4 faint = ImVec4(0.62f, 0.66f, 0.70f, 1), warning = ImVec4(1.0f, 0.68f, 0.25f, 1);
 const ImU32 line_colour = IM_COL32(255, 200, 60, 220);
-const float panel_width = 290, margin = 12;
 
 /* 1234567 -> "1.23 M"; up to four digits stay as they are. */
 void format_count(char *text, size_t size, uint64_t value)
@@ -48,8 +82,9 @@ void format_bytes(char *text, size_t size, uint64_t value)
 
 void apply_style(float scale)
 {
-    ImGui::StyleColorsDark();
     ImGuiStyle &style = ImGui::GetStyle();
+    style = ImGuiStyle();
+    ImGui::StyleColorsDark();
     style.WindowRounding = 6;
     style.FrameRounding = style.GrabRounding = 4;
     style.WindowBorderSize = 0;
@@ -58,30 +93,15 @@ void apply_style(float scale)
     style.Colors[ImGuiCol_PlotHistogram] = ImVec4(0.26f, 0.52f, 0.80f, 1);
     style.ScaleAllSizes(scale);
     ImFontConfig font;
-    font.SizePixels = 13 * scale;
+    font.SizePixels = std::floor(13 * scale);
+    ImGui::GetIO().Fonts->Clear();
     ImGui::GetIO().Fonts->AddFontDefault(&font);
-}
-
-void row(const char *name, const char *value)
-{
-    ImGui::TableNextRow();
-    ImGui::TableNextColumn();
-    ImGui::TextColored(faint, "%s", name);
-    ImGui::TableNextColumn();
-    ImGui::TextUnformatted(value);
 }
 
 void count_row(const char *name, uint64_t value)
 {
     char text[32];
     format_count(text, sizeof text, value);
-    row(name, text);
-}
-
-void real_row(const char *name, const char *format, double value)
-{
-    char text[32];
-    std::snprintf(text, sizeof text, format, value);
     row(name, text);
 }
 
@@ -94,11 +114,10 @@ void budget(const char *name, uint64_t used, uint64_t most)
     ImGui::ProgressBar(most ? (float)((double)used / (double)most) : 0, ImVec2(-1, 0), text);
 }
 
-void heading(const char *text)
+void button(strl_gui_controls *controls, const char *label, strl_action action)
 {
-    ImGui::Spacing();
-    ImGui::TextColored(faint, "%s", text);
-    ImGui::Separator();
+    if (ImGui::Button(label))
+        strl_requests_add(&controls->requests, action, STRL_ACTION_SELECTION);
 }
 
 void show_controls(const strl_gui_facts *facts, strl_gui_controls *controls)
@@ -106,15 +125,18 @@ void show_controls(const strl_gui_facts *facts, strl_gui_controls *controls)
     ImGui::SetNextItemWidth(-1);
     ImGui::SliderFloat("##error", &controls->error_px, STRL_GUI_LEAST_ERROR_PX, STRL_GUI_MOST_ERROR_PX,
                        "pixel error %.2f", ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp);
-    int mode = controls->fly;
-    ImGui::RadioButton("orbit", &mode, 0);
+    int mode = controls->mode;
+    ImGui::RadioButton("orbit", &mode, STRL_NAVIGATOR_ORBIT);
     ImGui::SameLine();
-    ImGui::RadioButton("fly", &mode, 1);
-    controls->fly = mode != 0;
-    if (controls->fly) {
-        ImGui::SameLine();
+    ImGui::RadioButton("fly", &mode, STRL_NAVIGATOR_FLY);
+    ImGui::SameLine();
+    ImGui::RadioButton("walk", &mode, STRL_NAVIGATOR_WALK);
+    controls->mode = (strl_navigator_mode)mode;
+    if (mode != STRL_NAVIGATOR_ORBIT)
         ImGui::TextColored(faint, "%.3g units/s", facts->speed);
-    }
+    ImGui::Checkbox("orthographic", &controls->orthographic);
+    ImGui::SameLine();
+    ImGui::Checkbox("parts", &controls->parts);
     int debug = controls->debug;
     ImGui::SetNextItemWidth(-1);
     ImGui::Combo("##colours", &debug, "colours of the model\0colours by cluster\0colours by level\0colours by error\0");
@@ -124,19 +146,48 @@ void show_controls(const strl_gui_facts *facts, strl_gui_controls *controls)
     ImGui::Checkbox("flat", &controls->flat);
     ImGui::SameLine();
     ImGui::Checkbox("freeze", &controls->frozen);
-    controls->home |= ImGui::Button("home");
+    button(controls, "home", STRL_ACTION_HOME);
     ImGui::SameLine();
-    controls->reset |= ImGui::Button("reset");
+    button(controls, "reset", STRL_ACTION_RESET);
     ImGui::SameLine();
-    controls->screenshot |= ImGui::Button("picture");
+    button(controls, "picture", STRL_ACTION_SCREENSHOT);
     ImGui::SameLine();
-    controls->help ^= ImGui::Button("help");
+    button(controls, facts->section->on ? "whole" : "section", STRL_ACTION_SECTION);
+    ImGui::SameLine();
+    button(controls, "help", STRL_ACTION_HELP);
+}
+
+/* In force when it is let go: both begin anew then. */
+void budget_slider(const char *format, float *mib, const char *name, strl_requests *requests)
+{
+    ImGui::SetNextItemWidth(-1);
+    ImGui::SliderFloat(name, mib, STRL_GUI_LEAST_MIB, STRL_GUI_MOST_MIB, format,
+                       ImGuiSliderFlags_Logarithmic | ImGuiSliderFlags_AlwaysClamp);
+    if (ImGui::IsItemDeactivatedAfterEdit())
+        strl_requests_add(requests, STRL_ACTION_BUDGETS, 0);
+}
+
+void show_memory(const strl_gui_facts *facts, strl_gui_controls *controls)
+{
+    heading("memory");
+    budget("nodes", facts->resident_bytes, facts->memory_bytes);
+    budget("GPU", facts->gpu_bytes, facts->gpu_memory_bytes);
+    if (!ImGui::CollapsingHeader("budgets and text"))
+        return;
+    budget_slider("nodes %.0f MiB", &controls->memory_mib, "##memory", &controls->requests);
+    budget_slider("GPU %.0f MiB", &controls->gpu_memory_mib, "##gpu", &controls->requests);
+    /* By steps: a slider would move under the hand as the text grows. */
+    if (ImGui::SmallButton("smaller text"))
+        controls->text_scale = std::fmax(controls->text_scale / 1.1f, 0.6f);
+    ImGui::SameLine();
+    if (ImGui::SmallButton("larger text"))
+        controls->text_scale = std::fmin(controls->text_scale * 1.1f, 3.0f);
 }
 
 void show_statistics(const strl_gui_facts *facts)
 {
     heading("frame");
-    if (!ImGui::BeginTable("statistics", 2, ImGuiTableFlags_SizingStretchSame))
+    if (!begin_table("statistics"))
         return;
     if (facts->idle)
         row("frames/s", "still");
@@ -168,12 +219,17 @@ void show_panel(float scale, const strl_gui_facts *facts, strl_gui_controls *con
     ImGui::Begin("Stroll", NULL,
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav);
     format_count(text, sizeof text, facts->model_triangles);
-    ImGui::TextWrapped("%s", facts->model);
+    const char *slash = std::strrchr(facts->model, '/');
+    ImGui::TextWrapped("%s", slash ? slash + 1 : facts->model);
+    if (ImGui::IsItemHovered())
+        ImGui::SetTooltip("%s", facts->model);
     ImGui::TextColored(faint, "%s triangles", text);
     show_controls(facts, controls);
-    heading("memory");
-    budget("nodes", facts->resident_bytes, facts->memory_bytes);
-    budget("GPU", facts->gpu_bytes, facts->gpu_memory_bytes);
+    if (ImGui::CollapsingHeader("bookmarks"))
+        show_bookmarks(facts, controls);
+    if (ImGui::CollapsingHeader("path"))
+        show_path(facts, controls);
+    show_memory(facts, controls);
     show_statistics(facts);
     if (facts->last_fault[0]) {
         ImGui::PushStyleColor(ImGuiCol_Text, warning);
@@ -255,14 +311,30 @@ void strl_gui_destroy(strl_gui *gui)
     delete gui;
 }
 
+void strl_gui_set_scale(strl_gui *gui, double scale)
+{
+    ImGui::SetCurrentContext(gui->context);
+    gui->scale = (float)scale;
+    apply_style(gui->scale);
+    ImGui_ImplOpenGL3_DestroyFontsTexture();
+    ImGui_ImplOpenGL3_CreateFontsTexture();
+}
+
 void strl_gui_show(strl_gui *gui, const strl_gui_facts *facts, strl_gui_controls *controls)
 {
     ImGui::SetCurrentContext(gui->context);
     ImGui_ImplOpenGL3_NewFrame();
     ImGui_ImplGlfw_NewFrame();
     ImGui::NewFrame();
+    place at = {gui->scale, ImGui::GetIO().DisplaySize.x, ImGui::GetIO().DisplaySize.y};
     show_lines(facts);
+    show_marks(facts);
     show_panel(gui->scale, facts, controls);
+    show_section(at, facts, controls);
+    if (controls->parts)
+        show_parts(at, facts, controls);
+    show_picks(at, facts, controls);
+    show_build(at, facts, controls);
     if (controls->help)
         show_help(facts->keys);
     if (facts->message[0])

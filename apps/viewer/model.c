@@ -4,11 +4,11 @@
 #include <string.h>
 
 #include "base/fail.h"
-#include "container/container.h"
 #include "container/layout.h"
 #include "frame/view.h"
 #include "platform/file.h"
 #include "platform/thread.h"
+#include "shared/units.h"
 
 #define READ_THREADS 2u
 /* A near plane closer than this share of the far one wastes the digits of depth. */
@@ -34,19 +34,18 @@ static strl_status check_kind(const char *path, strl_error *err)
     return status;
 }
 
-/* The walk gives bounds; up axis and counts are the header's. */
+/* The walk gives bounds; up axis, unit and counts are the header's. */
 static strl_status read_facts(strl_viewer_model *model, const char *path, strl_error *err)
 {
-    strl_container *container = NULL;
-    strl_status status = strl_container_open_path(path, &container, err);
-    if (status == STRL_OK) {
-        const strl_container_info *info = strl_container_get_info(container);
-        model->up_axis = info->up_axis;
-        for (uint32_t t = 0; t < info->tree_count; t++)
-            model->triangles += strl_container_tree(container, t)->triangle_count;
-    }
-    strl_container_close(container);
-    return status;
+    strl_status status = strl_container_open_path(path, &model->container, err);
+    if (status != STRL_OK)
+        return status;
+    const strl_container_info *info = strl_container_get_info(model->container);
+    model->up_axis = info->up_axis;
+    model->unit_metres = strl_unit_metres(info->unit);
+    for (uint32_t t = 0; t < info->tree_count; t++)
+        model->triangles += strl_container_tree(model->container, t)->triangle_count;
+    return STRL_OK;
 }
 
 static strl_status submit(void *context, void (*run)(void *job), void *job, strl_error *err)
@@ -69,7 +68,8 @@ strl_status strl_viewer_model_open(strl_viewer_model *model, const char *path, u
         status = strl_source_open_file(path, READ_THREADS, &source, err);
     if (status == STRL_OK) {
         model->executor = (strl_executor){model->pool, submit};
-        const strl_walk_desc desc = {.memory_bytes = memory_bytes, .error_px = error_px, .executor = &model->executor};
+        const strl_walk_desc desc = {
+            .memory_bytes = memory_bytes, .error_px = error_px, .executor = &model->executor, .labels = true};
         status = strl_walk_open(source, &desc, &model->walk, err);
     }
     if (status == STRL_OK)
@@ -82,6 +82,7 @@ strl_status strl_viewer_model_open(strl_viewer_model *model, const char *path, u
 void strl_viewer_model_close(strl_viewer_model *model)
 {
     strl_walk_close(model->walk);
+    strl_container_close(model->container);
     strl_pool_destroy(model->pool);
     *model = (strl_viewer_model){0};
 }

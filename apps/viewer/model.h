@@ -1,16 +1,19 @@
-/* A container opened for walking: source, decoding threads and walk. */
+/* A container opened for walking: source, decoding threads and walk; and for asking, by a reader that may wait. */
 #ifndef STRL_VIEWER_MODEL_H
 #define STRL_VIEWER_MODEL_H
 
+#include "container/container.h"
 #include "jobs/pool.h"
 #include "stroll/walk.h"
 
 typedef struct strl_viewer_model {
+    strl_container *container; /* for names */
     strl_walk *walk;
     strl_pool *pool; /* decodes */
     strl_executor executor;
     double bounds[6];
     unsigned up_axis;
+    double unit_metres; /* 0 = unknown */
     uint64_t triangles; /* of the finest level */
 } strl_viewer_model;
 

@@ -1,4 +1,4 @@
-/* `stroll view`: a window on a container, with fly and orbit, pixel error and statistics. */
+/* `stroll view`: a window on a container, for walking through it and reviewing it. */
 #ifndef STRL_VIEWER_VIEWER_H
 #define STRL_VIEWER_VIEWER_H
 
@@ -12,18 +12,24 @@ typedef struct strl_viewer_frame {
     uint64_t frame_ns, select_ns; /* frame: from the camera to the swap of the window's buffers */
     uint64_t triangles;
     uint32_t missing_nodes;
+    uint64_t memory_bytes;       /* the walk's budget */
     double asked_px, allowed_px; /* pixel error: of the panel; more where memory is tight */
     double max_error_px;         /* of what was drawn; infinite where the eye is inside a node's box */
 } strl_viewer_frame;
 
-/* Zero-initialise: every 0 but path takes its default. Strings are borrowed for the call. */
+/* Zero-initialise: every 0 but path takes what the settings remember, else its default. Strings are borrowed for the
+ * call. */
 typedef struct strl_viewer_desc {
-    const char *path;          /* a container */
-    const char *screenshots;   /* the folder where pictures go, made at the first; NULL = the current one */
-    strl_backend backend;      /* STRL_BACKEND_NULL is no window's */
-    uint32_t size[2];          /* of the window in screen units; 0 = 1280x720 */
-    double error_px;           /* 0 = 1 */
-    uint64_t memory_bytes;     /* of decoded nodes; 0 = 512 MiB */
+    const char *path;        /* a container */
+    const char *screenshots; /* the folder where pictures and paths go, made at the first; NULL = the current one */
+    const char *settings;    /* the file that remembers; NULL = nothing is remembered */
+    const char *cache;       /* the folder for containers of meshes from folders that cannot be written; NULL = none */
+    const char *camera_path; /* a path file to replay, at once; NULL = none */
+    const char *journal;     /* a file for what happens, one JSON object a line; NULL = none */
+    strl_backend backend;    /* STRL_BACKEND_NULL is no window's */
+    uint32_t size[2];        /* of the window in screen units; 0 = 1280x720 */
+    double error_px;         /* 0 = 1 */
+    uint64_t memory_bytes;   /* of decoded nodes; 0 = 512 MiB */
     uint64_t gpu_memory_bytes; /* of buffers of nodes; 0 = 512 MiB */
     uint64_t frames;           /* the window closes after as many, and never rests till then; 0 = when it is told to */
     void (*shown)(void *context, const strl_viewer_frame *frame); /* after each frame; may be NULL */

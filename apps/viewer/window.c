@@ -9,11 +9,18 @@
 #include "base/fail.h"
 #include "base/memory.h"
 
+/* Screen units and seconds. */
+#define DRAG_UNITS 4.0
+#define TWICE_SECONDS 0.35
+
 struct strl_window {
     GLFWwindow *handle;
     strl_window_input pending;
-    double cursor[2]; /* where it was last */
-    bool dragging[2]; /* left, right: went down outside the panel */
+    double cursor[2];  /* where it was last */
+    bool dragging[2];  /* left, right: went down outside the panel */
+    double pressed[2]; /* where the left button went down, then as far as its drag has been told */
+    bool moved;        /* too far since then for a click */
+    double clicked[2], click_time;
     bool mouse_taken, keyboard_taken;
 };
 
@@ -21,23 +28,46 @@ static const struct {
     int key;
     strl_action action;
 } bindings[] = {
-    {GLFW_KEY_O, STRL_ACTION_ORBIT},         {GLFW_KEY_F, STRL_ACTION_FLY},
-    {GLFW_KEY_H, STRL_ACTION_HOME},          {GLFW_KEY_R, STRL_ACTION_RESET},
-    {GLFW_KEY_0, STRL_ACTION_NO_COLOURS},    {GLFW_KEY_1, STRL_ACTION_CLUSTER_COLOURS},
-    {GLFW_KEY_2, STRL_ACTION_LEVEL_COLOURS}, {GLFW_KEY_3, STRL_ACTION_ERROR_COLOURS},
-    {GLFW_KEY_X, STRL_ACTION_WIREFRAME},     {GLFW_KEY_L, STRL_ACTION_FLAT},
-    {GLFW_KEY_C, STRL_ACTION_FREEZE},        {GLFW_KEY_P, STRL_ACTION_SCREENSHOT},
-    {GLFW_KEY_F1, STRL_ACTION_HELP},         {GLFW_KEY_ESCAPE, STRL_ACTION_QUIT},
+    {GLFW_KEY_O, STRL_ACTION_ORBIT},
+    {GLFW_KEY_F, STRL_ACTION_FLY},
+    {GLFW_KEY_G, STRL_ACTION_WALK},
+    {GLFW_KEY_5, STRL_ACTION_ORTHOGRAPHIC},
+    {GLFW_KEY_H, STRL_ACTION_HOME},
+    {GLFW_KEY_R, STRL_ACTION_RESET},
+    {GLFW_KEY_V, STRL_ACTION_LOOK},
+    {GLFW_KEY_0, STRL_ACTION_NO_COLOURS},
+    {GLFW_KEY_1, STRL_ACTION_CLUSTER_COLOURS},
+    {GLFW_KEY_2, STRL_ACTION_LEVEL_COLOURS},
+    {GLFW_KEY_3, STRL_ACTION_ERROR_COLOURS},
+    {GLFW_KEY_X, STRL_ACTION_WIREFRAME},
+    {GLFW_KEY_L, STRL_ACTION_FLAT},
+    {GLFW_KEY_C, STRL_ACTION_FREEZE},
+    {GLFW_KEY_P, STRL_ACTION_SCREENSHOT},
+    {GLFW_KEY_BACKSPACE, STRL_ACTION_FORGET_PICKS},
+    {GLFW_KEY_T, STRL_ACTION_PARTS},
+    {GLFW_KEY_DELETE, STRL_ACTION_HIDE},
+    {GLFW_KEY_I, STRL_ACTION_ISOLATE},
+    {GLFW_KEY_U, STRL_ACTION_SHOW_ALL},
+    {GLFW_KEY_K, STRL_ACTION_SECTION},
+    {GLFW_KEY_J, STRL_ACTION_SECTION_NORMAL},
+    {GLFW_KEY_B, STRL_ACTION_BOOKMARK},
+    {GLFW_KEY_N, STRL_ACTION_NEXT_BOOKMARK},
+    {GLFW_KEY_M, STRL_ACTION_RECORD},
+    {GLFW_KEY_SPACE, STRL_ACTION_REPLAY},
+    {GLFW_KEY_F1, STRL_ACTION_HELP},
+    {GLFW_KEY_ESCAPE, STRL_ACTION_QUIT},
+};
+
+/* By what is written on them, which lies elsewhere on each keyboard; these repeat while held. */
+static const struct {
+    unsigned character;
+    strl_action action;
+} characters[] = {
+    {'+', STRL_ACTION_COARSER},       {'=', STRL_ACTION_COARSER},      {'-', STRL_ACTION_FINER},
+    {'.', STRL_ACTION_SECTION_FORTH}, {',', STRL_ACTION_SECTION_BACK},
 };
 
 /* ---- what GLFW tells */
-
-static void add_action(strl_window *window, strl_action action)
-{
-    strl_window_input *input = &window->pending;
-    if (input->action_count < STRL_WINDOW_MOST_ACTIONS)
-        input->actions[input->action_count++] = action;
-}
 
 static void on_key(GLFWwindow *handle, int key, int scancode, int action, int modifiers)
 {
@@ -49,20 +79,29 @@ static void on_key(GLFWwindow *handle, int key, int scancode, int action, int mo
         return;
     for (size_t b = 0; b < sizeof bindings / sizeof *bindings; b++)
         if (bindings[b].key == key)
-            add_action(window, bindings[b].action);
+            strl_requests_add(&window->pending.requests, bindings[b].action, STRL_ACTION_SELECTION);
 }
 
-/* By character: plus and minus lie elsewhere on each keyboard. A held key repeats. */
 static void on_character(GLFWwindow *handle, unsigned character)
 {
     strl_window *window = glfwGetWindowUserPointer(handle);
     window->pending.touched = true;
-    if (window->keyboard_taken)
-        return;
-    if (character == '+' || character == '=')
-        add_action(window, STRL_ACTION_COARSER);
-    else if (character == '-')
-        add_action(window, STRL_ACTION_FINER);
+    for (size_t c = 0; !window->keyboard_taken && c < sizeof characters / sizeof *characters; c++)
+        if (characters[c].character == character)
+            strl_requests_add(&window->pending.requests, characters[c].action, 0);
+}
+
+static void add_click(strl_window *window)
+{
+    strl_window_input *input = &window->pending;
+    double scale = strl_window_pixel_scale(window), now = glfwGetTime();
+    bool near = hypot(window->cursor[0] - window->clicked[0], window->cursor[1] - window->clicked[1]) < DRAG_UNITS;
+    bool twice = near && now - window->click_time < TWICE_SECONDS;
+    window->click_time = twice ? -TWICE_SECONDS : now; /* a third one is a first one */
+    memcpy(window->clicked, window->cursor, sizeof window->clicked);
+    if (input->click_count < STRL_WINDOW_MOST_CLICKS)
+        input->clicks[input->click_count++] =
+            (strl_click){{window->cursor[0] * scale, window->cursor[1] * scale}, twice};
 }
 
 static void on_button(GLFWwindow *handle, int button, int action, int modifiers)
@@ -70,24 +109,46 @@ static void on_button(GLFWwindow *handle, int button, int action, int modifiers)
     (void)modifiers;
     strl_window *window = glfwGetWindowUserPointer(handle);
     window->pending.touched = true;
-    if (button == GLFW_MOUSE_BUTTON_LEFT || button == GLFW_MOUSE_BUTTON_RIGHT)
-        window->dragging[button == GLFW_MOUSE_BUTTON_RIGHT] = action == GLFW_PRESS && !window->mouse_taken;
+    if (button != GLFW_MOUSE_BUTTON_LEFT && button != GLFW_MOUSE_BUTTON_RIGHT)
+        return;
+    bool right = button == GLFW_MOUSE_BUTTON_RIGHT, down = action == GLFW_PRESS;
+    if (!right && !down && window->dragging[0] && !window->moved)
+        add_click(window);
+    window->dragging[right] = down && !window->mouse_taken;
+    if (!right) {
+        window->moved = false;
+        memcpy(window->pressed, window->cursor, sizeof window->pressed);
+    }
 }
 
-/* Drags are summed here and not from frame to frame, so that a slow frame loses nothing. */
+/* Drags are summed here and not from frame to frame, so that a slow frame loses nothing. A hand that clicks trembles:
+ * the first few units of a left drag count when it turns out to be one. */
 static void on_cursor(GLFWwindow *handle, double x, double y)
 {
     strl_window *window = glfwGetWindowUserPointer(handle);
-    double scale = strl_window_pixel_scale(window), dx = (x - window->cursor[0]) * scale,
-           dy = (y - window->cursor[1]) * scale;
+    double scale = strl_window_pixel_scale(window);
     strl_window_input *input = &window->pending;
     input->touched = true;
-    if (window->dragging[0])
-        input->left[0] += dx, input->left[1] += dy;
-    if (window->dragging[1])
-        input->right[0] += dx, input->right[1] += dy;
+    if (window->dragging[1]) {
+        input->right[0] += (x - window->cursor[0]) * scale;
+        input->right[1] += (y - window->cursor[1]) * scale;
+    }
     window->cursor[0] = x;
     window->cursor[1] = y;
+    window->moved = window->moved || hypot(x - window->pressed[0], y - window->pressed[1]) >= DRAG_UNITS;
+    if (!window->dragging[0] || !window->moved)
+        return;
+    input->left[0] += (x - window->pressed[0]) * scale;
+    input->left[1] += (y - window->pressed[1]) * scale;
+    memcpy(window->pressed, window->cursor, sizeof window->pressed);
+}
+
+static void on_drop(GLFWwindow *handle, int count, const char **paths)
+{
+    strl_window *window = glfwGetWindowUserPointer(handle);
+    window->pending.touched = true;
+    if (count > 0 && strlen(paths[0]) < sizeof window->pending.dropped)
+        memcpy(window->pending.dropped, paths[0], strlen(paths[0]) + 1);
 }
 
 static void on_scroll(GLFWwindow *handle, double x, double y)
@@ -125,6 +186,7 @@ static void install_callbacks(strl_window *window)
     glfwSetMouseButtonCallback(window->handle, on_button);
     glfwSetCursorPosCallback(window->handle, on_cursor);
     glfwSetScrollCallback(window->handle, on_scroll);
+    glfwSetDropCallback(window->handle, on_drop);
     glfwSetFramebufferSizeCallback(window->handle, on_resize);
     glfwSetWindowFocusCallback(window->handle, on_focus);
     glfwSetWindowRefreshCallback(window->handle, on_change);
@@ -178,6 +240,7 @@ strl_status strl_window_create(const strl_window_desc *desc, strl_window **windo
     glfwMakeContextCurrent(made->handle);
     glfwSwapInterval(1);
     install_callbacks(made);
+    made->click_time = -TWICE_SECONDS;
     *window = made;
     return STRL_OK;
 }
@@ -207,6 +270,19 @@ void strl_window_framebuffer_size(const strl_window *window, uint32_t size[2])
     size[1] = height > 0 ? (uint32_t)height : 0;
 }
 
+void strl_window_size(const strl_window *window, uint32_t size[2])
+{
+    int width = 0, height = 0;
+    glfwGetWindowSize(window->handle, &width, &height);
+    size[0] = width > 0 ? (uint32_t)width : 0;
+    size[1] = height > 0 ? (uint32_t)height : 0;
+}
+
+void strl_window_set_title(strl_window *window, const char *title)
+{
+    glfwSetWindowTitle(window->handle, title);
+}
+
 double strl_window_pixel_scale(const strl_window *window)
 {
     int pixels = 0, units = 0, unused;
@@ -221,6 +297,11 @@ double strl_window_text_scale(const strl_window *window)
     glfwGetWindowContentScale(window->handle, &x, &y);
     double scale = y / strl_window_pixel_scale(window);
     return scale > 0.5 && scale < 8 ? scale : 1;
+}
+
+void strl_window_cursor(const strl_window *window, double at[2])
+{
+    memcpy(at, window->cursor, sizeof window->cursor);
 }
 
 bool strl_window_should_close(const strl_window *window)

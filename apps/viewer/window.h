@@ -6,38 +6,27 @@
 #include <stdint.h>
 
 #include "stroll/error.h"
+#include "viewer/action.h"
 
-/* Of a key: happens once when it goes down. */
-typedef enum strl_action {
-    STRL_ACTION_ORBIT,
-    STRL_ACTION_FLY,
-    STRL_ACTION_HOME,
-    STRL_ACTION_RESET,
-    STRL_ACTION_NO_COLOURS,
-    STRL_ACTION_CLUSTER_COLOURS,
-    STRL_ACTION_LEVEL_COLOURS,
-    STRL_ACTION_ERROR_COLOURS,
-    STRL_ACTION_WIREFRAME,
-    STRL_ACTION_FLAT,
-    STRL_ACTION_FREEZE,
-    STRL_ACTION_COARSER,
-    STRL_ACTION_FINER,
-    STRL_ACTION_SCREENSHOT,
-    STRL_ACTION_HELP,
-    STRL_ACTION_QUIT
-} strl_action;
+#define STRL_WINDOW_MOST_CLICKS 8u
 
-#define STRL_WINDOW_MOST_ACTIONS 32u
+/* A press of the left button without a drag. */
+typedef struct strl_click {
+    double at[2]; /* framebuffer pixels, y downward */
+    bool twice;   /* the second of two in quick succession */
+} strl_click;
 
-/* Since the last frame. Drags and moves that the panel takes are not in it. */
+/* Since the last frame. Drags, clicks and moves that the panel takes are not in it. */
 typedef struct strl_window_input {
     double left[2], right[2]; /* drags in framebuffer pixels, y downward */
     double wheel;             /* ticks; up is positive */
     double way[3];            /* held keys: right, up, forward, each -1 to 1 */
     bool fast;
-    strl_action actions[STRL_WINDOW_MOST_ACTIONS];
-    unsigned action_count;
-    bool touched; /* something happened at all */
+    strl_requests requests; /* of keys: once when one goes down */
+    strl_click clicks[STRL_WINDOW_MOST_CLICKS];
+    unsigned click_count;
+    char dropped[4096]; /* the last file let fall on the window; empty = none */
+    bool touched;       /* something happened at all */
 } strl_window_input;
 
 typedef struct strl_window strl_window;
@@ -55,10 +44,15 @@ struct GLFWwindow *strl_window_handle(strl_window *window); /* borrowed, for the
 
 /* Pixels to draw; 0x0 while the window is an icon. */
 void strl_window_framebuffer_size(const strl_window *window, uint32_t size[2]);
+/* Screen units, as strl_window_desc has them. */
+void strl_window_size(const strl_window *window, uint32_t size[2]);
+void strl_window_set_title(strl_window *window, const char *title);
 /* Framebuffer pixels per screen unit. */
 double strl_window_pixel_scale(const strl_window *window);
 /* How many times larger than usual people here want text, in screen units. */
 double strl_window_text_scale(const strl_window *window);
+/* Where the mouse was when the last input was taken, screen units. */
+void strl_window_cursor(const strl_window *window, double at[2]);
 bool strl_window_should_close(const strl_window *window);
 
 /* What the panel keeps for itself from now on: see strl_gui_takes_mouse. */

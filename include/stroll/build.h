@@ -49,6 +49,7 @@ typedef struct strl_build_desc {
     bool compact;           /* for the network: a coarser lattice where grid is 0, normals of 2 x 8 bits */
     int up_axis;            /* 1 x, 2 y, 3 z; 0 = the inputs' own */
     const char *unit;       /* NULL = unknown */
+    const char *importer;   /* the program that reads foreign formats (readers/reader.h); NULL = as installed */
     bool certify;           /* measure what nodes claim, and claim no more */
     /* A build that is stopped leaves its scratch folder, with the stages that are finished, for a later one
      * that resumes. Not set: nothing is left. */
@@ -66,9 +67,20 @@ typedef struct strl_build_desc {
     void *context; /* of all three */
 } strl_build_desc;
 
+/* The stages that people are told of, in order; all levels are one. */
+enum { STRL_BUILD_STAGES = 7 };
+/* "survey", ...; stage < STRL_BUILD_STAGES. Static. */
+STRL_API const char *strl_build_stage_name(uint32_t stage);
+
+/* What a stage took, of this run alone; zero where it was resumed behind it. cpu_seconds: of all threads. */
+typedef struct strl_build_stage {
+    double seconds, cpu_seconds;
+} strl_build_stage;
+
 typedef struct strl_build_result {
     uint64_t triangles_in, triangles_leaf;
     uint64_t dropped_nonfinite, dropped_degenerate, dropped_lines, dropped_points;
+    double dropped_longest; /* the longest edge of a triangle without area on the lattice, model units: claims leave these out */
     uint64_t missing_libraries; /* material libraries that could not be read: what they define is white */
     uint32_t coarse_lattices;   /* 1 where the step had to be more than a sixteenth of the 1st-percentile edge */
     uint64_t vertices, nodes, groups, bytes_out, scratch_bytes;
@@ -76,6 +88,7 @@ typedef struct strl_build_result {
     uint64_t placements;
     double step, quantisation_error; /* of the lattice; how far it moves a point at most; model units */
     double seconds, cpu_seconds;
+    strl_build_stage stages[STRL_BUILD_STAGES];
     uint64_t peak_rss_bytes;
     bool resumed;      /* an earlier build's stages were used; seconds and cpu_seconds are of this run alone */
     bool scratch_kept; /* of a failed build: there is something to resume */

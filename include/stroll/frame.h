@@ -26,6 +26,11 @@ typedef struct strl_vertex {
     uint8_t rgba[4];     /* vertex colour x material colour, sRGB-encoded */
 } strl_vertex;
 
+/* What a vertex belongs to: indices into the container's tables of names. All corners of a triangle mostly agree. */
+typedef struct strl_vertex_label {
+    uint32_t part, material;
+} strl_vertex_label;
+
 /* What strl_vertex.position holds. A walk gives lattice positions only; floats are for triangles drawn as read. */
 typedef enum strl_positions {
     STRL_POSITIONS_LATTICE = 0,
@@ -39,6 +44,7 @@ typedef struct strl_draw_item {
     uint32_t state;        /* refinement step; the indices are a function of (key, state) */
     bool visible;          /* intersects the view frustum (and is not known to be hidden) */
     const strl_vertex *vertices;
+    const strl_vertex_label *labels; /* [vertex_count]; NULL where the walk was not asked for them */
     uint32_t vertex_count;
     const uint16_t *indices; /* 3 * triangle_count, of this state */
     uint32_t index_count;

@@ -46,6 +46,12 @@ typedef enum strl_debug_colour {
     STRL_DEBUG_ERROR    /* blue (0 px) over green to red (2 px and more) */
 } strl_debug_colour;
 
+typedef enum strl_part_style {
+    STRL_PART_PLAIN = 0,
+    STRL_PART_HIDDEN,
+    STRL_PART_MARKED /* tinted */
+} strl_part_style;
+
 /* How to draw one list. Zero-initialise: every 0 takes its default. */
 typedef struct strl_draw_options {
     strl_debug_colour debug;
@@ -55,6 +61,12 @@ typedef struct strl_draw_options {
     uint8_t background[3];  /* sRGB-encoded */
     float headlight;        /* strength of the light at the eye; 0 = 0.55 */
     double sky_up[3];       /* world direction from which the sky shines; zero = +z */
+    double section[4];      /* world: only points p with x p.x + y p.y + z p.z <= w are drawn; zero = all */
+    /* Of parts by number, strl_part_style each; parts past the end are plain. It works on items with labels. NULL = all
+     * plain. The version tells contents apart: vertices are sent again only where it differs from the draw before. */
+    const uint8_t *part_styles;
+    uint32_t part_count;
+    uint64_t styles_version;
 } strl_draw_options;
 
 /* Of one draw. */

@@ -16,12 +16,14 @@ typedef struct strl_build_context {
     strl_pool *pool;
     strl_spill_set *spills;
     const char *scratch_dir;
+    const char *part_dir;  /* for the unfinished container: beside the output */
     uint64_t memory_bytes; /* what the output may depend on; of a resumed build, the first one's */
     bool keep;             /* checkpoints are made (checkpoint.h); settled when the survey is done */
     bool has_checkpoint;   /* there is one in the scratch folder */
     strl_writer resumed;   /* the builder's words in the checkpoint to go on with; empty = from the beginning */
     strl_build_progress progress;
     strl_estimate estimate;
+    uint64_t stage_ns, stage_cpu_ns; /* when the stage under way began, by the clock and by the processor */
 } strl_build_context;
 
 /* Reports progress; STRL_ERR_CANCELLED where the callback says so. */

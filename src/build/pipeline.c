@@ -27,19 +27,34 @@ strl_status strl__build_report(strl_build_context *context, uint64_t done, uint6
     return STRL_OK;
 }
 
+/* What the stage under way has taken until now goes to its account. */
+static void end_stage(strl_build_context *context)
+{
+    uint64_t now = strl_clock_ns(), cpu_now = strl_clock_cpu_ns();
+    if (context->progress.stage_index) {
+        strl_build_stage *stage = &context->result->stages[context->progress.stage_index - 1];
+        stage->seconds += (double)(now - context->stage_ns) * 1e-9;
+        stage->cpu_seconds += (double)(cpu_now - context->stage_cpu_ns) * 1e-9;
+    }
+    context->stage_ns = now;
+    context->stage_cpu_ns = cpu_now;
+}
+
 void strl__build_stage(strl_build_context *context, const char *stage)
 {
+    end_stage(context);
     strl__estimate_stage(&context->estimate, stage);
     context->progress.stage = stage;
     context->progress.stage_index = context->estimate.stage_index;
-    context->progress.stage_count = STRL_STAGE_COUNT;
+    context->progress.stage_count = STRL_BUILD_STAGES;
     context->progress.done = context->progress.total = 0;
 }
 
 void strl__build_expect(strl_build_context *context, uint64_t triangles)
 {
     context->progress.triangles_in = triangles;
-    strl__estimate_guess(&context->estimate, strl__estimate_seconds(triangles, strl_pool_workers(context->pool)));
+    strl__estimate_guess(&context->estimate, strl__estimate_seconds(triangles, strl_pool_workers(context->pool),
+                                                                   context->desc->certify));
 }
 
 strl_status strl__build_open_stream(strl_build_context *context, const char *name, strl_spill **spill, strl_error *err)
@@ -96,6 +111,26 @@ static strl_status open_scratch(const strl_build_desc *desc, const char *target,
         snprintf(path, size, "%s.tmp", target);
     const strl_scratch_desc wanted = {.path = path, .parent = desc->scratch, .names = scratch_names, .keep = desc->resume};
     strl_status status = strl_scratch_create(&wanted, scratch, err);
+    strl__free(path);
+    return status;
+}
+
+/* Where scratch is elsewhere, what is unfinished of the output still lies beside it, to be renamed: in a folder of ours too, so
+ * that the next build removes what a kill has left. *scratch: NULL where the build's own scratch is that folder. */
+static strl_status open_part_scratch(const char *target, const char *own, strl_scratch **scratch, strl_error *err)
+{
+    strl_file_info there, here;
+    size_t size = strlen(target) + sizeof ".tmp";
+    char *path = strl__alloc(size, 1);
+    *scratch = NULL;
+    if (!path)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
+    snprintf(path, size, "%s.tmp", target);
+    strl_status status = strl_path_stat(own, &there, err);
+    bool is_own = !status && strl_path_exists(path) && strl_path_stat(path, &here, NULL) == STRL_OK &&
+                  here.device == there.device && here.inode == there.inode;
+    if (!status && !is_own)
+        status = strl_scratch_create(&(strl_scratch_desc){.path = path, .names = scratch_names}, scratch, err);
     strl__free(path);
     return status;
 }
@@ -170,8 +205,9 @@ static strl_status run_in_scratch(strl_build_context *context, strl_scratch *scr
         status = resume(context, scratch, err);
     if (!status)
         status = strl__clusters_run(context, err);
+    end_stage(context);
     if (context->spills)
-        context->result->scratch_bytes = strl_spill_set_peak_bytes(context->spills);
+        context->result->scratch_bytes += strl_spill_set_peak_bytes(context->spills);
     strl_spill_set_destroy(context->spills);
     strl_pool_destroy(context->pool);
     strl__free(context->resumed.data);
@@ -181,14 +217,18 @@ static strl_status run_in_scratch(strl_build_context *context, strl_scratch *scr
 /* Everything between a checked request and its end. */
 static strl_status run(strl_build_context *context, const char *target, strl_error *err)
 {
-    strl_scratch *scratch = NULL;
+    strl_scratch *scratch = NULL, *parts = NULL;
     strl_status status = open_scratch(context->desc, target, &scratch, err);
     if (status)
         return status;
     context->scratch_dir = strl_scratch_path(scratch);
     bool resumes = context->desc->resume && strl__checkpoint_exists(context->scratch_dir);
     context->has_checkpoint = resumes;
-    status = run_in_scratch(context, scratch, err);
+    status = open_part_scratch(target, context->scratch_dir, &parts, err);
+    context->part_dir = parts ? strl_scratch_path(parts) : context->scratch_dir;
+    if (!status)
+        status = run_in_scratch(context, scratch, err);
+    strl_scratch_destroy(parts);
     context->result->scratch_kept = status && context->has_checkpoint && (resumes || is_stopped(context, resumes, status));
     if (context->result->scratch_kept)
         strl_scratch_leave(scratch);
@@ -212,6 +252,7 @@ strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *
     strl__free(target);
     result->seconds = (double)(strl_clock_ns() - started) * 1e-9;
     result->cpu_seconds = (double)(strl_clock_cpu_ns() - cpu_started) * 1e-9;
-    result->peak_rss_bytes = strl_process_peak_rss_bytes();
+    uint64_t peak = strl_process_peak_rss_bytes();
+    result->peak_rss_bytes = peak > result->peak_rss_bytes ? peak : result->peak_rss_bytes;
     return status;
 }

@@ -6,7 +6,10 @@
 #ifndef STRL_BUILD_PROGRESS_H
 #define STRL_BUILD_PROGRESS_H
 
+#include <stdbool.h>
 #include <stdint.h>
+
+#include "stroll/build.h"
 
 typedef struct strl_estimate {
     double share; /* of the whole build, 0 to 1; never shrinks */
@@ -15,13 +18,11 @@ typedef struct strl_estimate {
     double stage_first, stage_share; /* of the stage under way */
     double first_share;              /* where this run began: 0 unless it resumed */
     uint64_t started_ns, updated_ns;
-    uint32_t stage_index; /* of STRL_STAGE_COUNT, 0 before the first */
+    uint32_t stage_index; /* of STRL_BUILD_STAGES, 0 before the first */
 } strl_estimate;
 
-enum { STRL_STAGE_COUNT = 7 }; /* for people: all levels are one */
-
 /* A rough time for this many triangles; no machine is known beforehand. */
-double strl__estimate_seconds(uint64_t triangles, unsigned workers);
+double strl__estimate_seconds(uint64_t triangles, unsigned workers, bool certifies);
 void strl__estimate_start(strl_estimate *estimate, uint64_t now_ns);
 /* seconds: guessed for the whole build. Before the first update it is all that is known, later it counts little. */
 void strl__estimate_guess(strl_estimate *estimate, double seconds);

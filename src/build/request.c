@@ -65,6 +65,13 @@ static const char *or_default(const char *text, const char *without)
     return *text ? text : without;
 }
 
+static strl_status compare_flag(const char *name, bool now, bool saved, strl_error *err)
+{
+    return now == saved ? STRL_OK
+                        : strl__fail(err, STRL_ERR_ARGUMENT, "%s is %s, in the build to be resumed it was not", name,
+                                     now ? "given" : "left out");
+}
+
 static strl_status compare_options(const strl_build_desc *desc, strl_cursor *saved, strl_error *err)
 {
     static const char *const axes[] = {"auto", "x", "y", "z"};
@@ -77,9 +84,6 @@ static strl_status compare_options(const strl_build_desc *desc, strl_cursor *sav
     if (!(grid == desc->grid))
         return strl__fail(err, STRL_ERR_ARGUMENT, "--grid is %g, in the build to be resumed it was %g (0 = chosen)",
                           desc->grid, grid);
-    if (compact != desc->compact)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "--compact is %s, in the build to be resumed it was not",
-                          desc->compact ? "given" : "left out");
     if (up != up_now)
         return strl__fail(err, STRL_ERR_ARGUMENT, "--up is %s, in the build to be resumed it was %s", axes[up_now & 3],
                           axes[up & 3]);
@@ -87,13 +91,12 @@ static strl_status compare_options(const strl_build_desc *desc, strl_cursor *sav
         return strl__fail(err, STRL_ERR_ARGUMENT, "--unit is %s, in the build to be resumed it was %.*s",
                           or_default(unit_now, "unknown"), unit.length ? shown(unit) : 7,
                           unit.length ? unit.text : "unknown");
-    if (no_dependencies != desc->no_dependencies)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "--no-dependencies is %s, in the build to be resumed it was not",
-                          desc->no_dependencies ? "given" : "left out");
-    if (certify != desc->certify)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "--certify is %s, in the build to be resumed it was not",
-                          desc->certify ? "given" : "left out");
-    return STRL_OK;
+    strl_status status = compare_flag("--compact", desc->compact, compact, err);
+    if (!status)
+        status = compare_flag("--no-dependencies", desc->no_dependencies, no_dependencies, err);
+    if (!status)
+        status = compare_flag("--certify", desc->certify, certify, err);
+    return status;
 }
 
 static strl_status compare_input(const char *path, strl_cursor *saved, strl_error *err)

@@ -27,7 +27,7 @@ static strl_status open_files(strl_container_writer *writer, const strl_containe
     writer->path = strl__strdup(desc->path);
     if (!writer->path)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to create %s", desc->path);
-    strl_status status = strl_output_open(desc->path, desc->scratch_dir, &writer->output, err);
+    strl_status status = strl_output_open(desc->path, desc->part_dir ? desc->part_dir : desc->scratch_dir, &writer->output, err);
     if (status != STRL_OK)
         return status;
     writer->sink.file = strl_output_file(writer->output);

@@ -9,8 +9,9 @@ typedef struct strl_container_writer strl_container_writer;
 
 typedef struct strl_container_writer_desc {
     const char *path;         /* final name; borrowed during create */
-    const char *scratch_dir;  /* an existing folder for node records until they are placed, and for the unfinished file
-                                 where the folder is beside it; borrowed during create */
+    const char *scratch_dir;  /* an existing folder for node records until they are placed; borrowed during create */
+    const char *part_dir;     /* an existing folder for the unfinished file, taken where it is beside the path; NULL =
+                                 scratch_dir; borrowed during create */
     strl_container_info info; /* version, file_bytes, model_id, bounds and all counts but those of input and drops are
                                  filled in by the writer */
 } strl_container_writer_desc;

@@ -249,18 +249,6 @@ static void measure_up(tracker *t, uint32_t triangle, double claim)
 
 /* ---- the start ---- */
 
-static bool plant(strl_near *tree, const strl_facet *facet, uint32_t count, strl_arena *arena)
-{
-    tree->facet = facet;
-    tree->order = strl_arena_alloc(arena, count, sizeof *tree->order);
-    tree->leaf = strl_arena_alloc(arena, count, sizeof *tree->leaf);
-    tree->nodes = strl_arena_alloc(arena, strl_near_nodes(count), sizeof *tree->nodes);
-    if (!tree->order || !tree->leaf || !tree->nodes)
-        return false;
-    strl_near_build(tree, count);
-    return true;
-}
-
 static bool prepare_pieces(tracker *t, const strl_piece *pieces, strl_arena *arena)
 {
     t->piece = strl_arena_alloc(arena, t->piece_count, sizeof *t->piece);
@@ -271,7 +259,7 @@ static bool prepare_pieces(tracker *t, const strl_piece *pieces, strl_arena *are
         return false;
     for (uint32_t i = 0; i < t->piece_count; i++)
         strl_piece_facet(&pieces[i], &t->piece[i]);
-    return plant(&t->piece_tree, t->piece, t->piece_count, arena);
+    return strl_near_create(&t->piece_tree, t->piece, t->piece_count, arena);
 }
 
 static bool prepare(tracker *t, const strl_mesh *mesh, strl_arena *arena)
@@ -300,13 +288,7 @@ static bool prepare(tracker *t, const strl_mesh *mesh, strl_arena *arena)
         }
         triangle_facet(t, i);
     }
-    return plant(&t->tree, t->facet, n, arena);
-}
-
-static void middle_of(const strl_facet *facet, double middle[3])
-{
-    for (unsigned k = 0; k < 3; k++)
-        middle[k] = (facet->corner[0][k] + facet->corner[1][k] + facet->corner[2][k]) / 3;
+    return strl_near_create(&t->tree, t->facet, n, arena);
 }
 
 /* Pieces come in the order of the triangles that they are or were: the next piece belongs to the next triangle, or to the same. */
@@ -316,17 +298,11 @@ static bool is_near_likely(tracker *t, const strl_facet *piece, double *bound)
     uint32_t last = t->around[0];
     for (uint32_t i = 2; i-- > 0;) {
         uint32_t triangle = last + i;
-        double most = 0;
-        if (triangle == t->mesh->triangle_count)
-            continue;
-        for (unsigned c = 0; c < 3 && most <= reach * reach; c++)
-            most = fmax(most, strl_facet_distance2(&t->facet[triangle], piece->corner[c]));
-        if (reach < 0 || most > reach * reach)
+        if (triangle == t->mesh->triangle_count || !strl_facet_is_near(&t->facet[triangle], piece, reach, bound))
             continue;
         t->around[0] = triangle;
         t->around_count = 1;
         t->used[0] = true;
-        *bound = sqrt(most);
         return true;
     }
     return false;
@@ -348,7 +324,7 @@ static bool measure_first(tracker *t, uint32_t id)
     double middle[3], distance, along[3], bound;
     if (is_near_likely(t, piece, &bound))
         return keep_measure(t, id, bound + piece->claim);
-    middle_of(piece, middle);
+    strl_facet_middle(piece, middle);
     t->around[0] = strl_near_find(&t->tree, middle, t->around[0], &distance);
     double reach = FIRST_REACH * distance, enough = fmax(fmax(t->most_down, t->granted) - piece->claim, reach);
     strl_facet_normal(&t->facet[t->around[0]], along);

@@ -100,6 +100,23 @@ double strl_facet_distance2(const strl_facet *facet, const double p[3])
     return best;
 }
 
+void strl_facet_middle(const strl_facet *facet, double middle[3])
+{
+    for (unsigned k = 0; k < 3; k++)
+        middle[k] = (facet->corner[0][k] + facet->corner[1][k] + facet->corner[2][k]) / 3;
+}
+
+bool strl_facet_is_near(const strl_facet *facet, const strl_facet *other, double reach, double *distance)
+{
+    double most = 0;
+    for (unsigned c = 0; c < 3 && most <= reach * reach; c++)
+        most = fmax(most, strl_facet_distance2(facet, other->corner[c]));
+    if (!(reach >= 0 && most <= reach * reach))
+        return false;
+    *distance = sqrt(most);
+    return true;
+}
+
 typedef struct work {
     const strl_cover *cover;
     double along[3];

@@ -53,6 +53,12 @@ void strl_facet_normal(const strl_facet *facet, double normal[3]);
 /* Squared distance of a point, without the claim. */
 double strl_facet_distance2(const strl_facet *facet, const double p[3]);
 
+/* The mean of its corners. */
+void strl_facet_middle(const strl_facet *facet, double middle[3]);
+/* Whether all corners of `other`, and so all its points, are within `reach` of the facet, without claims; *distance: how far the
+ * farthest is, set where they are. */
+bool strl_facet_is_near(const strl_facet *facet, const strl_facet *other, double reach, double *distance);
+
 /* along: of any length. */
 void strl_prism_set(strl_prism *prism, const strl_facet *facet, const double along[3]);
 

@@ -86,6 +86,18 @@ void strl_near_build(strl_near *tree, uint32_t count)
     split(tree, 0, 0, count, &used);
 }
 
+bool strl_near_create(strl_near *tree, const strl_facet *facet, uint32_t count, strl_arena *arena)
+{
+    tree->facet = facet;
+    tree->order = strl_arena_alloc(arena, count, sizeof *tree->order);
+    tree->leaf = strl_arena_alloc(arena, count, sizeof *tree->leaf);
+    tree->nodes = strl_arena_alloc(arena, strl_near_nodes(count), sizeof *tree->nodes);
+    if (!tree->order || !tree->leaf || !tree->nodes)
+        return false;
+    strl_near_build(tree, count);
+    return true;
+}
+
 void strl_near_update(strl_near *tree, uint32_t facet)
 {
     const strl_facet *f = &tree->facet[facet];

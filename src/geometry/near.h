@@ -1,7 +1,8 @@
-/* A small tree of boxes over facets: which are near? Kernels on the caller's arrays; nothing is allocated. */
+/* A small tree of boxes over facets: which are near? Only strl_near_create allocates. */
 #ifndef STRL_GEOMETRY_NEAR_H
 #define STRL_GEOMETRY_NEAR_H
 
+#include "base/memory.h"
 #include "geometry/cover.h"
 
 #define STRL_NEAR_LEAF 4u
@@ -26,6 +27,8 @@ static inline uint32_t strl_near_nodes(uint32_t facets)
 
 /* Builds the tree over `count` (at least 1) facets; the arrays are the caller's. */
 void strl_near_build(strl_near *tree, uint32_t count);
+/* The same with arrays of the arena. The facets are borrowed. False without memory. */
+bool strl_near_create(strl_near *tree, const strl_facet *facet, uint32_t count, strl_arena *arena);
 /* The facet has moved: boxes grow to hold it. */
 void strl_near_update(strl_near *tree, uint32_t facet);
 /* The facet nearest to p, and its distance, claims left out. guess: a facet that is likely near. */

@@ -1,4 +1,4 @@
-/* The payload codec: a progressive mesh to bytes and back. docs/format.md, "Node payload", is normative.
+/* The payload codec: a progressive mesh to bytes and back. docs/format-payload.md is normative.
  * Lossless for all of strl_pm but the errors, which are rounded up to a logarithmic scale (the claim stays a bound: at
  * most 4.5 % more). What strl_pm leaves open is not kept: base vertices come back in another order, triangles in
  * another order within their step, and corners rotated; steps, their vertices, the palette and every state stay what

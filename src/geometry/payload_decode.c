@@ -57,26 +57,11 @@ strl_status strl_payload_peek(const void *data, size_t size, strl_payload_sizes 
 static strl_status allocate(const strl_payload_sizes *sizes, uint8_t flags, strl_arena *arena, strl_pm *pm,
                             strl_error *err)
 {
-    uint32_t vertices = sizes->vertex_count, states = sizes->step_count + 1;
-    bool colour = flags & FLAG_COLOUR, palette_index = flags & FLAG_PALETTE_INDEX;
-    pm->vertex_count = vertices;
+    pm->vertex_count = sizes->vertex_count;
     pm->triangle_count = sizes->triangle_count;
     pm->step_count = sizes->step_count;
     pm->palette_count = sizes->palette_count;
-    pm->position = strl_arena_alloc(arena, vertices, sizeof *pm->position);
-    pm->normal = strl_arena_alloc(arena, vertices, sizeof *pm->normal);
-    pm->colour = colour ? strl_arena_alloc(arena, vertices, sizeof *pm->colour) : NULL;
-    pm->palette_index = palette_index ? strl_arena_alloc(arena, vertices, sizeof *pm->palette_index) : NULL;
-    pm->parent = strl_arena_alloc(arena, vertices, sizeof *pm->parent);
-    pm->triangle = strl_arena_alloc(arena, sizes->triangle_count, sizeof *pm->triangle);
-    pm->vertex_end = strl_arena_alloc(arena, states, sizeof *pm->vertex_end);
-    pm->triangle_end = strl_arena_alloc(arena, states, sizeof *pm->triangle_end);
-    pm->geometric_error = strl_arena_alloc(arena, states, sizeof *pm->geometric_error);
-    pm->appearance_error = strl_arena_alloc(arena, states, sizeof *pm->appearance_error);
-    pm->palette = strl_arena_alloc(arena, sizes->palette_count, sizeof *pm->palette);
-    if (!pm->position || !pm->normal || (colour && !pm->colour) || (palette_index && !pm->palette_index) ||
-        !pm->parent || !pm->triangle || !pm->vertex_end || !pm->triangle_end || !pm->geometric_error ||
-        !pm->appearance_error || !pm->palette)
+    if (!strl_pm_create(pm, flags & FLAG_COLOUR, flags & FLAG_PALETTE_INDEX, arena))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to decode a node payload");
     memset(pm->parent, 0, sizes->base_vertex_count * sizeof *pm->parent);
     return STRL_OK;

@@ -1,9 +1,27 @@
 #include "geometry/progressive.h"
 
 #include <inttypes.h>
-#include <stdbool.h>
 
 #include "base/fail.h"
+
+bool strl_pm_create(strl_pm *pm, bool has_colours, bool has_palette_indices, strl_arena *arena)
+{
+    size_t vertices = pm->vertex_count, states = (size_t)pm->step_count + 1;
+    pm->position = strl_arena_alloc(arena, vertices, sizeof *pm->position);
+    pm->normal = strl_arena_alloc(arena, vertices, sizeof *pm->normal);
+    pm->colour = has_colours ? strl_arena_alloc(arena, vertices, sizeof *pm->colour) : NULL;
+    pm->palette_index = has_palette_indices ? strl_arena_alloc(arena, vertices, sizeof *pm->palette_index) : NULL;
+    pm->parent = strl_arena_alloc(arena, vertices, sizeof *pm->parent);
+    pm->triangle = strl_arena_alloc(arena, pm->triangle_count, sizeof *pm->triangle);
+    pm->vertex_end = strl_arena_alloc(arena, states, sizeof *pm->vertex_end);
+    pm->triangle_end = strl_arena_alloc(arena, states, sizeof *pm->triangle_end);
+    pm->geometric_error = strl_arena_alloc(arena, states, sizeof *pm->geometric_error);
+    pm->appearance_error = strl_arena_alloc(arena, states, sizeof *pm->appearance_error);
+    pm->palette = strl_arena_alloc(arena, pm->palette_count, sizeof *pm->palette);
+    return pm->position && pm->normal && (pm->colour || !has_colours) && (pm->palette_index || !has_palette_indices) &&
+           pm->parent && pm->triangle && pm->vertex_end && pm->triangle_end && pm->geometric_error &&
+           pm->appearance_error && pm->palette;
+}
 
 static strl_status check_counts(const strl_pm *pm, strl_error *err)
 {

@@ -18,8 +18,10 @@
 #ifndef STRL_GEOMETRY_PROGRESSIVE_H
 #define STRL_GEOMETRY_PROGRESSIVE_H
 
+#include <stdbool.h>
 #include <stdint.h>
 
+#include "base/memory.h"
 #include "stroll/error.h"
 
 /* Most vertices of a node's finest state: indices are 16 bits on the GPU. */
@@ -56,6 +58,10 @@ typedef struct strl_pm {
     float *appearance_error;     /* [step_count + 1], never increasing */
     strl_palette_entry *palette; /* [palette_count] */
 } strl_pm;
+
+/* Gives the mesh its arrays, from the arena and unset: the four counts are set and within the limits above. False without
+ * memory. */
+bool strl_pm_create(strl_pm *pm, bool has_colours, bool has_palette_indices, strl_arena *arena);
 
 /* Checks every invariant that this file states (of the limit of moves only the moved corners): counts, order, errors,
  * indices, one position per step, no degenerate triangle in any state, each step's triangles hold one of its vertices.

@@ -263,18 +263,11 @@ static bool colours_vary(const simplifier *s, const strl_star *star, uint32_t ow
     return false;
 }
 
-static double distance_squared(const simplifier *s, uint32_t a, uint32_t b)
-{
-    const double *p = s->sites[a].position, *q = s->sites[b].position;
-    double x = p[0] - q[0], y = p[1] - q[1], z = p[2] - q[2];
-    return x * x + y * y + z * z;
-}
-
 static float farthest(const simplifier *s, const strl_star *star, uint32_t to)
 {
     double most = 0;
     for (uint32_t i = 0; i < star->neighbour_count; i++) {
-        double squared = distance_squared(s, star->neighbour[i], to);
+        double squared = strl__distance2(s->sites[star->neighbour[i]].position, s->sites[to].position);
         most = squared > most ? squared : most;
     }
     return (float)sqrt(most);
@@ -399,7 +392,7 @@ static void drift_straight(const simplifier *s, const strl_star *star, uint32_t 
         if (receiver != NO_INDEX)
             effect->receiver[effect->receivers++] = receiver;
         reach lost = effect->of[i];
-        double edge = has_edge ? 0 : sqrt(distance_squared(s, to, x));
+        double edge = has_edge ? 0 : sqrt(strl__distance2(s->sites[to].position, s->sites[x].position));
         for (unsigned k = 0; k < 6; k++)
             lost.of[k] = (lost.of[k] + (float)edge) * STRL_ROUND_UP;
         strl__unite(&effect->orphan, &lost);

@@ -62,12 +62,6 @@ static cell_slot *find_cell(clustering *c, const double p[3], double size)
     return &c->slots[at];
 }
 
-static double squared_distance(const double a[3], const double b[3])
-{
-    double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
-    return x * x + y * y + z * z;
-}
-
 static bool prepare(clustering *c, simplifier *s, strl_arena *arena)
 {
     uint32_t points = s->mesh->point_count, size = 16;
@@ -91,7 +85,7 @@ static bool prepare(clustering *c, simplifier *s, strl_arena *arena)
         const uint32_t *point = s->faces[t].point;
         for (unsigned k = 0; k < 3 && !s->faces[t].gone; k++) {
             unite(c->component, point[0], point[k]);
-            shortest = fmin(shortest, squared_distance(s->sites[point[k]].position, s->sites[point[(k + 1) % 3]].position));
+            shortest = fmin(shortest, strl__distance2(s->sites[point[k]].position, s->sites[point[(k + 1) % 3]].position));
         }
     }
     s->shortest_edge = (float)sqrt(shortest);

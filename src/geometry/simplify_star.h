@@ -169,6 +169,12 @@ typedef struct simplifier {
     collapse_effect effect, other_effect;
 } simplifier;
 
+static inline double strl__distance2(const double a[3], const double b[3])
+{
+    double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+    return x * x + y * y + z * z;
+}
+
 static inline float strl__larger(float a, float b)
 {
     return a > b ? a : b;

@@ -9,10 +9,23 @@
 strl_status strl__input_init(strl__input *input, strl_file *file, size_t capacity, strl_error *err)
 {
     *input = (strl__input){.file = file, .capacity = capacity, .file_bytes = strl_file_bytes(file)};
-    input->buffer = strl__alloc(capacity + 1, 1);
+    return strl__input_wake(input, err);
+}
+
+void strl__input_rest(strl__input *input)
+{
+    strl__free(input->buffer);
+    input->buffer = NULL;
+}
+
+strl_status strl__input_wake(strl__input *input, strl_error *err)
+{
+    if (input->buffer)
+        return STRL_OK;
+    input->buffer = strl__alloc(input->capacity + 1, 1);
     if (!input->buffer)
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a read buffer of %zu bytes",
-                          strl_file_path(file), capacity);
+                          strl_file_path(input->file), input->capacity);
     strl__input_seek(input, 0, 1);
     return STRL_OK;
 }

@@ -30,6 +30,10 @@ typedef struct strl__input {
 /* capacity >= STRL__TOKEN_BYTES. */
 strl_status strl__input_init(strl__input *input, strl_file *file, size_t capacity, strl_error *err);
 void strl__input_deinit(strl__input *input);
+/* Gives the buffer back. */
+void strl__input_rest(strl__input *input);
+/* Makes a buffer that was given back, at the beginning of the file. */
+strl_status strl__input_wake(strl__input *input, strl_error *err);
 /* Forgets an earlier failure. */
 void strl__input_seek(strl__input *input, uint64_t offset, uint64_t line);
 /* The failed read, if there was one. */

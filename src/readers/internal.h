@@ -14,7 +14,9 @@
 typedef struct strl__format {
     const char *name;
     strl_axis default_up;
+    const char *default_unit; /* NULL: the format does not say */
     size_t state_bytes; /* zeroed, in reader->state */
+    bool weak;          /* its beginning may be another format's: a name's ending says more */
     bool (*recognises)(const strl__input *input,
                        uint64_t file_bytes); /* by the first bytes, which are in the input */
     strl_status (*open)(strl_reader *reader,
@@ -24,12 +26,24 @@ typedef struct strl__format {
     strl_status (*start)(strl_reader *reader, strl_error *err); /* to the first face */
     strl_status (*fill)(strl_reader *reader,
                         strl_error *err); /* adds faces to the batch; sets reader->ended */
+    uint64_t (*bytes_done)(const strl_reader *reader); /* NULL: where the input stands */
+    strl_status (*check_unchanged)(const strl_reader *reader,
+                                   strl_error *err); /* files beside this one; may be NULL */
     void (*close)(strl_reader *reader);   /* what the state owns; may be NULL */
 } strl__format;
 
 extern const strl__format strl__format_ply;
 extern const strl__format strl__format_stl;
 extern const strl__format strl__format_obj;
+extern const strl__format strl__format_gltf;
+extern const strl__format strl__format_glb;
+/* Not among those that are recognised: the last resort, by the name's ending alone. */
+extern const strl__format strl__format_assimp;
+
+/* Whether the name ends in a dot and this, in letters of either case. */
+bool strl__has_extension(const char *path, const char *extension);
+/* The ending of a name that tells of a format which assimp reads and Stroll does not; NULL = none. */
+const char *strl__assimp_extension(const char *path);
 
 struct strl_reader {
     const strl__format *format;
@@ -37,15 +51,22 @@ struct strl_reader {
     char *path;        /* owned */
     char *scratch_dir; /* owned; NULL where none was given */
     uint64_t memory_bytes;
+    strl_reader_child child; /* borrowed, during open */
+    strl_axis default_up;
+    const char *default_unit; /* static; NULL = unknown */
     strl_file *file;       /* owned */
     strl_file_info opened; /* as it was at opening */
+    uint64_t all_bytes; /* with the files that this one names, where they count; else 0 */
     uint64_t triangles_hint;
+    bool hint_is_exact;
+    uint64_t listed_vertices; /* where the table of vertices does not hold them all, or was given back; else 0 */
     strl__input input;
     strl__table vertices, normals;
     strl__batch batch;
     strl__names parts, materials;
     strl__names missing; /* sentences: why files that this one names could not be read */
     strl_reader_drops drops;
+    strl_reader_costs costs;
     bool prepared; /* tables and batch are there */
     bool started;  /* the input stands at a face */
     bool ended;    /* the format has no more faces */
@@ -56,6 +77,10 @@ struct strl_reader {
 /* Opens a file as a given format instead of guessing; for tests and fuzzers. NULL guesses. */
 strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__format *format,
                                  strl_reader **reader, strl_error *err);
+
+/* Fails where an open file is not as it was. */
+strl_status strl__reader_check_unchanged(strl_file *file, const strl_file_info *opened,
+                                         strl_error *err);
 
 /* Allocates the batch for the reader's tables, which must be complete. */
 strl_status strl__reader_init_batch(strl_reader *reader, bool indexed, strl_error *err);

@@ -23,8 +23,7 @@ void strl__names_deinit(strl__names *names)
     *names = (strl__names){0};
 }
 
-/* Bytes of the well-formed UTF-8 sequence at text, 0 where there is none. */
-static size_t utf8_sequence(const unsigned char *text, size_t left)
+size_t strl__utf8_sequence(const unsigned char *text, size_t left)
 {
     unsigned char lead = text[0];
     if (lead < 0x80)
@@ -50,7 +49,7 @@ static size_t clean(const char *text, size_t length, char out[STRL__NAME_BYTES_M
     const unsigned char *bytes = (const unsigned char *)text;
     size_t used = 0;
     for (size_t i = 0; i < length;) {
-        size_t sequence = utf8_sequence(bytes + i, length - i);
+        size_t sequence = strl__utf8_sequence(bytes + i, length - i);
         if (used + (sequence ? sequence : 2) > STRL__NAME_BYTES_MAX)
             break;
         if (sequence == 0) {
@@ -122,7 +121,8 @@ strl_status strl__names_add(strl__names *names, const char *text, size_t length,
                   3 * names->slot_count * sizeof *names->slots;
     if (held > names->limit_bytes || names->count >= UINT32_MAX - 1)
         return strl__fail(err, STRL_ERR_LIMIT,
-                          "expected at most %zu bytes of names, found more than %zu names",
+                          "expected at most %zu bytes of names, found more than %zu names: more --memory "
+                          "may help",
                           names->limit_bytes, names->count);
     if (!strl__grow(&names->items, &names->capacity, names->count + 1, sizeof *names->items) ||
         !grow_slots(names))

@@ -31,6 +31,8 @@ void strl__names_deinit(strl__names *names);
  * as Latin-1. */
 strl_status strl__names_add(strl__names *names, const char *text, size_t length, uint32_t *index,
                             strl_error *err);
+/* Bytes of the well-formed UTF-8 sequence at text, 0 where there is none; left > 0. */
+size_t strl__utf8_sequence(const unsigned char *text, size_t left);
 /* The index of a name, UINT32_MAX where it is unknown. */
 uint32_t strl__names_find(const strl__names *names, const char *text, size_t length);
 

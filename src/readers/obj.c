@@ -518,6 +518,7 @@ const strl__format strl__format_obj = {
     .name = "obj",
     .default_up = STRL_AXIS_Y,
     .state_bytes = sizeof(obj_state),
+    .weak = true,
     .recognises = obj_recognises,
     .open = obj_open,
     .prepare = obj_prepare,

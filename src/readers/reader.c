@@ -15,10 +15,11 @@
 #define INPUT_BYTES_MAX ((uint64_t)1 << 20)
 
 /* The most certain signature first. */
-static const strl__format *const formats[] = {&strl__format_ply, &strl__format_stl,
+static const strl__format *const formats[] = {&strl__format_glb, &strl__format_ply,
+                                              &strl__format_gltf, &strl__format_stl,
                                               &strl__format_obj};
 
-static bool has_extension(const char *path, const char *extension)
+bool strl__has_extension(const char *path, const char *extension)
 {
     size_t length = strlen(path), wanted = strlen(extension);
     if (length <= wanted || path[length - wanted - 1] != '.')
@@ -48,19 +49,23 @@ static strl_status recognise(strl_reader *reader, strl_error *err)
     strl_status status = strl__input_status(&reader->input, err);
     if (status)
         return status;
+    const bool foreign = strl__assimp_extension(reader->path) != NULL;
     for (size_t i = 0; i < sizeof formats / sizeof *formats && !reader->format; i++)
-        if (formats[i]->recognises(&reader->input, reader->opened.bytes))
+        if (!(foreign && formats[i]->weak) &&
+            formats[i]->recognises(&reader->input, reader->opened.bytes))
             reader->format = formats[i];
     for (size_t i = 0; i < sizeof formats / sizeof *formats && !reader->format; i++)
-        if (has_extension(reader->path, formats[i]->name))
+        if (strl__has_extension(reader->path, formats[i]->name))
             reader->format = formats[i];
+    if (!reader->format && foreign)
+        reader->format = &strl__format_assimp;
     if (reader->format)
         return STRL_OK;
     char found[32];
     show_start(&reader->input, found, sizeof found);
     return strl__fail(err, STRL_ERR_UNSUPPORTED,
-                      "%s: expected a PLY, STL or OBJ file by its first bytes or its name's "
-                      "ending, found one that begins with '%s'",
+                      "%s: expected a PLY, STL, OBJ or glTF file by its first bytes or its name's "
+                      "ending, or a name's ending that assimp knows, found one that begins with '%s'",
                       reader->path, found);
 }
 
@@ -90,6 +95,8 @@ static strl_status open_format(strl_reader *reader, strl_error *err)
     if (!reader->state)
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a reader", reader->path);
     strl__input_seek(&reader->input, 0, 1);
+    reader->default_up = reader->format->default_up;
+    reader->default_unit = reader->format->default_unit;
     return reader->format->open(reader, err);
 }
 
@@ -107,11 +114,14 @@ strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__forma
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a reader", desc->path);
     reader->format = format;
     reader->memory_bytes = memory_bytes;
-    strl__names_init(&reader->parts, (size_t)(memory_bytes / 16));
-    strl__names_init(&reader->materials, (size_t)(memory_bytes / 16));
+    uint64_t names_bytes = desc->names_bytes ? desc->names_bytes : memory_bytes / 8;
+    strl__names_init(&reader->parts, (size_t)names_bytes);
+    strl__names_init(&reader->materials, (size_t)(names_bytes / 2));
+    reader->child = desc->child;
     strl_status status = open_file(reader, desc, err);
     if (!status)
         status = open_format(reader, err);
+    reader->child = (strl_reader_child){0};
     if (!status)
         *out = reader;
     else
@@ -148,9 +158,11 @@ void strl_reader_info_get(const strl_reader *reader, strl_reader_info *info)
 {
     *info = (strl_reader_info){
         .format = reader->format->name,
-        .default_up = reader->format->default_up,
+        .default_up = reader->default_up,
+        .default_unit = reader->default_unit,
         .triangles_hint = reader->triangles_hint,
-        .file_bytes = reader->opened.bytes,
+        .hint_is_exact = reader->hint_is_exact,
+        .file_bytes = reader->all_bytes ? reader->all_bytes : reader->opened.bytes,
     };
 }
 
@@ -168,13 +180,18 @@ strl_status strl__reader_init_batch(strl_reader *reader, bool indexed, strl_erro
     return strl__batch_init(&reader->batch, &desc, err);
 }
 
+static void release_tables(strl_reader *reader)
+{
+    strl__table_deinit(&reader->vertices);
+    strl__table_deinit(&reader->normals);
+    strl__batch_deinit(&reader->batch);
+}
+
 static strl_status make_ready(strl_reader *reader, strl_error *err)
 {
-    strl_status status = STRL_OK;
-    if (!reader->prepared) {
-        strl__table_deinit(&reader->vertices);
-        strl__table_deinit(&reader->normals);
-        strl__batch_deinit(&reader->batch);
+    strl_status status = strl__input_wake(&reader->input, err);
+    if (!status && !reader->prepared) {
+        release_tables(reader);
         status = reader->format->prepare(reader, err);
         reader->prepared = !status;
     }
@@ -229,23 +246,43 @@ strl_status strl_reader_next(strl_reader *reader, strl_triangle *triangles, size
     return reader->failure.status;
 }
 
-strl_status strl_reader_rewind(strl_reader *reader, strl_error *err)
+strl_status strl__reader_check_unchanged(strl_file *file, const strl_file_info *opened,
+                                         strl_error *err)
 {
     strl_file_info now;
-    strl_status status = strl_file_stat(reader->file, &now, err);
+    strl_status status = strl_file_stat(file, &now, err);
     if (status)
         return status;
-    if (now.bytes != reader->opened.bytes || now.modified_ns != reader->opened.modified_ns)
+    if (now.bytes != opened->bytes || now.modified_ns != opened->modified_ns)
         return strl__fail(err, STRL_ERR_IO,
                           "%s has changed while it was read: it had %" PRIu64
                           " bytes, now it has %" PRIu64 " and a time of change %s",
-                          reader->path, reader->opened.bytes, now.bytes,
-                          now.modified_ns != reader->opened.modified_ns ? "of its own"
-                                                                        : "as before");
+                          strl_file_path(file), opened->bytes, now.bytes,
+                          now.modified_ns != opened->modified_ns ? "of its own" : "as before");
+    return STRL_OK;
+}
+
+strl_status strl_reader_rewind(strl_reader *reader, strl_error *err)
+{
+    strl_status status = strl__reader_check_unchanged(reader->file, &reader->opened, err);
+    if (!status && reader->format->check_unchanged)
+        status = reader->format->check_unchanged(reader, err);
+    if (status)
+        return status;
     reader->started = reader->ended = reader->failed = false;
     reader->drops = (strl_reader_drops){0};
     strl__batch_reset(&reader->batch);
     return STRL_OK;
+}
+
+void strl_reader_rest(strl_reader *reader)
+{
+    if (reader->vertices.count)
+        reader->listed_vertices = reader->vertices.count;
+    release_tables(reader);
+    strl__input_rest(&reader->input);
+    reader->prepared = reader->started = false;
+    reader->ended = true;
 }
 
 void strl_reader_drops_get(const strl_reader *reader, strl_reader_drops *drops)
@@ -253,9 +290,14 @@ void strl_reader_drops_get(const strl_reader *reader, strl_reader_drops *drops)
     *drops = reader->drops;
 }
 
+void strl_reader_costs_get(const strl_reader *reader, strl_reader_costs *costs)
+{
+    *costs = reader->costs;
+}
+
 uint64_t strl_reader_vertex_count(const strl_reader *reader)
 {
-    return reader->vertices.count;
+    return reader->listed_vertices ? reader->listed_vertices : reader->vertices.count;
 }
 
 uint32_t strl_reader_missing_count(const strl_reader *reader)
@@ -270,7 +312,10 @@ const char *strl_reader_missing(const strl_reader *reader, uint32_t index)
 
 uint64_t strl_reader_bytes_done(const strl_reader *reader)
 {
-    return reader->started ? strl__input_offset(&reader->input) : 0;
+    if (!reader->started)
+        return 0;
+    return reader->format->bytes_done ? reader->format->bytes_done(reader)
+                                      : strl__input_offset(&reader->input);
 }
 
 uint32_t strl_reader_part_count(const strl_reader *reader)

@@ -34,29 +34,54 @@ typedef struct strl_triangle {
     uint32_t flags;         /* STRL_TRIANGLE_HAS_... : for all three corners */
 } strl_triangle;
 
+/* What a child process may take that reads what Stroll does not read itself. Zero = defaults. */
+typedef struct strl_reader_child {
+    const char *importer;     /* its program; NULL = stroll-import beside the running program, or in its libexec folder */
+    uint64_t memory_bytes;    /* of address space, all in all; 0 = 1 GiB */
+    uint64_t cpu_seconds;     /* of processor time, and four times as much of any; 0 = by the size of the file */
+    bool (*go_on)(void *context); /* asked on the caller's thread, some times a second; false cancels; may be NULL */
+    void *context;
+} strl_reader_child;
+
 typedef struct strl_reader_desc {
     const char *path;         /* UTF-8; borrowed during the call of open */
     const char *scratch_dir;  /* an existing folder for spill files, which close removes; borrowed during open */
-    uint64_t memory_bytes;    /* budget of all the reader holds; 0 = 256 MiB; the least is 8 MiB */
+    uint64_t memory_bytes;    /* budget of all the reader holds but names; 0 = 256 MiB; the least is 8 MiB */
+    uint64_t names_bytes;     /* budget of the names of parts; those of materials have half as much; 0 = an eighth of memory_bytes */
+    strl_reader_child child;  /* borrowed during open: the child has ended before open returns */
 } strl_reader_desc;
 
 typedef enum strl_axis { STRL_AXIS_X, STRL_AXIS_Y, STRL_AXIS_Z } strl_axis;
 
 /* Facts known at opening. */
 typedef struct strl_reader_info {
-    const char *format;       /* "ply", "stl", "obj"; static */
-    strl_axis default_up;     /* y for OBJ, z for PLY and STL */
+    const char *format;       /* "ply", "stl", "obj", "gltf", "glb", "assimp" (all others); static */
+    strl_axis default_up;     /* y for OBJ and glTF, z for PLY and STL; what assimp makes of the others, mostly y */
+    const char *default_unit; /* "m" for glTF, what assimp tells of FBX, COLLADA and IFC; NULL = unknown; static */
     uint64_t triangles_hint;  /* a guess for progress bars (faces announced, or from the file's size); 0 = unknown */
-    uint64_t file_bytes;
+    bool hint_is_exact;       /* no more triangles than that will be read (glTF: all placements, checked); it may be
+                                 far more than the file has bytes */
+    uint64_t file_bytes;      /* with the files that hold what this one names (glTF's buffers) */
 } strl_reader_info;
 
-/* Recognises the format by content, then by name. Fails with one sentence that names file, place, expected and found. */
+/* What a file took beyond the memory budget. */
+typedef struct strl_reader_costs {
+    uint64_t scratch_bytes;  /* of the stream that a child wrote, until close */
+    uint64_t child_rss_bytes; /* peak resident set of the child and of this process meanwhile, together; 0 = no child */
+} strl_reader_costs;
+
+/* Recognises the format by content, then by name; what Stroll does not read itself goes to a child process that links
+ * assimp, which is run during open. Fails with one sentence that names file, place, expected and found. */
 strl_status strl_reader_open(const strl_reader_desc *desc, strl_reader **reader, strl_error *err);
 void strl_reader_info_get(const strl_reader *reader, strl_reader_info *info);
 /* Up to `capacity` next triangles into `triangles`; *count 0 = the end. A broken file fails here: nothing after is read. */
 strl_status strl_reader_next(strl_reader *reader, strl_triangle *triangles, size_t capacity, size_t *count, strl_error *err);
-/* Back to the first triangle. Fails where the file has changed (size or time of change). */
+/* Back to the first triangle. Fails where the file, or a buffer's file beside it, has changed (size or time of
+ * change). */
 strl_status strl_reader_rewind(strl_reader *reader, strl_error *err);
+/* Gives back what reading takes, tables and windows, until rewind: of many files that are open one is read. Facts, drops and
+ * names stay; next gives nothing. */
+void strl_reader_rest(strl_reader *reader);
 /* Of the pass so far; complete after the end was reached. */
 void strl_reader_drops_get(const strl_reader *reader, strl_reader_drops *drops);
 /* Vertices that the file lists, used or not, after the first call of next; 0 where the format has no such list (STL). */
@@ -68,7 +93,10 @@ const char *strl_reader_missing(const strl_reader *reader, uint32_t index);
 /* Bytes of the file consumed so far in this pass, for progress. */
 uint64_t strl_reader_bytes_done(const strl_reader *reader);
 
-/* Parts (OBJ o/g, STL solids; a file without any has one, unnamed) and materials (one default, white, where absent) as
+void strl_reader_costs_get(const strl_reader *reader, strl_reader_costs *costs);
+
+/* Parts (OBJ o/g, STL solids, glTF nodes with a mesh, of foreign formats the path of node names; a file without any has one,
+ * unnamed) and materials (one default, white, where absent) as
  * known after a whole pass; indices are stable over passes. Names are borrowed UTF-8 until close. */
 uint32_t strl_reader_part_count(const strl_reader *reader);
 const char *strl_reader_part_name(const strl_reader *reader, uint32_t part);

@@ -285,6 +285,7 @@ const strl__format strl__format_stl = {
     .name = "stl",
     .default_up = STRL_AXIS_Z,
     .state_bytes = sizeof(stl_state),
+    .weak = true,
     .recognises = stl_recognises,
     .open = stl_open,
     .prepare = stl_prepare,

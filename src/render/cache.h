@@ -19,6 +19,8 @@ typedef struct strl_cache_entry {
     uint64_t batch;      /* the backend's: the batch of draws that uses it last */
     uint64_t bytes;
     bool translucent;    /* some vertex has alpha below 255 */
+    uint64_t styles_version;     /* of the uploaded vertices */
+    bool styled, hides, hidden;  /* as uploaded: some vertex is not plain; some, all vertices are hidden */
     bool lines;          /* indices are expanded to lines */
     union {
         struct { uint32_t slab, vertex_at, vertex_granules, index_at, index_granules; } range; /* gl45 */

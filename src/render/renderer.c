@@ -93,6 +93,9 @@ static void complete_options(strl_draw_options *options)
         up[0] = up[1] = 0, up[2] = length = 1;
     for (int i = 0; i < 3; i++)
         up[i] /= length;
+    for (int i = 0; i < 4; i++)
+        if (!isfinite(options->section[i]))
+            memset(options->section, 0, sizeof options->section);
 }
 
 strl_status strl_renderer_draw(strl_renderer *renderer, const strl_camera *camera, const strl_draw_list *list,

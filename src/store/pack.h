@@ -4,6 +4,8 @@
 #ifndef STRL_STORE_PACK_H
 #define STRL_STORE_PACK_H
 
+#include <string.h>
+
 #include "base/cursor.h"
 
 /* What is expected of numbers of one kind. Zero-initialise, or say how many bits the first ones may have. */
@@ -141,7 +143,99 @@ static inline uint32_t strl_unpack(strl_unpacker *unpacker, strl_pack_model *mod
     return value;
 }
 
+/* A number that is mostly the same as another, which both sides know. */
+typedef struct strl_pack_same {
+    strl_pack_model differs, step;
+} strl_pack_same;
+
+static inline void strl_pack_beside(strl_packer *packer, strl_pack_same *model, uint32_t value, uint32_t guide)
+{
+    strl_pack(packer, &model->differs, value != guide);
+    if (value != guide)
+        strl_pack(packer, &model->step, strl_pack_zigzag(value - guide));
+}
+
+static inline uint32_t strl_unpack_beside(strl_unpacker *unpacker, strl_pack_same *model, uint32_t guide)
+{
+    return strl_unpack(unpacker, &model->differs) ? guide + strl_unpack_zigzag(strl_unpack(unpacker, &model->step)) : guide;
+}
+
+/* A colour, four bytes, that is mostly the same as another. */
+typedef struct strl_pack_rgba {
+    strl_pack_model differs, channel[4];
+} strl_pack_rgba;
+
+static inline void strl_pack_colour(strl_packer *packer, strl_pack_rgba *model, uint32_t colour, uint32_t guide)
+{
+    strl_pack(packer, &model->differs, colour != guide);
+    for (unsigned c = 0; c < 32 && colour != guide; c += 8)
+        strl_pack(packer, &model->channel[c / 8], strl_pack_zigzag((colour >> c & 255) - (guide >> c & 255)));
+}
+
+static inline uint32_t strl_unpack_colour(strl_unpacker *unpacker, strl_pack_rgba *model, uint32_t guide)
+{
+    uint32_t colour = 0;
+    if (!strl_unpack(unpacker, &model->differs))
+        return guide;
+    for (unsigned c = 0; c < 32; c += 8)
+        colour |= (((guide >> c) + strl_unpack_zigzag(strl_unpack(unpacker, &model->channel[c / 8]))) & 255) << c;
+    return colour;
+}
+
+/* A corner of a triangle: most often the first vertex that no corner named yet, *next, or one named lately. */
+static inline void strl_pack_corner(strl_packer *packer, strl_pack_model *model, uint32_t corner, uint32_t *next)
+{
+    strl_pack(packer, model, strl_pack_zigzag(*next - corner));
+    *next = corner >= *next ? corner + 1 : *next;
+}
+
+static inline uint32_t strl_unpack_corner(strl_unpacker *unpacker, strl_pack_model *model, uint32_t *next)
+{
+    uint32_t corner = *next - strl_unpack_zigzag(strl_unpack(unpacker, model));
+    *next = corner >= *next ? corner + 1 : *next;
+    return corner;
+}
+
 #define STRL_PACK_LENGTHS 33u /* of 32-bit numbers */
+
+/* One component of normals, as steps; the length of one says what to expect of the next. */
+typedef struct strl_pack_steps {
+    strl_pack_model model[STRL_PACK_LENGTHS];
+    unsigned length; /* of the last one */
+} strl_pack_steps;
+
+static inline void strl_pack_step(strl_packer *packer, strl_pack_steps *steps, uint32_t value, uint32_t guide)
+{
+    uint32_t step = strl_pack_zigzag(value - guide);
+    strl_pack(packer, &steps->model[steps->length], step);
+    steps->length = strl_pack_length(step);
+}
+
+static inline uint32_t strl_unpack_step(strl_unpacker *unpacker, strl_pack_steps *steps, uint32_t guide)
+{
+    uint32_t step = strl_unpack(unpacker, &steps->model[steps->length]);
+    steps->length = strl_pack_length(step);
+    return guide + strl_unpack_zigzag(step);
+}
+
+/* Floats that mostly repeat the one before. */
+static inline void strl_pack_floats(strl_packer *packer, strl_pack_same *model, const float *values, size_t count)
+{
+    uint32_t last = 0, bits;
+    for (size_t i = 0; i < count; i++, last = bits) {
+        memcpy(&bits, &values[i], sizeof bits);
+        strl_pack_beside(packer, model, bits, last);
+    }
+}
+
+static inline void strl_unpack_floats(strl_unpacker *unpacker, strl_pack_same *model, float *values, size_t count)
+{
+    uint32_t bits = 0;
+    for (size_t i = 0; i < count; i++) {
+        bits = strl_unpack_beside(unpacker, model, bits);
+        memcpy(&values[i], &bits, sizeof bits);
+    }
+}
 
 /* Lattice positions, as steps from one to the next. The steps are of one length mostly, or short and
  * long in turn: the lengths of the last two say what to expect of x, x what to expect of y, and both

@@ -66,6 +66,8 @@ strl_status strl__v_cut_surface_init(strl__cut_surface *cut, strl__model *model,
     double(*box)[2][3] = node_boxes(tree, cut->nodes, count);
     if (!box)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a cut of %u nodes", count);
+    for (uint32_t i = 0; i < count; i++)
+        cut->surface.most_claimed = fmax(cut->surface.most_claimed, (double)tree->nodes[cut->nodes[i]].geometric_max);
     cut->surface.load = load_node;
     cut->surface.context = cut;
     return strl__v_surface_init(&cut->surface, count, box, err);

@@ -38,6 +38,10 @@ static void worst_of(const strl__measured *results, uint32_t count, strl__measur
             total->most = results[i].most;
             memcpy(total->worst, results[i].worst, sizeof total->worst);
         }
+        if (results[i].excess > total->excess) {
+            total->excess = results[i].excess;
+            memcpy(total->most_excessive, results[i].most_excessive, sizeof total->most_excessive);
+        }
     }
 }
 
@@ -53,6 +57,20 @@ static void check_most(comparison *self, uint64_t key, const char *name, const c
         p[k] = tree->origin[k] + tree->step * measured->worst[k];
     strl__v_flaw(self->model->checks, STRL_VERIFY_DISTANCES, key, "%s: %s at %g %g %g is %g, above the claim of %g",
                  name, direction, p[0], p[1], p[2], measured->most * tree->step, claimed * tree->step);
+}
+
+/* A point of the input is no farther from some node than that node claims, whatever others do. */
+static void check_excess(comparison *self, uint64_t key, const char *name, const strl__measured *from, double claimed)
+{
+    const strl__vtree *tree = self->tree;
+    double p[3];
+    if (from->excess <= claimed * 1e-9 + self->input->rounding)
+        return;
+    for (unsigned k = 0; k < 3; k++)
+        p[k] = tree->origin[k] + tree->step * from->most_excessive[k];
+    strl__v_flaw(self->model->checks, STRL_VERIFY_DISTANCES, key,
+                 "%s: the input's point at %g %g %g is farther from every node than it claims, by %g at least", name, p[0],
+                 p[1], p[2], from->excess * tree->step);
 }
 
 /* Each node's own claim, towards the input. */
@@ -104,6 +122,7 @@ static strl_status compare(comparison *self, uint64_t key, const char *name, str
     worst_of(self->of_cut, cut->surface.count, &to);
     fill_in(self, cut, &from, &to, out);
     check_most(self, key, name, "the distance of the input's point", &from, to.claimed);
+    check_excess(self, key, name, &from, to.claimed);
     check_most(self, key, name, "the distance from the input", &to, to.claimed);
     check_nodes(self, key, name, cut);
     return STRL_OK;

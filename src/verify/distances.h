@@ -30,6 +30,8 @@ void strl__v_cut_surface_deinit(strl__cut_surface *cut);
 typedef struct strl__measured {
     double most, sum; /* lattice units; squared, summed */
     double worst[3];  /* where the largest was */
+    double excess;    /* the largest excess over what the nearest chunks claim; at least 0 */
+    double most_excessive[3];
     double claimed;   /* of the chunk */
     uint64_t points;
 } strl__measured;

@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "platform/thread.h"
 #include "readers/reader.h"
 
 #define READ_BATCH 4096u
@@ -13,6 +14,8 @@
 /* Memory of one triangle while its slice is cut into chunks: corners, box, order, and what building a chunk takes. */
 #define SLICE_TRIANGLE_BYTES 160u
 #define LATTICE_LIMIT 0x1p62
+/* What this process may grow by while a child reads for it. */
+#define CHILD_RESERVE_BYTES (8u << 20)
 
 /* ---- reading ---- */
 
@@ -78,11 +81,28 @@ static strl_status read_all(reading *self, strl_reader *reader, strl_error *err)
     return status;
 }
 
+static bool go_on(void *context)
+{
+    return strl__v_report(context, "read input", 0, 0, NULL) == STRL_OK;
+}
+
+/* What is left of the budget for a child that reads a foreign format while this process waits. */
+static uint64_t child_bytes(const strl__model *model)
+{
+    const uint64_t held = strl_process_rss_bytes() + CHILD_RESERVE_BYTES;
+    return model->memory_bytes > held ? model->memory_bytes - held : CHILD_RESERVE_BYTES;
+}
+
 static strl_status read_input(reading *self, const char *path, strl_error *err)
 {
     strl__model *model = self->model;
-    const strl_reader_desc desc = {
-        .path = path, .scratch_dir = model->desc->scratch_dir, .memory_bytes = model->memory_bytes / 4};
+    const strl_reader_desc desc = {.path = path,
+                                   .scratch_dir = model->desc->scratch_dir,
+                                   .memory_bytes = model->memory_bytes / 4,
+                                   .child = {.importer = model->desc->importer,
+                                             .memory_bytes = child_bytes(model),
+                                             .go_on = go_on,
+                                             .context = model}};
     strl_reader *reader = NULL;
     strl_status status = strl_reader_open(&desc, &reader, err);
     if (status == STRL_OK)

@@ -22,6 +22,14 @@ static void take_point(strl__seeker *seeker, const strl__chunk *chunk, const dou
         result->most = distance;
         memcpy(result->worst, p, sizeof p);
     }
+    double excess = distance - strl__v_seeker_claimed(seeker);
+    if (!(seeker->surface->most_claimed > 0) || excess <= result->excess)
+        return;
+    excess = strl__v_seeker_excess(seeker, p, excess);
+    if (excess > result->excess) {
+        result->excess = excess;
+        memcpy(result->most_excessive, p, sizeof p);
+    }
 }
 
 static double triangle_area(const strl__chunk *chunk, uint32_t t)

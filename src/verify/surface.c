@@ -259,6 +259,49 @@ static double first_bound(const strl__seeker *seeker, const double p[3])
     return chunk_triangle_distance2(chunk, seeker->last_triangle, q);
 }
 
+double strl__v_seeker_claimed(const strl__seeker *seeker)
+{
+    return seeker->last_place == NONE ? 0 : seeker->chunk[seeker->last_place]->claimed;
+}
+
+/* The claim of a chunk is known once it is pinned: before, the largest of all stands for it. */
+static double excess_at(strl__seeker *seeker, uint32_t index, const double p[3], double best)
+{
+    double reach = best + seeker->surface->most_claimed;
+    if (box_distance2(seeker->surface->box[index], p) >= reach * reach)
+        return best;
+    uint32_t place = pinned_place(seeker, index), triangle = NONE;
+    if (place == NONE)
+        return best;
+    const strl__chunk *chunk = seeker->chunk[place];
+    const double q[3] = {p[0] - chunk->base[0], p[1] - chunk->base[1], p[2] - chunk->base[2]};
+    reach = best + chunk->claimed;
+    double found = search_chunk(chunk, q, reach * reach, &triangle);
+    return triangle == NONE ? best : sqrt(found) - chunk->claimed;
+}
+
+double strl__v_seeker_excess(strl__seeker *seeker, const double p[3], double best)
+{
+    const strl__surface *surface = seeker->surface;
+    const double q[3] = {p[0] - surface->base[0], p[1] - surface->base[1], p[2] - surface->base[2]};
+    uint32_t stack[STRL__BVH_STACK];
+    unsigned top = 0;
+    stack[top++] = 0;
+    while (top && seeker->status == STRL_OK && surface->count && best > 0) {
+        const strl__bvh_node *node = &surface->nodes[stack[--top]];
+        double reach = best + surface->most_claimed;
+        if (strl__bvh_distance2(node, q) >= reach * reach)
+            continue;
+        for (uint32_t i = node->first; i < node->first + node->count && best > 0; i++)
+            best = excess_at(seeker, surface->order[i], p, best);
+        if (node->count)
+            continue;
+        stack[top++] = node->first;
+        stack[top++] = node->first + 1;
+    }
+    return best;
+}
+
 double strl__v_seeker_distance2(strl__seeker *seeker, const double p[3])
 {
     const strl__surface *surface = seeker->surface;

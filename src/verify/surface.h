@@ -41,6 +41,7 @@ typedef struct strl__surface {
     uint32_t count;
     double (*box)[2][3];   /* [count] encloses the chunk; owned */
     double base[3];        /* of the tree of chunks */
+    double most_claimed;   /* no chunk claims more; 0 for the input */
     strl__bvh_node *nodes; /* over chunks, owned */
     uint32_t *order;       /* [count] chunks in the order of its leaves, owned */
     /* Makes chunk `index`; worker is the thread's slot in the pool. */
@@ -80,6 +81,12 @@ void strl__v_seeker_init(strl__seeker *seeker, strl__surface *surface, unsigned 
 void strl__v_seeker_deinit(strl__seeker *seeker);
 /* Squared distance of p from the surface. Exact up to rounding. */
 double strl__v_seeker_distance2(strl__seeker *seeker, const double p[3]);
+
+/* By how much p is farther from the surface than claimed: the least, over all chunks, of the distance from a chunk less its own
+ * claim. found: an upper bound of that. */
+double strl__v_seeker_excess(strl__seeker *seeker, const double p[3], double found);
+/* The claim of the chunk that was found last. */
+double strl__v_seeker_claimed(const strl__seeker *seeker);
 
 /* Squared distance of p from a triangle, which may be degenerate. */
 double strl__v_triangle_distance2(const double p[3], const double a[3], const double b[3], const double c[3]);

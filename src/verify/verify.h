@@ -63,6 +63,7 @@ typedef struct strl_verify_desc {
     const char *const *inputs; /* what the model was built from, in the same order */
     uint32_t input_count;      /* 0 = the container alone is checked */
     const char *scratch_dir;   /* an existing folder, for files without names; needed with inputs */
+    const char *importer;      /* the program that reads foreign formats (readers/reader.h); NULL = as installed */
     uint64_t memory_bytes;     /* 0 = 1 GiB; least STRL_VERIFY_LEAST_MEMORY */
     unsigned jobs;             /* threads that work; 0 = one per processor */
     uint32_t cuts;             /* view-dependent cuts per tree; 0 = 200 */

@@ -26,6 +26,7 @@ static strl_draw_item make_item(const strl_walk *walk, const strl__active *activ
         .state = mesh->state,
         .visible = active->sight.seen,
         .vertices = mesh->vertices,
+        .labels = mesh->labels,
         .vertex_count = mesh->vertex_count,
         .indices = mesh->indices,
         .index_count = 3 * mesh->triangle_end[mesh->state],

@@ -71,7 +71,7 @@ static uint64_t new_bytes(const strl_walk *walk)
     uint64_t bytes = 0;
     for (size_t i = 0; i < walk->children.count; i++)
         if (walk->children.items[i]->counted_pass != walk->pass)
-            bytes += strl_node_decoded_bytes(walk->children.items[i]->record);
+            bytes += strl__node_bytes(walk->children.items[i]->record, walk->labels);
     return bytes;
 }
 

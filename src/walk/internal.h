@@ -32,7 +32,7 @@ typedef struct strl__retry {
     uint64_t frame;    /* not before this frame */
 } strl__retry;
 
-/* A decoded node: one block of at most strl_node_decoded_bytes, which `vertices` begins. indices[k]
+/* A decoded node: one block of at most strl__node_bytes, which `vertices` begins. indices[k]
  * = resolve(corner k, state) for all corners, also those of triangles that the state does not have
  * yet. The corners that a vertex v >= base_vertices moves (those in its subtree of the parent
  * forest) are corners[moved_first[v - base] ...], moved_count of them. */
@@ -47,6 +47,7 @@ typedef struct strl__mesh {
     uint16_t *parents;                   /* [vertex_count - base_vertices] */
     uint16_t *indices;                   /* [3 * triangle_count] */
     uint16_t (*finest)[3];               /* [triangle_count], corners of the finest state; NULL at leaves */
+    strl_vertex_label *labels;           /* [vertex_count]; NULL where the walk keeps none */
 } strl__mesh;
 
 typedef struct strl__node {
@@ -117,6 +118,7 @@ typedef struct strl__job {
     atomic_int phase;
     strl__page *page;
     strl_node record;
+    bool labels;      /* wanted */
     strl__node *node; /* the walk's thread only */
     bool is_waiting;  /* for the node by which it is decoded; the walk's thread only */
     strl_payload_reference reference; /* that node's mesh, which stays as long as the job may run */
@@ -248,6 +250,7 @@ struct strl_walk {
     strl_executor executor;    /* submit NULL: inline */
     uint64_t memory_bytes;
     double error_px;
+    bool labels; /* kept for each vertex */
     double bounds[6];
     strl__walk_tree *trees;
     uint32_t tree_count;
@@ -285,8 +288,10 @@ struct strl_walk {
 };
 
 /* mesh.c: thread-safe. */
+/* What a decoded node takes at most, known before anything is fetched. */
+uint64_t strl__node_bytes(const strl_node *record, bool labels);
 strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size,
-                              const strl_payload_reference *reference, strl__mesh *mesh, strl_error *err);
+                              const strl_payload_reference *reference, bool labels, strl__mesh *mesh, strl_error *err);
 /* The finest state of a node's mesh, for the payload of another node. */
 strl_payload_reference strl__mesh_reference(const strl__node *from, const strl_node *record);
 void strl__mesh_deinit(strl__mesh *mesh);

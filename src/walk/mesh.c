@@ -31,18 +31,31 @@ static void make_vertices(const strl_pm *pm, strl_vertex *vertices)
     }
 }
 
+static void make_labels(const strl_pm *pm, strl_vertex_label *labels)
+{
+    for (uint32_t v = 0; v < pm->vertex_count; v++) {
+        const strl_palette_entry *entry = &pm->palette[pm->palette_index ? pm->palette_index[v] : 0];
+        labels[v] = (strl_vertex_label){entry->part, entry->material};
+    }
+}
+
 /* ---- layout */
 
-static strl_status allocate(const strl_node *record, const strl_pm *pm, strl__mesh *mesh, strl_error *err)
+uint64_t strl__node_bytes(const strl_node *record, bool labels)
+{
+    return strl_node_decoded_bytes(record) + (labels ? record->vertex_count * sizeof(strl_vertex_label) : 0);
+}
+
+static strl_status allocate(const strl_node *record, const strl_pm *pm, bool labels, strl__mesh *mesh, strl_error *err)
 {
     size_t vertices = pm->vertex_count, added = vertices - pm->vertex_end[0], states = (size_t)pm->step_count + 1;
     size_t corners = 3 * (size_t)pm->triangle_count;
     size_t words = corners + 2 * added + 2 * states, halves = states + added + corners + (record->child_count ? corners : 0);
-    size_t bytes = vertices * sizeof(strl_vertex) + words * 4 + halves * 2;
-    if (bytes > strl_node_decoded_bytes(record))
+    size_t bytes = vertices * (sizeof(strl_vertex) + (labels ? sizeof(strl_vertex_label) : 0)) + words * 4 + halves * 2;
+    if (bytes > strl__node_bytes(record, labels))
         return strl__fail(err, STRL_ERR_INTERNAL,
                           "a decoded node takes %zu bytes, expected at most the %" PRIu64 " reserved for it", bytes,
-                          strl_node_decoded_bytes(record));
+                          strl__node_bytes(record, labels));
     uint8_t *block = strl__alloc(1, bytes);
     if (!block)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %" PRIu32 " vertices", pm->vertex_count);
@@ -52,7 +65,8 @@ static strl_status allocate(const strl_node *record, const strl_pm *pm, strl__me
                          .step_count = pm->step_count};
     /* Four-byte arrays come first, so that all are aligned. */
     mesh->vertices = (strl_vertex *)block;
-    mesh->corners = (uint32_t *)(mesh->vertices + vertices);
+    mesh->labels = labels ? (strl_vertex_label *)(mesh->vertices + vertices) : NULL;
+    mesh->corners = labels ? (uint32_t *)(mesh->labels + vertices) : (uint32_t *)(mesh->vertices + vertices);
     mesh->moved_first = mesh->corners + corners;
     mesh->moved_count = mesh->moved_first + added;
     mesh->triangle_end = mesh->moved_count + added;
@@ -144,7 +158,7 @@ strl_payload_reference strl__mesh_reference(const strl__node *from, const strl_n
 }
 
 strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size,
-                              const strl_payload_reference *reference, strl__mesh *mesh, strl_error *err)
+                              const strl_payload_reference *reference, bool labels, strl__mesh *mesh, strl_error *err)
 {
     strl_arena arena;
     strl_pm pm;
@@ -152,12 +166,14 @@ strl_status strl__mesh_create(const strl_node *record, const void *page, size_t 
     strl_arena_init(&arena, SCRATCH_BYTES);
     strl_status status = strl_page_mesh(record, page, size, reference, &arena, &pm, err);
     if (status == STRL_OK)
-        status = allocate(record, &pm, mesh, err);
+        status = allocate(record, &pm, labels, mesh, err);
     if (status == STRL_OK)
         status = find_moves(&pm, mesh, &arena, err);
     if (status == STRL_OK) {
         copy_states(&pm, mesh);
         make_vertices(&pm, mesh->vertices);
+        if (labels)
+            make_labels(&pm, mesh->labels);
         if (mesh->finest)
             memcpy(mesh->finest, pm.triangle, pm.triangle_count * sizeof *pm.triangle);
     } else {

@@ -38,7 +38,8 @@ static void run_job(void *context)
         return;
     }
     const strl_payload_reference *reference = job->record.decode_parent != STRL_NONE ? &job->reference : NULL;
-    job->status = strl__mesh_create(&job->record, job->page->data, job->page->size, reference, &job->mesh, &job->error);
+    job->status = strl__mesh_create(&job->record, job->page->data, job->page->size, reference, job->labels, &job->mesh,
+                                    &job->error);
     atomic_store_explicit(&job->phase, STRL__JOB_DONE, memory_order_release);
 }
 
@@ -172,6 +173,7 @@ static strl_status start_job(strl_walk *walk, strl__node *node, strl__page *page
     job->page = page;
     job->node = node;
     job->record = *node->record;
+    job->labels = walk->labels;
     strl_status status = submit_job(walk, job, err);
     if (status != STRL_OK) {
         destroy_job(job);
@@ -330,7 +332,7 @@ static bool ask_for_node(strl_walk *walk, const strl__candidate *candidate, uint
         return true;
     if (!strl__node_hold(walk, node))
         return true;
-    if (!strl__make_room(walk, strl_node_decoded_bytes(node->record), evict_before)) {
+    if (!strl__make_room(walk, strl__node_bytes(node->record, walk->labels), evict_before)) {
         strl__node_let_go(node);
         return false;
     }

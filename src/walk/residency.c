@@ -52,7 +52,7 @@ void strl__node_reserve(strl_walk *walk, strl__node *node)
 {
     node->residency = STRL__PENDING;
     node->treelet->pins++;
-    walk->resident_bytes += strl_node_decoded_bytes(node->record);
+    walk->resident_bytes += strl__node_bytes(node->record, walk->labels);
 }
 
 void strl__node_release(strl_walk *walk, strl__node *node)
@@ -61,7 +61,7 @@ void strl__node_release(strl_walk *walk, strl__node *node)
     node->residency = STRL__ABSENT;
     node->request = NULL;
     node->treelet->pins--;
-    walk->resident_bytes -= strl_node_decoded_bytes(node->record);
+    walk->resident_bytes -= strl__node_bytes(node->record, walk->labels);
 }
 
 void strl__node_install(strl_walk *walk, strl__node *node, const strl__mesh *mesh)

@@ -115,7 +115,7 @@ static strl_status load_root(strl_walk *walk, uint32_t tree, strl_error *err)
     if (status != STRL_OK)
         return status;
     strl__node *root = walk->trees[tree].root;
-    uint64_t bytes = strl_node_decoded_bytes(root->record);
+    uint64_t bytes = strl__node_bytes(root->record, walk->labels);
     if (!strl__make_room(walk, bytes, 0))
         return strl__fail(err, STRL_ERR_MEMORY,
                           "the root of tree %" PRIu32 " takes %" PRIu64
@@ -128,7 +128,7 @@ static strl_status load_root(strl_walk *walk, uint32_t tree, strl_error *err)
     if (status == STRL_OK)
         status = strl_page_check(page, data, page->bytes, err);
     if (status == STRL_OK)
-        status = strl__mesh_create(root->record, data, page->bytes, NULL, &mesh, err);
+        status = strl__mesh_create(root->record, data, page->bytes, NULL, walk->labels, &mesh, err);
     if (status == STRL_OK)
         strl__node_install(walk, root, &mesh);
     strl__free(data);
@@ -175,6 +175,7 @@ static void apply_desc(strl_walk *walk, const strl_walk_desc *desc)
         walk->requests_in_flight = STRL__MAX_REQUESTS;
     if (desc->executor)
         walk->executor = *desc->executor;
+    walk->labels = desc->labels;
     strl_walk_set_error_px(walk, desc->error_px);
     walk->stats.allowed_error_px = walk->error_px;
 }

@@ -6,6 +6,9 @@ import subprocess
 import sys
 
 root = pathlib.Path(os.environ.get("STRL_TEST_ROOT", pathlib.Path(__file__).resolve().parents[2]))
-most = "20000" if b"__asan_init" in pathlib.Path(sys.argv[1]).read_bytes() else "500000"
+sys.path.insert(0, str(root / "tests" / "support"))
+import sanitized
+
+most = "20000" if sanitized.sanitizers(sys.argv[1]) else "500000"
 command = [sys.executable, root / "bench" / "counts.py", "--stroll", sys.argv[1], "--most", most]
 sys.exit(subprocess.run(command).returncode)

@@ -10,29 +10,24 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(os.environ.get("STRL_TEST_ROOT", pathlib.Path(__file__).resolve().parents[2]))
-sys.path.insert(0, str(ROOT / "bench"))
+sys.path[:0] = [str(ROOT / "bench"), str(ROOT / "tests" / "support")]
 sys.dont_write_bytecode = True
 import measure
 import must_show
+import sanitized
 import sheets
 import tables
 
 MODELS = ("isosurface_3k", "isosurface_6k")
 ONE_EACH = ("build", "images_orbit", "images_flythrough", "psnr_orbit", "psnr_flythrough", "verify", "backends",
-            "rate", "bytes", "sizes", "dependencies", "walk", "scale", "shapes", "cap", "walk_cold")
-
-
-def is_sanitized(program):
-    """Sanitizers reserve address space by the terabyte, which no limit allows."""
-    content = pathlib.Path(program).read_bytes()
-    return any(name in content for name in (b"__asan_init", b"__tsan_init"))
+            "rate", "bytes", "sizes", "dependencies", "walk", "scale", "shapes", "cap", "walk_cold", "claims", "decode", "kills")
 
 
 class Test:
     def __init__(self, program, folder):
         self.program, self.folder, self.failures = program, folder, 0
-        self.data, self.log, self.docs, self.counts = (
-            folder / name for name in ("data", "log.jsonl", "docs.md", "counts.csv"))
+        self.data, self.log, self.docs, self.counts, self.errors = (
+            folder / name for name in ("data", "log.jsonl", "docs.md", "counts.csv", "errors.csv"))
         self.data.mkdir()
         self.docs.write_text(f"before\n{tables.BEGIN}\nSTALE\n{tables.END}\nafter\n")
         self.counts.write_text("model,triangles,seed,triangles_in,triangles_leaf,nodes,levels,root_triangles,"
@@ -47,7 +42,7 @@ class Test:
     def must_show(self, *words, models=MODELS):
         command = [sys.executable, "-B", ROOT / "bench" / "must_show.py", "--data", self.data, "--stroll", self.program,
                    "--scratch", self.folder / "scratch", "--log", self.log, "--docs", self.docs,
-                   "--counts", self.counts, "--models", ",".join(models), "--frames", 2, "--size", "160x90", "--pairs", 1,
+                   "--counts", self.counts, "--errors", self.errors, "--kills", 2, "--models", ",".join(models), "--frames", 2, "--size", "160x90", "--pairs", 1,
                    "--runs", 1, *words]
         return subprocess.run([str(word) for word in command], capture_output=True, text=True)
 
@@ -99,6 +94,10 @@ class Test:
             cells = [cell.strip() for row in rows for cell in row.strip("|").split("|")]
             self.check(f"no figure of \"{title}\" is missing", len(rows) > 1 and "-" not in cells and "" not in cells,
                        rows)
+        levels = self.errors.read_text().splitlines()
+        self.check("errors of all levels are written", levels[0].endswith(",claimed_over_measured") and
+                   all(float(line.split(",")[3]) >= 1 for line in levels[1:]) and
+                   sum(line.startswith(MODELS[1] + ",certified,") for line in levels) >= 2, levels)
         counted = [line.split(",")[0] for line in self.counts.read_text().splitlines()[1:]]
         self.check("counts are written", counted == ["isosurface", "isosurface", "plane"], counted)
 
@@ -164,7 +163,7 @@ class Test:
 
 def main():
     program = os.path.abspath(sys.argv[1])
-    if is_sanitized(program):
+    if sanitized.sanitizers(program):  # they reserve address space by the terabyte, which no limit allows
         print("skipped: what it asks of the program, other tests ask too")
         return 77
     with tempfile.TemporaryDirectory() as folder:

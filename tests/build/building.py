@@ -12,6 +12,9 @@ import threading
 import time
 import traceback
 
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import sanitized
+
 STROLL = os.path.abspath(sys.argv[1]) if len(sys.argv) > 1 else None
 MIB = 1 << 20
 SKIP = 77
@@ -23,10 +26,7 @@ def skip(why):
 
 
 def sanitizers():
-    """Which sanitizers the program was built with: they change memory and time, not behaviour."""
-    with open(STROLL, "rb") as file:
-        program = file.read()
-    return [name for name in ("asan", "tsan") if b"__" + name.encode() + b"_init" in program]
+    return sanitized.sanitizers(STROLL)
 
 
 class Done:

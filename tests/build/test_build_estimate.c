@@ -31,7 +31,14 @@ static void ask_shares(double shares[STAGES])
         shares[i] = estimate.share - before;
     }
     assert_true(fabs(estimate.share - 1) < 1e-9);
-    assert_int_equal(estimate.stage_index, STRL_STAGE_COUNT);
+    assert_int_equal(estimate.stage_index, STRL_BUILD_STAGES);
+}
+
+static void ask_seconds(double seconds[STAGES], double total)
+{
+    ask_shares(seconds);
+    for (int i = 0; i < STAGES; i++)
+        seconds[i] *= total;
 }
 
 /* A build whose stages take `seconds`. check is called at each step with the truth. */
@@ -69,9 +76,7 @@ static void usual_shares_tell_the_time_left(void **state)
     (void)state;
     double seconds[STAGES];
     strl_estimate estimate;
-    ask_shares(seconds);
-    for (int i = 0; i < STAGES; i++)
-        seconds[i] *= 1000;
+    ask_seconds(seconds, 1000);
     simulate(&estimate, 0, seconds, 1000, near_the_truth);
     assert_true(fabs(strl__estimate_rate(&estimate, 5000000) - 5000) < 1);
 }
@@ -89,9 +94,7 @@ static void a_wrong_guess_is_forgotten(void **state)
     (void)state;
     double seconds[STAGES];
     strl_estimate estimate;
-    ask_shares(seconds);
-    for (int i = 0; i < STAGES; i++)
-        seconds[i] *= 1000;
+    ask_seconds(seconds, 1000);
     simulate(&estimate, 0, seconds, 100, soon_near_the_truth);
 }
 
@@ -108,9 +111,9 @@ static void a_slow_stage_is_soon_believed(void **state)
     (void)state;
     double seconds[STAGES];
     strl_estimate estimate;
-    ask_shares(seconds);
-    for (int i = 0; i < STAGES; i++)
-        seconds[i] *= i == 6 || i == 7 ? 4000 : 1000;
+    ask_seconds(seconds, 1000);
+    for (int i = 6; i < 8; i++)
+        seconds[i] *= 4;
     simulate(&estimate, 0, seconds, 1000, half_believed);
 }
 
@@ -119,11 +122,9 @@ static void a_resumed_build_counts_from_where_it_began(void **state)
     (void)state;
     double seconds[STAGES], share = 0;
     strl_estimate estimate;
-    ask_shares(seconds);
-    for (int i = 0; i < STAGES; i++) {
-        share += i < 7 ? seconds[i] : 0;
-        seconds[i] *= 1000;
-    }
+    ask_seconds(seconds, 1000);
+    for (int i = 0; i < 7; i++)
+        share += seconds[i] / 1000;
     simulate(&estimate, 7, seconds, 1000, near_the_truth);
     assert_true(fabs(estimate.first_share - share) < 1e-9);
     assert_true(fabs(strl__estimate_rate(&estimate, 5000000) - 5000) < 1);
@@ -154,8 +155,9 @@ static void without_anything_known_nothing_is_said(void **state)
     assert_true(estimate.seconds_left == 0 && strl__estimate_rate(&estimate, 1000) == 0);
     strl__estimate_update(&estimate, 0, 0, 7);
     assert_true(estimate.seconds_left == 0 && estimate.share == 0);
-    assert_true(strl__estimate_seconds(1000000, 0) == strl__estimate_seconds(1000000, 1));
-    assert_true(strl__estimate_seconds(1000000, 2) < strl__estimate_seconds(1000000, 1));
+    assert_true(strl__estimate_seconds(1000000, 0, false) == strl__estimate_seconds(1000000, 1, false));
+    assert_true(strl__estimate_seconds(1000000, 2, false) < strl__estimate_seconds(1000000, 1, false));
+    assert_true(strl__estimate_seconds(1000000, 1, true) > strl__estimate_seconds(1000000, 1, false));
 }
 
 static void more_triangles_need_more_memory(void **state)

@@ -1,15 +1,17 @@
 #!/usr/bin/env python3
-"""Every nasty PLY, STL and OBJ is built, with what was dropped counted, or refused with one sentence: soon, in little
-memory, without a signal, and with nothing left behind."""
+"""Every nasty PLY, STL, OBJ and glTF, and where the importer is there every file of a foreign format, is built, with what was
+dropped counted, or refused with one sentence: soon, in little memory, without a signal, and with nothing left behind."""
 import json
 import os
 import sys
 import tempfile
 
-from building import MIB, data_folder, models, run, sanitizers, skip, unpack
+from building import MIB, STROLL, data_folder, models, run, sanitizers, skip, unpack
 
 MOST_SECONDS = 20 * (6 if sanitizers() else 1)
 MOST_BYTES = 300 * MIB
+OURS = (".ply", ".stl", ".obj", ".gltf", ".glb")
+FOREIGN = (".3ds", ".3mf", ".ase", ".dae", ".dxf", ".lwo", ".md5mesh", ".off", ".raw", ".smd", ".step", ".x", ".zae")
 
 
 def problem_of(path, folder):
@@ -38,6 +40,13 @@ def problem_of(path, folder):
     return (None if left == [] else f"left {left}: {done}"), False
 
 
+def has_importer():
+    found = os.path.exists(os.path.join(os.path.dirname(STROLL), "stroll-import"))
+    if not found:
+        print("no foreign formats: stroll-import was not built")
+    return found
+
+
 def main():
     archive = os.path.join(data_folder(), "nasty.tar.zst")
     if not os.path.exists(archive):
@@ -45,7 +54,7 @@ def main():
     problems, built, refused = [], 0, 0
     with tempfile.TemporaryDirectory() as archive_folder, tempfile.TemporaryDirectory() as work:
         unpack(archive, archive_folder)
-        paths = models(archive_folder, (".ply", ".stl", ".obj"))
+        paths = models(archive_folder, OURS + (FOREIGN if has_importer() else ()))
         assert len(paths) > 100, f"only {len(paths)} files in {archive}"
         for path in paths:
             problem, was_built = problem_of(path, work)

@@ -157,6 +157,12 @@ def scratch_elsewhere_is_found_again_and_removed(folder):
     scene.stopped(folder=elsewhere, more=("--scratch", elsewhere))
     assert os.listdir(elsewhere) == ["out.stroll.tmp"]
     scene.resume("--scratch", elsewhere)
+    scene.stopped(folder=elsewhere, more=("--scratch", elsewhere), when="order-01.spill")
+    left = os.path.join(folder, "out.stroll.tmp")  # no other name may stay beside the output
+    assert sorted(os.listdir(folder)) == ["elsewhere", "in.ply", "out.stroll.tmp"], os.listdir(folder)
+    assert any(name.endswith(".part") for name in os.listdir(left)), os.listdir(left)
+    scene.resume("--scratch", elsewhere)
+    assert os.listdir(folder) == ["in.ply"], os.listdir(folder)
 
 
 def on_a_full_disk_it_waits_for_room(folder):

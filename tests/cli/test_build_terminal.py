@@ -12,13 +12,15 @@ import sys
 import tempfile
 import termios
 
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import sanitized
+
 STROLL = os.path.abspath(sys.argv[1])
 LINE = re.compile(r"(\d)/(\d) (\w[\w ]*?) +(?:\[[#-]+\] +)? *(\d+) %(?:  [\d.]+(?: [KMG])? triangles/s)?(?:  left [\d:]+)?"
                   r"  mem ([\d.]+[KMG])/1G  scratch ([\d.]+[KMG])")
-with open(STROLL, "rb") as program:
-    if b"__asan_init" in program.read():
-        print("skipped: what a person sees is the same without sanitizers")
-        sys.exit(77)
+if sanitized.sanitizers(STROLL):
+    print("skipped: what a person sees is the same without sanitizers")
+    sys.exit(77)
 failures = 0
 
 

@@ -14,11 +14,12 @@ import tempfile
 import time
 import traceback
 
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "support"))
+import sanitized
+
 STROLL = os.path.abspath(sys.argv[1])
 ROOT = os.geteuid() == 0
 PATIENCE_S = 600
-with open(STROLL, "rb") as program:
-    IS_SANITIZED = b"__asan_init" in program.read()
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
@@ -106,9 +107,7 @@ def what_is_no_place_for_a_file_is_refused_before_any_work(folder, writers):
             print("no right to make a device: not tested")
         before = every_file(place)
         for path, part in cases:
-            start = time.monotonic()
             assert_refused(run(*writer.long, path), part)
-            assert time.monotonic() - start < 5, f"{writer.name} worked before it refused {path}"
             assert every_file(place) == before, (writer.name, path, every_file(place))
 
 
@@ -465,7 +464,7 @@ def main():
     with tempfile.TemporaryDirectory(prefix="stroll-outputs-") as data:
         os.chmod(data, 0o755)
         writers = make_writers(data)
-        for test in FILES + (() if IS_SANITIZED else SIGNALLED):
+        for test in FILES + (() if sanitized.sanitizers(STROLL) else SIGNALLED):
             with tempfile.TemporaryDirectory(prefix="stroll-outputs-") as folder:
                 start = time.monotonic()
                 try:

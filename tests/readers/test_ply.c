@@ -559,10 +559,10 @@ static void facts_are_known_at_opening(void **state)
     assert_null(reader);
     assert_int_equal(open_test_file("missing.ply", 0, &reader, &err), STRL_ERR_IO);
     write_test_text("what.txt", "once upon a time\n");
-    assert_refused("what.txt", "expected a PLY, STL or OBJ file by its first bytes or its name's ending, "
-                               "found one that begins with 'once upon a time?'");
-    write_test_file("what.glb", "glTF\2\0\0\0", 8);
-    assert_refused("what.glb", "found one that begins with 'glTF");
+    assert_refused("what.txt", "expected a PLY, STL, OBJ or glTF file by its first bytes or its name's ending, "
+                               "or a name's ending that assimp knows, found one that begins with 'once upon a time?'");
+    write_test_file("what.bin", "RIFF\2\0\0\0", 8);
+    assert_refused("what.bin", "found one that begins with 'RIFF");
     write_test_text("empty.ply", "");
     assert_refused("empty.ply", "found an empty file");
 }

@@ -300,6 +300,86 @@ static void depth_is_the_distance_along_the_view(void **state)
     patches_deinit(&all);
 }
 
+/* Every backend cuts along the same plane, and only on the side of its normal. */
+static void a_section_cuts_what_lies_before_it(void **state)
+{
+    (void)state;
+    static picture whole, cut, other;
+    static const strl_renderer_desc others[] = {{.backend = STRL_BACKEND_GL3}, {.backend = STRL_BACKEND_GL3, .core_only = true},
+                                                {.backend = STRL_BACKEND_GL3, .gles = true}};
+    patches all;
+    patches_init(&all, (patches_desc){.side = 6, .flat = true});
+    double extent = 6 * PATCH_SIDE * 1000 * 0x1p-10;
+    strl_camera camera = {.eye = {extent / 2, extent / 2, 33}, .target = {extent / 2, extent / 2, 0}, .up = {0, 1, 0}, .fov_y_deg = 60,
+                          .width = WIDTH, .height = HEIGHT};
+    strl_draw_options options = {.section = {1, 0, 0, extent / 2}};
+    for (int orthographic = 0; orthographic < 2; orthographic++) {
+        camera.fov_y_deg = orthographic ? 0 : 60, camera.ortho_height = 40;
+        shoot_once((strl_renderer_desc){.backend = STRL_BACKEND_GL45}, &camera, &all.list, NULL, &whole);
+        shoot_once((strl_renderer_desc){.backend = STRL_BACKEND_GL45}, &camera, &all.list, &options, &cut);
+        assert_int_equal(count_covered(&whole), PIXELS);
+        for (size_t p = 0; p < PIXELS; p++)
+            assert_true(isinf(cut.depth[p]) == (p % WIDTH >= WIDTH / 2));
+        for (size_t o = 0; o < sizeof others / sizeof *others; o++) {
+            shoot_once(others[o], &camera, &all.list, &options, &other);
+            assert_true(count_different(&cut, &other, 3) <= (int)(PIXELS / 500));
+        }
+    }
+    /* The state is gone with the draw: the next one is whole, and a plane that is no number cuts nothing. */
+    strl_renderer *renderer = make((strl_renderer_desc){.backend = STRL_BACKEND_GL45});
+    shoot(renderer, &camera, &all.list, &options, &cut);
+    shoot(renderer, &camera, &all.list, NULL, &other);
+    assert_int_equal(count_covered(&other), PIXELS);
+    options.section[3] = NAN;
+    shoot(renderer, &camera, &all.list, &options, &other);
+    assert_int_equal(count_covered(&other), PIXELS);
+    strl_renderer_destroy(renderer);
+    patches_deinit(&all);
+}
+
+/* Patches are parts: 0 hidden, 1 marked, others plain; the part of a patch is its number modulo 3. */
+static void hidden_and_marked_parts_are_drawn_so_and_back(void **state)
+{
+    (void)state;
+    static picture plain, styled, again;
+    static strl_vertex_label labels[3][PATCH_VERTICES];
+    static const strl_renderer_desc descs[] = {{.backend = STRL_BACKEND_GL45}, {.backend = STRL_BACKEND_GL3},
+                                               {.backend = STRL_BACKEND_GL3, .gles = true}};
+    const uint8_t styles[] = {STRL_PART_HIDDEN, STRL_PART_MARKED};
+    patches all;
+    patches_init(&all, (patches_desc){.side = 3, .flat = true});
+    for (uint32_t part = 0; part < 3; part++)
+        for (int v = 0; v < PATCH_VERTICES; v++)
+            labels[part][v].part = part;
+    labels[2][PATCH_VERTICES - 1].part = 0; /* one corner of a plain patch is hidden */
+    for (uint32_t i = 0; i < all.count; i++)
+        all.items[i].labels = labels[i % 3];
+    strl_camera camera = patches_camera(&all, WIDTH, HEIGHT, 0.6);
+    strl_draw_options options = {.part_styles = styles, .part_count = 2, .styles_version = 5};
+    for (size_t d = 0; d < sizeof descs / sizeof *descs; d++) {
+        strl_renderer *renderer = make(descs[d]);
+        shoot(renderer, &camera, &all.list, NULL, &plain);
+        uint64_t all_vertices = plain.stats.uploaded_vertices;
+        shoot(renderer, &camera, &all.list, &options, &styled);
+        assert_int_equal(styled.stats.uploaded_vertices, all_vertices); /* every patch has a part that is not plain */
+        assert_int_equal(styled.stats.items, 6);
+        int gone = 0, tinted = 0;
+        for (size_t p = 0; p < PIXELS; p++) {
+            gone += !isinf(plain.depth[p]) && isinf(styled.depth[p]);
+            tinted += !isinf(styled.depth[p]) && styled.rgba[p][0] > styled.rgba[p][2] + 40;
+        }
+        assert_true(gone > count_covered(&plain) / 5 && gone < count_covered(&plain) / 2);
+        assert_true(tinted > count_covered(&plain) / 5 && tinted < count_covered(&plain) / 2);
+        shoot(renderer, &camera, &all.list, &options, &again);
+        assert_int_equal(again.stats.uploaded_vertices, 0);
+        assert_memory_equal(styled.rgba, again.rgba, sizeof again.rgba);
+        shoot(renderer, &camera, &all.list, NULL, &again);
+        assert_memory_equal(plain.rgba, again.rgba, sizeof again.rgba);
+        strl_renderer_destroy(renderer);
+    }
+    patches_deinit(&all);
+}
+
 static double linear_of(double encoded)
 {
     encoded /= 255;
@@ -477,6 +557,8 @@ int main(void)
         cmocka_unit_test(a_list_larger_than_the_budget_is_drawn_whole_within_it),
         cmocka_unit_test(alpha_is_a_pattern_fixed_to_the_pixel_grid),
         cmocka_unit_test(depth_is_the_distance_along_the_view),
+        cmocka_unit_test(a_section_cuts_what_lies_before_it),
+        cmocka_unit_test(hidden_and_marked_parts_are_drawn_so_and_back),
         cmocka_unit_test(supersampling_is_the_mean_of_the_larger_image_in_linear_light),
         cmocka_unit_test(float_positions_draw_like_lattice_positions),
         cmocka_unit_test(a_placement_moves_the_model_and_not_its_look),

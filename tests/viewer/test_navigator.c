@@ -19,7 +19,7 @@ static const double bounds[6] = {100, -20, 3, 140, 10, 9};
 static strl_navigator start(unsigned up_axis)
 {
     strl_navigator navigator;
-    strl_navigator_init(&navigator, bounds, up_axis);
+    strl_navigator_init(&navigator, bounds, up_axis, 0);
     navigator.view_height = HEIGHT;
     return navigator;
 }
@@ -127,6 +127,118 @@ static void keys_move_along_the_view_only_while_flying(void **state)
     assert_true(distance(still.eye, navigator.eye) > 3 * navigator.speed);
 }
 
+static void a_transition_goes_smoothly_and_ends_where_it_shall(void **state)
+{
+    (void)state;
+    strl_navigator navigator = start(2);
+    strl_pose home = strl_navigator_home(&navigator);
+    strl_navigator_drag_left(&navigator, 900, 100);
+    strl_navigator_wheel(&navigator, 8);
+    strl_navigator_go(&navigator, &home, 0.5);
+    double last[3], longest = 0, pivot[3], whole = distance(navigator.eye, home.eye);
+    int steps = 0;
+    do {
+        memcpy(last, navigator.eye, sizeof last);
+        find_pivot(&navigator, pivot);
+        assert_true(distance(pivot, navigator.centre) < 1e-9); /* an orbit stays one */
+        view_of(&navigator);
+        steps++;
+        longest = fmax(longest, strl_navigator_step(&navigator, 0.01) ? distance(last, navigator.eye) : 0);
+    } while (navigator.going > 0);
+    assert_true(steps >= 49 && steps <= 51 && longest < whole / 8);
+    strl_pose there = strl_navigator_pose(&navigator);
+    assert_memory_equal(&there, &home, sizeof home);
+    /* The hand ends it on the way. */
+    strl_navigator_wheel(&navigator, 3);
+    strl_navigator_go(&navigator, &home, 0.5);
+    strl_navigator_step(&navigator, 0.1);
+    strl_navigator_drag_left(&navigator, 5, 0);
+    assert_false(strl_navigator_step(&navigator, 10));
+    assert_true(distance(navigator.eye, home.eye) > 1e-6);
+}
+
+static void looking_at_a_box_shows_all_of_it(void **state)
+{
+    (void)state;
+    const double box[6] = {101, -19, 4, 103, -18, 4.5};
+    strl_navigator navigator = start(2);
+    strl_navigator_drag_left(&navigator, 77, -31);
+    strl_pose pose = strl_navigator_pose_on(&navigator, box);
+    assert_true(pose.yaw == navigator.yaw && pose.pitch == navigator.pitch);
+    strl_navigator_go(&navigator, &pose, 0);
+    strl_view view = view_of(&navigator);
+    for (unsigned corner = 0; corner < 8; corner++) {
+        double x = 0, y = 0, z = 0;
+        for (unsigned i = 0; i < 3; i++) {
+            double away = box[i + (corner >> i & 1 ? 3 : 0)] - view.eye[i];
+            x += view.right[i] * away, y += view.up[i] * away, z += view.forward[i] * away;
+        }
+        assert_true(z > 0 && fabs(x) < z * view.tan_x && fabs(y) < z * view.tan_y);
+    }
+}
+
+static void a_walker_stays_level_at_eye_height(void **state)
+{
+    (void)state;
+    const double way[3] = {0, 1, 1};
+    strl_navigator navigator;
+    strl_navigator_init(&navigator, bounds, 1, 0.001); /* millimetres */
+    assert_true(fabs(navigator.eye_height - 1700) < 1e-9);
+    navigator = start(1);
+    assert_true(fabs(navigator.eye_height - navigator.radius / 50) < 1e-12);
+    strl_navigator_set_mode(&navigator, STRL_NAVIGATOR_WALK);
+    double height = navigator.eye[1], before[3];
+    memcpy(before, navigator.eye, sizeof before);
+    strl_navigator_move(&navigator, way, false, 2);
+    assert_true(navigator.eye[1] == height); /* though the view goes down */
+    assert_true(fabs(distance(before, navigator.eye) - 2 * strl_navigator_speed(&navigator)) < 1e-9);
+    double speed = strl_navigator_speed(&navigator);
+    strl_navigator_wheel(&navigator, 2);
+    assert_true(strl_navigator_speed(&navigator) > 1.5 * speed);
+    int steps = 0;
+    while (strl_navigator_stand(&navigator, 2.5, 0.02))
+        assert_true(++steps < 500);
+    assert_true(fabs(navigator.eye[1] - 2.5 - navigator.eye_height) < 1e-9 && steps > 3);
+}
+
+/* What an orthographic camera shows at the pivot is as large as in perspective, and nothing is behind its eye. */
+static void an_orthographic_camera_shows_the_same_size(void **state)
+{
+    (void)state;
+    strl_navigator navigator = start(2);
+    for (int zoom = 0; zoom < 40; zoom++) {
+        strl_navigator_wheel(&navigator, 1);
+        navigator.orthographic = false;
+        strl_view perspective = view_of(&navigator);
+        navigator.orthographic = true;
+        strl_view view = view_of(&navigator);
+        assert_true(view.orthographic);
+        assert_true(fabs(view.half_height / (perspective.tan_y * navigator.distance) - 1) < 1e-12);
+        double ahead = 0, aside = 0;
+        for (int i = 0; i < 3; i++) {
+            ahead += view.forward[i] * (navigator.centre[i] - view.eye[i]);
+            aside += view.right[i] * (view.eye[i] - navigator.eye[i]);
+        }
+        assert_true(ahead >= navigator.radius && fabs(aside) < 1e-9);
+    }
+}
+
+static void a_pose_towards_a_target_looks_there(void **state)
+{
+    (void)state;
+    const double eye[3] = {90, 3, 8}, target[3] = {120, -7, 5};
+    for (unsigned up = 0; up < 3; up++) {
+        strl_navigator navigator = start(up);
+        strl_pose pose = strl_navigator_pose_at(&navigator, eye, target);
+        strl_navigator_go(&navigator, &pose, 0);
+        strl_view view = view_of(&navigator);
+        double length = distance(eye, target);
+        for (int i = 0; i < 3; i++)
+            assert_true(fabs(view.eye[i] - eye[i]) < 1e-12 &&
+                        fabs(view.forward[i] - (target[i] - eye[i]) / length) < 1e-9);
+    }
+}
+
 static void no_movement_breaks_the_camera(void **state)
 {
     (void)state;
@@ -167,7 +279,7 @@ static void a_model_of_one_point_has_a_camera(void **state)
     const double points[2][6] = {{0}, {5e6, 4e6, 100, 5e6, 4e6, 100}};
     for (int p = 0; p < 2; p++) {
         strl_navigator navigator;
-        strl_navigator_init(&navigator, points[p], 2);
+        strl_navigator_init(&navigator, points[p], 2, 0);
         view_of(&navigator);
     }
 }
@@ -197,6 +309,11 @@ int main(void)
         cmocka_unit_test(orbit_keeps_the_pivot_and_fly_the_eye),
         cmocka_unit_test(a_drag_takes_the_model_along),
         cmocka_unit_test(keys_move_along_the_view_only_while_flying),
+        cmocka_unit_test(a_transition_goes_smoothly_and_ends_where_it_shall),
+        cmocka_unit_test(looking_at_a_box_shows_all_of_it),
+        cmocka_unit_test(a_walker_stays_level_at_eye_height),
+        cmocka_unit_test(an_orthographic_camera_shows_the_same_size),
+        cmocka_unit_test(a_pose_towards_a_target_looks_there),
         cmocka_unit_test(no_movement_breaks_the_camera),
         cmocka_unit_test(a_model_of_one_point_has_a_camera),
         cmocka_unit_test(a_camera_seen_from_behind_is_a_pyramid),

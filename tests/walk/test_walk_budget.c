@@ -34,14 +34,18 @@ static void resident_bytes_never_pass_the_budget(void **state)
         uint64_t memory = (uint64_t)600 << (10 + run);
         watched_source *source = watched_source_open(memory_source(model, model_bytes));
         source->hold_percent = 30;
-        strl_walk *walk = open_walk(&source->base, &(strl_walk_desc){.memory_bytes = memory, .error_px = 0.5});
+        strl_walk *walk = open_walk(
+            &source->base, &(strl_walk_desc){.memory_bytes = memory, .error_px = 0.5, .labels = run % 2 == 1});
         for (unsigned at = 0; at < 200; at++) {
             strl_camera camera = at % 4 ? flight_camera(11 * at) : random_camera(&random);
             strl_draw_list list = walk_frame(walk, &camera);
             uint64_t drawn = 0;
             for (uint32_t i = 0; i < list.count; i++)
-                drawn +=
-                    list.items[i].vertex_count * sizeof(strl_vertex) + list.items[i].index_count * sizeof(uint16_t);
+                drawn += list.items[i].vertex_count *
+                             (sizeof(strl_vertex) + (list.items[i].labels ? sizeof(strl_vertex_label) : 0)) +
+                         list.items[i].index_count * sizeof(uint16_t);
+            for (uint32_t i = 0; i < list.count; i++)
+                assert_true((list.items[i].labels != NULL) == (run % 2 == 1));
             assert_true(strl_walk_get_stats(walk)->resident_bytes <= memory);
             assert_true(drawn <= strl_walk_get_stats(walk)->resident_bytes);
             if (at % 10 == 0)

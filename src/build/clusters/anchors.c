@@ -61,7 +61,8 @@ static bool add_piece(strl_pieces *pieces, const strl_piece *piece)
 
 /* What numbers of pieces are like: the way from piece to piece, from corner to corner, and claims. */
 typedef struct piece_models {
-    strl_pack_model corner[3][3], claim_repeats, claim;
+    strl_pack_model corner[3][3];
+    strl_pack_same claim;
 } piece_models;
 
 void strl_pieces_write(const strl_pieces *pieces, strl_writer *writer)
@@ -80,9 +81,7 @@ void strl_pieces_write(const strl_pieces *pieces, strl_writer *writer)
                 uint32_t from = (uint32_t)(c ? piece->corner[c - 1][k] : last.corner[2][k]);
                 strl_pack(&packer, &m.corner[c][k], strl_pack_zigzag((uint32_t)piece->corner[c][k] - from));
             }
-        strl_pack(&packer, &m.claim_repeats, claim != last_claim);
-        if (claim != last_claim)
-            strl_pack(&packer, &m.claim, strl_pack_zigzag(claim - last_claim));
+        strl_pack_beside(&packer, &m.claim, claim, last_claim);
         last = *piece;
         last_claim = claim;
     }
@@ -99,8 +98,7 @@ static void unpack_pieces(strl_unpacker *unpacker, uint32_t count, const int64_t
                 at[k] += strl_unpack_zigzag(strl_unpack(unpacker, &m.corner[c][k]));
                 to[i].corner[c][k] = (int32_t)(at[k] + (uint32_t)moved[k]);
             }
-        if (strl_unpack(unpacker, &m.claim_repeats))
-            claim += strl_unpack_zigzag(strl_unpack(unpacker, &m.claim));
+        claim = strl_unpack_beside(unpacker, &m.claim, claim);
         memcpy(&to[i].claim, &claim, sizeof claim);
     }
 }
@@ -126,9 +124,9 @@ bool strl_anchors_bear(const strl_mesh *base, const strl_certificate *certificat
 {
     for (uint32_t t = 0; t < base->triangle_count; t++) {
         strl_piece piece = {.claim = strl_mesh_error(base, strl_drift_length(&base->drift[t]))};
-        if (certificate)
-            piece.claim = strl_mesh_error(base, fmaxf(certificate->triangle_down[t],
-                                                      fminf(certificate->triangle_up[t], piece.claim)));
+        if (certificate) /* the claims of the older pieces, which these hold, have the start's error already */
+            piece.claim = fminf(fmaxf(certificate->triangle_down[t], fminf(certificate->triangle_up[t], piece.claim)),
+                                base->most_error > 0 ? base->most_error : INFINITY);
         for (unsigned c = 0; c < 3; c++)
             memcpy(piece.corner[c], base->position[base->wedge[base->triangle[t][c]].point], sizeof piece.corner[c]);
         if (!add_piece(born, &piece))
@@ -229,8 +227,7 @@ static bool add_part(const part *p, float claim, strl_pieces *pieces)
 static void find_nearest(divider *d, const strl_facet *piece)
 {
     double middle[3];
-    for (unsigned k = 0; k < 3; k++)
-        middle[k] = (piece->corner[0][k] + piece->corner[1][k] + piece->corner[2][k]) / 3;
+    strl_facet_middle(piece, middle);
     d->candidate[0] = strl_near_find(&d->tree, middle, d->candidate[0], &d->distance);
     d->enough = fmax(NEAR_ENOUGH * d->distance, d->tolerance);
 }
@@ -240,14 +237,11 @@ static void list_candidates(divider *d, const strl_facet *piece, double reach)
     d->candidate_count = 1 + strl_near_list(&d->tree, piece, reach, d->candidate + 1, CANDIDATES - 1);
 }
 
-/* Whether all corners, and so all points, are near enough to one triangle of the member. */
 static bool is_near_first(const divider *d, const strl_facet *piece, uint32_t member)
 {
-    const strl_facet *facet = &d->facet[d->candidate[0]];
-    bool near = d->owner[d->candidate[0]] == member;
-    for (unsigned c = 0; c < 3 && near; c++)
-        near = strl_facet_distance2(facet, piece->corner[c]) <= d->enough * d->enough;
-    return near;
+    uint32_t first = d->candidate[0];
+    double distance;
+    return d->owner[first] == member && strl_facet_is_near(&d->facet[first], piece, d->enough, &distance);
 }
 
 /* Pieces come in the order of the triangles that they are or were: the next piece belongs to the next triangle, or to the same. */
@@ -324,11 +318,7 @@ static bool divide_piece(divider *d, const strl_piece *piece, uint32_t own, strl
 static bool prepare_divider(divider *d, const strl_mesh *mesh, strl_arena *arena)
 {
     d->facet = strl_arena_alloc(arena, mesh->triangle_count, sizeof *d->facet);
-    d->tree.facet = d->facet;
-    d->tree.order = strl_arena_alloc(arena, mesh->triangle_count, sizeof *d->tree.order);
-    d->tree.leaf = strl_arena_alloc(arena, mesh->triangle_count, sizeof *d->tree.leaf);
-    d->tree.nodes = strl_arena_alloc(arena, strl_near_nodes(mesh->triangle_count), sizeof *d->tree.nodes);
-    if (!d->facet || !d->tree.order || !d->tree.leaf || !d->tree.nodes)
+    if (!d->facet)
         return false;
     for (uint32_t t = 0; t < mesh->triangle_count; t++) {
         double corner[3][3];
@@ -337,8 +327,7 @@ static bool prepare_divider(divider *d, const strl_mesh *mesh, strl_arena *arena
         strl_facet_set(&d->facet[t], corner[0], corner[1], corner[2]);
         d->facet[t].claim = 0;
     }
-    strl_near_build(&d->tree, mesh->triangle_count);
-    return true;
+    return strl_near_create(&d->tree, d->facet, mesh->triangle_count, arena);
 }
 
 static bool divide_pieces(divider *d, const strl_pieces *pieces, uint32_t own, strl_anchors *shares)

@@ -1,6 +1,5 @@
 /* The builder `clusters`: stages in order, and the container from what they left. */
 #include <inttypes.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "base/fail.h"
@@ -64,7 +63,6 @@ static strl_status simplify_levels(strl_hierarchy *hierarchy, const strl_positio
     for (uint32_t level = from->level; level <= hierarchy->partition->depth && !status; level++) {
         uint32_t first = level == from->level ? from->done : 0;
         strl__build_stage(hierarchy->context, names[level < 10 ? level : 10]);
-        hierarchy->anchor_plan = strl_hierarchy_anchor_plan(hierarchy, level);
         if (first == 0)
             status = strl_level_open(hierarchy, level, err);
         if (!status)
@@ -112,10 +110,10 @@ static strl_status write_container(const strl_hierarchy *hierarchy, strl_error *
     const strl_build_context *context = hierarchy->context;
     const strl_ingest *ingest = hierarchy->ingest;
     strl_build_result *result = context->result;
-    strl_container_writer_desc desc = {.path = context->desc->output, .scratch_dir = context->scratch_dir};
+    strl_container_writer_desc desc = {.path = context->desc->output, .scratch_dir = context->scratch_dir,
+                                       .part_dir = context->part_dir};
     strl_container_writer *writer = NULL;
-    if (context->desc->unit)
-        snprintf(desc.info.unit, sizeof desc.info.unit, "%s", context->desc->unit);
+    memcpy(desc.info.unit, ingest->unit, sizeof desc.info.unit);
     desc.info.up_axis = (uint32_t)ingest->up;
     desc.info.has_colour = shows_colour(ingest);
     desc.info.triangles_in = result->triangles_in;
@@ -161,6 +159,17 @@ static void fill_result(const strl_hierarchy *hierarchy, strl_build_result *resu
     result->placements = 1;
     result->step = hierarchy->ingest->step;
     result->quantisation_error = (double)hierarchy->ingest->leaf_error * hierarchy->ingest->step;
+}
+
+/* Every triangle that came in is in a leaf or was counted when it was dropped. */
+static strl_status check_counts(const strl_build_result *result, strl_error *err)
+{
+    uint64_t dropped = result->dropped_nonfinite + result->dropped_degenerate;
+    if (result->triangles_in >= dropped && result->triangles_in - dropped == result->triangles_leaf)
+        return STRL_OK;
+    return strl__fail(err, STRL_ERR_INTERNAL,
+                      "%" PRIu64 " triangles came in and %" PRIu64 " were dropped, but the leaves have %" PRIu64,
+                      result->triangles_in, dropped, result->triangles_leaf);
 }
 
 static strl_status run_ingest(strl_hierarchy *hierarchy, strl_position *position, strl_spill **graph, strl_error *err)
@@ -217,8 +226,10 @@ strl_status strl__clusters_run(strl_build_context *context, strl_error *err)
     strl_status status = run_stages(&hierarchy, &partition, err);
     if (!status) {
         fill_result(&hierarchy, context->result);
-        status = write_container(&hierarchy, err);
+        status = check_counts(context->result, err);
     }
+    if (!status)
+        status = write_container(&hierarchy, err);
     hierarchy_deinit(&hierarchy);
     strl_partition_deinit(&partition);
     strl_ingest_deinit(&ingest);

@@ -49,18 +49,13 @@ static strl_status take_stream(strl_build_context *context, const char *name, st
     return strl_spill_take(context->spills, name, spill, err);
 }
 
-static bool has_anchors(const strl_hierarchy *hierarchy, uint32_t index)
-{
-    strl_anchor_plan plan = strl_hierarchy_anchor_plan(hierarchy, index);
-    return plan.measures || plan.begins;
-}
-
 static strl_status open_level(strl_hierarchy *hierarchy, uint32_t index, bool with_meshes, open_fn open,
                               strl_error *err)
 {
     strl_level *level = &hierarchy->levels[index];
     char name[32];
     strl_status status = STRL_OK;
+    hierarchy->anchor_plan = strl_hierarchy_anchor_plan(hierarchy, index);
     level->count = 1u << (hierarchy->partition->depth - index);
     level->nodes = strl__alloc_zero(level->count, sizeof *level->nodes);
     if (!level->nodes)
@@ -71,7 +66,7 @@ static strl_status open_level(strl_hierarchy *hierarchy, uint32_t index, bool wi
     if (!status && with_meshes)
         status = open(hierarchy->context, name, &level->meshes, err);
     snprintf(name, sizeof name, "anchors-%02u", index);
-    if (!status && with_meshes && has_anchors(hierarchy, index))
+    if (!status && with_meshes && (hierarchy->anchor_plan.measures || hierarchy->anchor_plan.begins))
         status = open(hierarchy->context, name, &level->anchors, err);
     snprintf(name, sizeof name, "nodes-%02u", index);
     if (!status && hierarchy->context->keep)

@@ -28,7 +28,7 @@ typedef struct strl_node_claims {
 /* What is kept of every node. Nodes of a level are numbered 0 .. count - 1; the children of i are 2i and 2i + 1 one level down. */
 typedef struct strl_node_state {
     strl_node record;       /* ids, group and page fields are filled in when the container is written */
-    uint64_t payload_at;    /* in the payload spill of its level */
+    uint64_t payload_at;    /* its progressive mesh, in the payload spill of its level */
     uint32_t payload_bytes;
     uint64_t mesh_at;       /* base mesh, in the mesh spill of its level; when it is written, the order of its mesh */
     uint32_t mesh_bytes;
@@ -45,7 +45,7 @@ typedef struct strl_level {
     uint32_t count;         /* nodes */
     strl_node_state *nodes; /* [count] */
     uint32_t group_count;
-    strl_spill *payloads;
+    strl_spill *payloads;   /* progressive meshes, packed (pm_spill.h) until they are written */
     strl_spill *meshes;     /* base meshes, deleted when the next level is done; while writing, orders of meshes */
     strl_spill *anchors;    /* the same of anchors; NULL where there are none */
     strl_spill *states;     /* of the nodes as they were taken, for checkpoints; NULL where none are made */
@@ -73,7 +73,7 @@ typedef struct strl_hierarchy {
     strl_adjacency next;    /* of the level above it */
     float even_error;       /* lattice units: where the nodes of the level being made are to end; 0 = at half their triangles */
     uint32_t soft_triangles; /* STRL_SOFT_TRIANGLES but while leaves are sampled */
-    strl_anchor_plan anchor_plan; /* of the level being made */
+    strl_anchor_plan anchor_plan; /* of the level opened last: the one being made */
     float growth;           /* by which even_error grows from level to level, so that about half the triangles go */
     uint32_t saved_done;    /* groups of the level being made that the last checkpoint has */
     uint64_t saved_at_ns;   /* when it was made */
@@ -88,7 +88,7 @@ typedef struct strl_made_node {
 } strl_made_node;
 
 void strl_made_node_deinit(strl_made_node *made);
-/* Simplifies to `target` triangles, records the progressive mesh, encodes it, keeps the base mesh with its shares. `self` is the node's index
+/* Simplifies to `target` triangles, records the progressive mesh, packs it, keeps the base mesh with its shares. `self` is the node's index
  * in its level. Boxes and errors are those of the mesh alone. anchors: what the node stands for; NULL = nothing. */
 strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh *node, const strl_anchors *anchors, uint32_t self,
                            uint32_t target, strl_arena *arena, strl_made_node *made, strl_error *err);

@@ -166,6 +166,9 @@ strl_status strl_leaf_shares_create(const strl_hierarchy *hierarchy, strl_leaf_s
         uint32_t head[4] = {0};
         for (int i = 0; i < 4 && !status; i++)
             status = next_word(&reader, &head[i], err);
+        if (!status && head[3] > hierarchy->ingest->cell_count)
+            status = strl__fail(err, STRL_ERR_INTERNAL, "a shared position is in %u cells of %u", head[3],
+                                hierarchy->ingest->cell_count);
         if (!status && !strl__grow(&d.cells, &d.cell_capacity, head[3], sizeof *d.cells))
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a position in %u cells", head[3]);
         for (uint32_t i = 0; i < head[3] && !status; i++)

@@ -11,10 +11,10 @@
 #define DRIFT_STEPS 250.f /* below 255: quotients may round up by one */
 
 typedef struct models {
-    strl_pack_model vertex, point, normal[2][STRL_PACK_LENGTHS], colour_repeats, colour[4], palette;
-    strl_pack_model corner[3];
-    strl_pack_model drift_repeats, drift[6], deviation_repeats, deviation, shift_repeats, shift;
-    strl_pack_model share_count, share;
+    strl_pack_model vertex, point, palette, corner[3], drift_repeats, drift[6], share_count, share;
+    strl_pack_steps normal[2];
+    strl_pack_rgba colour;
+    strl_pack_same deviation, shift;
 } models;
 
 /* Open addressing from position to base vertex; slot value vertex + 1. */
@@ -101,19 +101,12 @@ static bool read_points(strl_mesh *mesh, const strl_pm *payload, models *m, strl
 static void write_wedges(const strl_mesh *mesh, models *m, strl_packer *packer)
 {
     strl_wedge last = {.point = UINT32_MAX};
-    unsigned turn[2] = {0};
     for (uint32_t w = 0; w < mesh->wedge_count; w++) {
         const strl_wedge *wedge = &mesh->wedge[w];
         strl_pack(packer, &m->point, strl_pack_zigzag(wedge->point - last.point - 1));
-        for (int k = 0; k < 2; k++) {
-            uint32_t step = strl_pack_zigzag((uint32_t)wedge->normal[k] - last.normal[k]);
-            strl_pack(packer, &m->normal[k][turn[k]], step);
-            turn[k] = strl_pack_length(step);
-        }
-        strl_pack(packer, &m->colour_repeats, wedge->colour != last.colour);
-        for (unsigned c = 0; c < 32 && wedge->colour != last.colour; c += 8)
-            strl_pack(packer, &m->colour[c / 8],
-                      strl_pack_zigzag((wedge->colour >> c & 255) - (last.colour >> c & 255)));
+        for (int k = 0; k < 2; k++)
+            strl_pack_step(packer, &m->normal[k], wedge->normal[k], last.normal[k]);
+        strl_pack_colour(packer, &m->colour, wedge->colour, last.colour);
         strl_pack(packer, &m->palette, strl_pack_zigzag(wedge->palette - last.palette));
         last = *wedge;
     }
@@ -122,22 +115,12 @@ static void write_wedges(const strl_mesh *mesh, models *m, strl_packer *packer)
 static bool read_wedges(strl_mesh *mesh, models *m, strl_unpacker *unpacker)
 {
     strl_wedge last = {.point = UINT32_MAX};
-    unsigned turn[2] = {0};
     bool good = true;
     for (uint32_t w = 0; w < mesh->wedge_count; w++) {
         last.point += 1 + strl_unpack_zigzag(strl_unpack(unpacker, &m->point));
-        for (int k = 0; k < 2; k++) {
-            uint32_t step = strl_unpack(unpacker, &m->normal[k][turn[k]]);
-            last.normal[k] = (uint16_t)(last.normal[k] + strl_unpack_zigzag(step));
-            turn[k] = strl_pack_length(step);
-        }
-        if (strl_unpack(unpacker, &m->colour_repeats)) {
-            uint32_t colour = 0;
-            for (unsigned c = 0; c < 32; c += 8)
-                colour |= (((last.colour >> c) + strl_unpack_zigzag(strl_unpack(unpacker, &m->colour[c / 8]))) & 255)
-                          << c;
-            last.colour = colour;
-        }
+        for (int k = 0; k < 2; k++)
+            last.normal[k] = (uint16_t)strl_unpack_step(unpacker, &m->normal[k], last.normal[k]);
+        last.colour = strl_unpack_colour(unpacker, &m->colour, last.colour);
         last.palette += strl_unpack_zigzag(strl_unpack(unpacker, &m->palette));
         good &= last.point < mesh->point_count;
         mesh->wedge[w] = last;
@@ -145,30 +128,30 @@ static bool read_wedges(strl_mesh *mesh, models *m, strl_unpacker *unpacker)
     return good;
 }
 
-/* A corner is most often the first wedge not named yet, or one named lately. */
 static void write_triangles(const strl_mesh *mesh, models *m, strl_packer *packer)
 {
     uint32_t next = 0;
     for (uint32_t t = 0; t < mesh->triangle_count; t++)
-        for (int c = 0; c < 3; c++) {
-            uint32_t wedge = mesh->triangle[t][c];
-            strl_pack(packer, &m->corner[c], strl_pack_zigzag(next - wedge));
-            next = wedge >= next ? wedge + 1 : next;
-        }
+        for (int c = 0; c < 3; c++)
+            strl_pack_corner(packer, &m->corner[c], mesh->triangle[t][c], &next);
 }
 
+/* The wedges have been read. A triangle has three points. */
 static bool read_triangles(strl_mesh *mesh, models *m, strl_unpacker *unpacker)
 {
     uint32_t next = 0;
-    bool good = true;
-    for (uint32_t t = 0; t < mesh->triangle_count; t++)
+    for (uint32_t t = 0; t < mesh->triangle_count; t++) {
+        uint32_t point[3];
         for (int c = 0; c < 3; c++) {
-            uint32_t wedge = next - strl_unpack_zigzag(strl_unpack(unpacker, &m->corner[c]));
-            next = wedge >= next ? wedge + 1 : next;
-            mesh->triangle[t][c] = wedge;
-            good &= wedge < mesh->wedge_count;
+            uint32_t wedge = mesh->triangle[t][c] = strl_unpack_corner(unpacker, &m->corner[c], &next);
+            if (wedge >= mesh->wedge_count)
+                return false;
+            point[c] = mesh->wedge[wedge].point;
         }
-    return good;
+        if (point[0] == point[1] || point[1] == point[2] || point[2] == point[0])
+            return false;
+    }
+    return true;
 }
 
 /* Drifts are rounded outward to steps of a 250th of the largest: six small numbers, and still boxes that hold them. */
@@ -209,29 +192,6 @@ static void read_drifts(strl_mesh *mesh, float step, models *m, strl_unpacker *u
             mesh->drift[t].least[k] = -step * (float)drift[k];
             mesh->drift[t].most[k] = step * (float)drift[3 + k];
         }
-    }
-}
-
-static void write_floats(const float *values, uint32_t count, strl_pack_model *repeats, strl_pack_model *model,
-                         strl_packer *packer)
-{
-    uint32_t last = 0, bits;
-    for (uint32_t i = 0; i < count; i++, last = bits) {
-        memcpy(&bits, &values[i], sizeof bits);
-        strl_pack(packer, repeats, bits != last);
-        if (bits != last)
-            strl_pack(packer, model, strl_pack_zigzag(bits - last));
-    }
-}
-
-static void read_floats(float *values, uint32_t count, strl_pack_model *repeats, strl_pack_model *model,
-                        strl_unpacker *unpacker)
-{
-    uint32_t bits = 0;
-    for (uint32_t i = 0; i < count; i++) {
-        if (strl_unpack(unpacker, repeats))
-            bits += strl_unpack_zigzag(strl_unpack(unpacker, model));
-        memcpy(&values[i], &bits, sizeof bits);
     }
 }
 
@@ -286,8 +246,8 @@ strl_status strl_node_mesh_write(const strl_node_mesh *node, const strl_pm *payl
     write_wedges(mesh, &m, &packer);
     write_triangles(mesh, &m, &packer);
     write_drifts(mesh, step, &m, &packer);
-    write_floats(mesh->deviation, mesh->triangle_count, &m.deviation_repeats, &m.deviation, &packer);
-    write_floats(mesh->shift, mesh->triangle_count, &m.shift_repeats, &m.shift, &packer);
+    strl_pack_floats(&packer, &m.deviation, mesh->deviation, mesh->triangle_count);
+    strl_pack_floats(&packer, &m.shift, mesh->shift, mesh->triangle_count);
     if (node->share_first)
         write_shares(node, &m, &packer);
     strl_pack_finish(&packer);
@@ -305,10 +265,10 @@ static bool read_arrays(strl_node_mesh *node, const strl_pm *payload, uint32_t s
     if (!payload)
         read_positions(mesh, unpacker);
     good = read_wedges(mesh, &m, unpacker) && good;
-    good = read_triangles(mesh, &m, unpacker) && good;
+    good = good && read_triangles(mesh, &m, unpacker);
     read_drifts(mesh, step, &m, unpacker);
-    read_floats(mesh->deviation, mesh->triangle_count, &m.deviation_repeats, &m.deviation, unpacker);
-    read_floats(mesh->shift, mesh->triangle_count, &m.shift_repeats, &m.shift, unpacker);
+    strl_unpack_floats(unpacker, &m.deviation, mesh->deviation, mesh->triangle_count);
+    strl_unpack_floats(unpacker, &m.shift, mesh->shift, mesh->triangle_count);
     if (node->share_first)
         good = read_shares(node, shares, &m, unpacker) && good;
     return good && !unpacker->failed;

@@ -1,4 +1,5 @@
-/* A vertex of a step is told by its parent, a corner by the first vertex of its step; the rest as in node_mesh_spill.c. */
+/* A vertex of a step is told by its parent, a corner by the first vertex of its step; the rest by what is mostly
+ * the same (store/pack.h). */
 #include "build/clusters/pm_spill.h"
 
 #include <string.h>
@@ -16,11 +17,11 @@
 
 typedef struct models {
     strl_pack_points base;
-    strl_pack_model step_vertices, step_triangles, parent, position[3], normal[2][STRL_PACK_LENGTHS];
-    strl_pack_model colour_repeats, colour[4], palette_repeats, palette;
-    strl_pack_model base_corner[3], is_new[3], new_corner[3], old_corner[3];
-    strl_pack_model error_repeats[2], error[2];
-    strl_pack_model part, material;
+    strl_pack_model step_vertices, step_triangles, parent, position[3];
+    strl_pack_model base_corner[3], is_new[3], new_corner[3], old_corner[3], part, material;
+    strl_pack_steps normal[2];
+    strl_pack_rgba colour;
+    strl_pack_same palette, geometric_error, appearance_error;
 } models;
 
 static void models_init(models *m)
@@ -47,16 +48,8 @@ static void write_ends(const strl_pm *pm, models *m, strl_packer *packer)
 
 static void write_errors(const strl_pm *pm, models *m, strl_packer *packer)
 {
-    const float *errors[2] = {pm->geometric_error, pm->appearance_error};
-    for (unsigned k = 0; k < 2; k++) {
-        uint32_t last = 0, bits;
-        for (uint32_t s = 0; s <= pm->step_count; s++, last = bits) {
-            memcpy(&bits, &errors[k][s], sizeof bits);
-            strl_pack(packer, &m->error_repeats[k], bits != last);
-            if (bits != last)
-                strl_pack(packer, &m->error[k], strl_pack_zigzag(bits - last));
-        }
-    }
+    strl_pack_floats(packer, &m->geometric_error, pm->geometric_error, (size_t)pm->step_count + 1);
+    strl_pack_floats(packer, &m->appearance_error, pm->appearance_error, (size_t)pm->step_count + 1);
 }
 
 /* Vertices of a step are at one place. */
@@ -84,26 +77,14 @@ static void write_parents(const strl_pm *pm, models *m, strl_packer *packer)
 
 static void write_attributes(const strl_pm *pm, models *m, strl_packer *packer)
 {
-    unsigned turn[2] = {0};
     for (uint32_t v = 0; v < pm->vertex_count; v++) {
         uint32_t guide = guide_of(pm, v);
-        for (unsigned k = 0; k < 2; k++) {
-            uint32_t step = strl_pack_zigzag((uint32_t)pm->normal[v][k] - (v ? pm->normal[guide][k] : 0u));
-            strl_pack(packer, &m->normal[k][turn[k]], step);
-            turn[k] = strl_pack_length(step);
-        }
-        if (pm->colour) {
-            uint32_t last = v ? pm->colour[guide] : 0;
-            strl_pack(packer, &m->colour_repeats, pm->colour[v] != last);
-            for (unsigned c = 0; c < 32 && pm->colour[v] != last; c += 8)
-                strl_pack(packer, &m->colour[c / 8], strl_pack_zigzag((pm->colour[v] >> c & 255) - (last >> c & 255)));
-        }
-        if (pm->palette_index) {
-            uint32_t last = v ? pm->palette_index[guide] : 0;
-            strl_pack(packer, &m->palette_repeats, pm->palette_index[v] != last);
-            if (pm->palette_index[v] != last)
-                strl_pack(packer, &m->palette, strl_pack_zigzag(pm->palette_index[v] - last));
-        }
+        for (unsigned k = 0; k < 2; k++)
+            strl_pack_step(packer, &m->normal[k], pm->normal[v][k], v ? pm->normal[guide][k] : 0);
+        if (pm->colour)
+            strl_pack_colour(packer, &m->colour, pm->colour[v], v ? pm->colour[guide] : 0);
+        if (pm->palette_index)
+            strl_pack_beside(packer, &m->palette, pm->palette_index[v], v ? pm->palette_index[guide] : 0);
     }
 }
 
@@ -111,11 +92,8 @@ static void write_triangles(const strl_pm *pm, models *m, strl_packer *packer)
 {
     uint32_t next = 0;
     for (uint32_t t = 0; t < pm->triangle_end[0]; t++)
-        for (unsigned c = 0; c < 3; c++) {
-            uint32_t vertex = pm->triangle[t][c];
-            strl_pack(packer, &m->base_corner[c], strl_pack_zigzag(next - vertex));
-            next = vertex >= next ? vertex + 1 : next;
-        }
+        for (unsigned c = 0; c < 3; c++)
+            strl_pack_corner(packer, &m->base_corner[c], pm->triangle[t][c], &next);
     for (uint32_t s = 1; s <= pm->step_count; s++)
         for (uint32_t t = pm->triangle_end[s - 1], first = pm->vertex_end[s - 1]; t < pm->triangle_end[s]; t++)
             for (unsigned c = 0; c < 3; c++) {
@@ -173,7 +151,9 @@ strl_status strl_pm_spill_write(const strl_pm *pm, strl_arena *scratch, strl_wri
     if (!packed)
         return strl_payload_encode(pm, NULL, scratch, writer, NULL, err);
     write_packed(pm, writer);
-    return writer->failed ? strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", pm->triangle_count) : STRL_OK;
+    return writer->failed
+               ? strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", pm->triangle_count)
+               : STRL_OK;
 }
 
 /* ---- reading: the same in the same order; everything that is used as an index is checked before */
@@ -192,15 +172,8 @@ static bool read_ends(strl_pm *pm, models *m, strl_unpacker *unpacker)
 
 static void read_errors(strl_pm *pm, models *m, strl_unpacker *unpacker)
 {
-    float *errors[2] = {pm->geometric_error, pm->appearance_error};
-    for (unsigned k = 0; k < 2; k++) {
-        uint32_t bits = 0;
-        for (uint32_t s = 0; s <= pm->step_count; s++) {
-            if (strl_unpack(unpacker, &m->error_repeats[k]))
-                bits += strl_unpack_zigzag(strl_unpack(unpacker, &m->error[k]));
-            memcpy(&errors[k][s], &bits, sizeof bits);
-        }
-    }
+    strl_unpack_floats(unpacker, &m->geometric_error, pm->geometric_error, (size_t)pm->step_count + 1);
+    strl_unpack_floats(unpacker, &m->appearance_error, pm->appearance_error, (size_t)pm->step_count + 1);
 }
 
 static bool read_parents(strl_pm *pm, models *m, strl_unpacker *unpacker)
@@ -235,27 +208,16 @@ static void read_positions(strl_pm *pm, models *m, strl_unpacker *unpacker)
 
 static void read_attributes(strl_pm *pm, models *m, strl_unpacker *unpacker)
 {
-    unsigned turn[2] = {0};
     for (uint32_t v = 0; v < pm->vertex_count; v++) {
         uint32_t guide = guide_of(pm, v);
-        for (unsigned k = 0; k < 2; k++) {
-            uint32_t step = strl_unpack(unpacker, &m->normal[k][turn[k]]);
-            pm->normal[v][k] = (uint16_t)((v ? pm->normal[guide][k] : 0u) + strl_unpack_zigzag(step));
-            turn[k] = strl_pack_length(step);
-        }
-        if (pm->colour) {
-            uint32_t last = v ? pm->colour[guide] : 0, colour = 0;
-            bool differs = strl_unpack(unpacker, &m->colour_repeats);
-            for (unsigned c = 0; c < 32 && differs; c += 8)
-                colour |= (((last >> c) + strl_unpack_zigzag(strl_unpack(unpacker, &m->colour[c / 8]))) & 255) << c;
-            pm->colour[v] = differs ? colour : last;
-        }
-        if (pm->palette_index) {
-            uint32_t index = v ? pm->palette_index[guide] : 0;
-            if (strl_unpack(unpacker, &m->palette_repeats))
-                index += strl_unpack_zigzag(strl_unpack(unpacker, &m->palette));
-            pm->palette_index[v] = (uint16_t)index;
-        }
+        for (unsigned k = 0; k < 2; k++)
+            pm->normal[v][k] =
+                (uint16_t)strl_unpack_step(unpacker, &m->normal[k], v ? pm->normal[guide][k] : 0);
+        if (pm->colour)
+            pm->colour[v] = strl_unpack_colour(unpacker, &m->colour, v ? pm->colour[guide] : 0);
+        if (pm->palette_index)
+            pm->palette_index[v] =
+                (uint16_t)strl_unpack_beside(unpacker, &m->palette, v ? pm->palette_index[guide] : 0);
     }
 }
 
@@ -264,10 +226,9 @@ static bool read_triangles(strl_pm *pm, models *m, strl_unpacker *unpacker)
     uint32_t next = 0;
     for (uint32_t t = 0; t < pm->triangle_end[0]; t++)
         for (unsigned c = 0; c < 3; c++) {
-            uint32_t vertex = next - strl_unpack_zigzag(strl_unpack(unpacker, &m->base_corner[c]));
+            uint32_t vertex = strl_unpack_corner(unpacker, &m->base_corner[c], &next);
             if (vertex >= pm->vertex_count)
                 return false;
-            next = vertex >= next ? vertex + 1 : next;
             pm->triangle[t][c] = (uint16_t)vertex;
         }
     for (uint32_t s = 1; s <= pm->step_count; s++)
@@ -292,25 +253,6 @@ static void read_palette(strl_pm *pm, models *m, strl_unpacker *unpacker)
         last.rgba = strl__unpack_bits(unpacker, 32);
         pm->palette[i] = last;
     }
-}
-
-static bool create(strl_pm *pm, uint32_t flags, strl_arena *arena)
-{
-    size_t states = (size_t)pm->step_count + 1;
-    pm->position = strl_arena_alloc(arena, pm->vertex_count, sizeof *pm->position);
-    pm->normal = strl_arena_alloc(arena, pm->vertex_count, sizeof *pm->normal);
-    pm->colour = flags & HAS_COLOURS ? strl_arena_alloc(arena, pm->vertex_count, sizeof *pm->colour) : NULL;
-    pm->palette_index = flags & HAS_PALETTE ? strl_arena_alloc(arena, pm->vertex_count, sizeof *pm->palette_index) : NULL;
-    pm->parent = strl_arena_alloc(arena, pm->vertex_count, sizeof *pm->parent);
-    pm->triangle = strl_arena_alloc(arena, pm->triangle_count, sizeof *pm->triangle);
-    pm->vertex_end = strl_arena_alloc(arena, states, sizeof *pm->vertex_end);
-    pm->triangle_end = strl_arena_alloc(arena, states, sizeof *pm->triangle_end);
-    pm->geometric_error = strl_arena_alloc(arena, states, sizeof *pm->geometric_error);
-    pm->appearance_error = strl_arena_alloc(arena, states, sizeof *pm->appearance_error);
-    pm->palette = strl_arena_alloc(arena, pm->palette_count, sizeof *pm->palette);
-    return pm->position && pm->normal && (pm->colour || !(flags & HAS_COLOURS)) &&
-           (pm->palette_index || !(flags & HAS_PALETTE)) && pm->parent && pm->triangle && pm->vertex_end && pm->triangle_end &&
-           pm->geometric_error && pm->appearance_error && pm->palette;
 }
 
 static bool read_arrays(strl_pm *pm, strl_unpacker *unpacker)
@@ -346,7 +288,7 @@ strl_status strl_pm_spill_read(const void *data, size_t size, strl_arena *arena,
         pm->palette_count == 0 || pm->palette_count > STRL_PM_MAX_PALETTE || vertices > pm->vertex_count ||
         triangles > pm->triangle_count || pm->step_count > pm->vertex_count - vertices)
         return strl__fail(err, STRL_ERR_INTERNAL, "a node's progressive mesh in scratch is damaged");
-    if (!create(pm, flags, arena))
+    if (!strl_pm_create(pm, flags & HAS_COLOURS, flags & HAS_PALETTE, arena))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", pm->triangle_count);
     pm->vertex_end[0] = vertices;
     pm->triangle_end[0] = triangles;

@@ -1,5 +1,6 @@
-/* The last stage: nodes into the container, breadth first. Until here every payload is self-contained, because children are made
- * before their parents; now each is told by its parent's finest state, which holds most of its base mesh.
+/* The last stage: nodes into the container, breadth first. Until here progressive meshes wait in scratch (pm_spill.h), because
+ * children are made before their parents; now each is encoded, told by its parent's finest state, which holds most of its base
+ * mesh.
  *
  * No checkpoint is made meanwhile: the one of the finished levels stays in place, and with it the payloads that are used up
  * here. A build that is resumed begins this stage anew. */
@@ -20,7 +21,7 @@ typedef struct written_node {
 
 #define SIBLINGS 2u
 
-/* A parent is decoded once for all that it tells. */
+/* A parent is read once for all that it tells. */
 typedef struct written_siblings {
     written_node node[SIBLINGS];
     uint32_t first, count; /* in their level */
@@ -36,8 +37,8 @@ typedef struct write_stage {
     uint64_t done, total;
 } write_stage;
 
-/* ---- orders on their way to the next level, in the machine's own byte order: what a reader will have is the mesh of the
- * self-contained payload in another order */
+/* ---- orders on their way to the next level, in the machine's own byte order: what a reader will have is the
+ * waiting mesh in another order */
 
 static bool order_create(strl_payload_order *order, const strl_pm *pm, strl_arena *arena)
 {

@@ -9,6 +9,7 @@
 
 #define SHARED_WEIGHT 4u /* of one shared position, against 1 of a neighbour on the curve */
 #define CURVE_REACH 2u
+#define BYTES_OF_PAIR 64u /* while pairs are connected: the pair, its place in the chains, shared positions, edges */
 
 typedef struct connected {
     uint64_t *edges; /* a << 32 | b, one for each position that both have */
@@ -216,7 +217,10 @@ static strl_status list_edges(connecting *c, strl_error *err)
 strl_status strl__connect_cells(strl_build_context *context, strl_ingest *ingest, pair_spills *pairs, strl_error *err)
 {
     connecting c = {.context = context, .ingest = ingest, .pairs = pairs};
-    unsigned window = strl_pool_workers(context->pool);
+    uint64_t largest = 0;
+    for (uint32_t i = 0; i < pairs->count; i++)
+        largest = pairs->stream[i].count > largest ? pairs->stream[i].count : largest;
+    unsigned window = strl__ingest_window(context, BYTES_OF_PAIR * largest);
     c.slots = strl__alloc_zero(strl_pool_window(context->pool, window), sizeof *c.slots);
     strl_status status = c.slots ? strl__build_open_stream(context, "shared", &ingest->shared, err)
                                  : strl__fail(err, STRL_ERR_MEMORY, "no memory to connect cells");

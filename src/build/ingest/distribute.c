@@ -7,16 +7,24 @@
 #include "base/fail.h"
 #include "base/hash.h"
 #include "base/memory.h"
+#include "build/ingest/batches.h"
 #include "build/ingest/internal.h"
 #include "geometry/octahedral.h"
 
 /* Buckets decide where cells are cut, so their size must not depend on the number of threads, or the output would. Sorting takes
- * some three times a bucket: with this share up to 32 threads stay within the budget. */
+ * some three times a bucket: with this share up to 32 threads may sort at once (strl__ingest_window). */
 #define SHARES_OF_MEMORY 96u
 
 uint64_t strl__bucket_bytes(const strl_build_context *context)
 {
     return context->memory_bytes / SHARES_OF_MEMORY;
+}
+
+unsigned strl__ingest_window(const strl_build_context *context, uint64_t bytes_each)
+{
+    uint64_t fit = context->memory_bytes * 2 / 3 / (bytes_each ? bytes_each : 1);
+    unsigned wanted = strl_pool_workers(context->pool) + 1; /* one waits for its turn while all work */
+    return fit < 1 ? 1 : fit < wanted ? (unsigned)fit : wanted;
 }
 
 static int compare_keys(const void *a, const void *b)
@@ -142,11 +150,6 @@ static bool palette_id(palette_table *table, strl_ingest *ingest, uint32_t part,
     return true;
 }
 
-static bool same_cell(const uint32_t a[3], const uint32_t b[3])
-{
-    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
-}
-
 /* False where two corners fall into one lattice cell. */
 static bool to_lattice(const strl_ingest *ingest, const strl_triangle *in, strl_soup_triangle *out, bool *lacks_normals)
 {
@@ -162,20 +165,18 @@ static bool to_lattice(const strl_ingest *ingest, const strl_triangle *in, strl_
         else
             *lacks_normals = true;
     }
-    return !same_cell(out->corner[0].position, out->corner[1].position) &&
-           !same_cell(out->corner[1].position, out->corner[2].position) &&
-           !same_cell(out->corner[2].position, out->corner[0].position);
+    return !strl__soup_has_collapsed(out);
 }
 
-static void widen_box(strl_ingest *ingest, const strl_soup_triangle *triangle)
-{
-    for (int c = 0; c < 3; c++)
-        for (int k = 0; k < 3; k++) {
-            uint32_t value = triangle->corner[c].position[k];
-            ingest->box_min[k] = value < ingest->box_min[k] ? value : ingest->box_min[k];
-            ingest->box_max[k] = value > ingest->box_max[k] ? value : ingest->box_max[k];
-        }
-}
+#define COLLAPSED UINT32_MAX
+
+/* A batch on its way to the buckets. */
+typedef struct distributed {
+    uint8_t *records; /* [capacity] packed, palette 0 */
+    uint32_t *bucket; /* [capacity] or COLLAPSED */
+    double longest2;  /* squared edge of those that collapsed */
+    bool lacks_normals;
+} distributed;
 
 typedef struct distribution {
     strl_build_context *context;
@@ -183,31 +184,71 @@ typedef struct distribution {
     bucket_set *buckets;
     palette_table table;
     uint32_t part_base, material_base;
-    strl_triangle *batch; /* [READ_BATCH] */
+    size_t record_bytes;
+    distributed *slots; /* [window of the pass] */
 } distribution;
 
-static strl_status take_batch(distribution *d, size_t count, strl_error *err)
+static double longest_edge2(const strl_triangle *triangle)
 {
-    strl_ingest *ingest = d->ingest;
-    for (size_t i = 0; i < count; i++) {
-        strl_soup_triangle triangle;
-        uint8_t bytes[64];
-        if (!to_lattice(ingest, &d->batch[i], &triangle, &ingest->lacks_normals)) {
-            d->context->result->dropped_degenerate++;
+    double most = 0;
+    for (unsigned c = 0; c < 3; c++) {
+        const double *a = triangle->position[c], *b = triangle->position[(c + 1) % 3];
+        double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
+        most = fmax(most, x * x + y * y + z * z);
+    }
+    return most;
+}
+
+static strl_status place_batch(void *user, const strl_triangle_batch *batch, unsigned slot, unsigned worker, strl_error *err)
+{
+    const distribution *d = user;
+    const strl_ingest *ingest = d->ingest;
+    distributed *out = &d->slots[slot];
+    (void)worker;
+    (void)err;
+    out->lacks_normals = false;
+    out->longest2 = 0;
+    for (size_t i = 0; i < batch->count; i++) {
+        strl_soup_triangle triangle = {.palette = 0};
+        out->bucket[i] = COLLAPSED;
+        if (!to_lattice(ingest, &batch->triangle[i], &triangle, &out->lacks_normals)) {
+            out->longest2 = fmax(out->longest2, longest_edge2(&batch->triangle[i]));
             continue;
         }
-        if (!palette_id(&d->table, ingest, d->part_base + d->batch[i].part, d->material_base + d->batch[i].material,
-                        &triangle.palette))
-            return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu part and material pairs", ingest->palette_count);
-        widen_box(ingest, &triangle);
-        strl__soup_pack(ingest, &triangle, bytes);
-        uint32_t to = bucket_of(d->buckets, strl__curve_key_of_triangle(ingest, &triangle));
-        strl_status status = strl_spill_append(d->buckets->spill[to], bytes, strl__soup_bucket_bytes(ingest), err);
-        if (status)
-            return status;
-        ingest->triangle_count++;
+        strl__soup_pack(ingest, &triangle, out->records + i * d->record_bytes);
+        out->bucket[i] = bucket_of(d->buckets, strl__curve_key_of_triangle(ingest, &triangle));
     }
     return STRL_OK;
+}
+
+/* Palette ids are given in the order of the input. */
+static strl_status put_triangle(distribution *d, const strl_triangle *triangle, uint8_t *record, uint32_t bucket,
+                                strl_error *err)
+{
+    uint32_t palette;
+    if (!palette_id(&d->table, d->ingest, d->part_base + triangle->part, d->material_base + triangle->material, &palette))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu part and material pairs", d->ingest->palette_count);
+    strl__soup_set_palette(d->ingest, palette, record);
+    return strl_spill_append(d->buckets->spill[bucket], record, d->record_bytes, err);
+}
+
+static strl_status put_batch(void *user, const strl_triangle_batch *batch, unsigned slot, strl_error *err)
+{
+    distribution *d = user;
+    const distributed *placed = &d->slots[slot];
+    strl_ingest *ingest = d->ingest;
+    strl_status status = STRL_OK;
+    for (size_t i = 0; i < batch->count && !status; i++)
+        if (placed->bucket[i] == COLLAPSED) {
+            d->context->result->dropped_degenerate++;
+        } else {
+            status = put_triangle(d, &batch->triangle[i], placed->records + i * d->record_bytes, placed->bucket[i], err);
+            ingest->triangle_count += !status;
+        }
+    ingest->lacks_normals |= placed->lacks_normals;
+    d->context->result->dropped_longest = fmax(d->context->result->dropped_longest, sqrt(placed->longest2));
+    return status ? status
+                  : strl__build_report(d->context, ingest->triangle_count, d->context->result->triangles_in, err);
 }
 
 static bool add_name(strl_names *names, const char *prefix, const char *name, uint32_t rgba, bool material)
@@ -242,43 +283,60 @@ static strl_status add_names(distribution *d, const strl_reader *reader, uint32_
     return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for the names of %s", desc->inputs[input]);
 }
 
-static strl_status distribute_input(distribution *d, strl_reader *reader, uint32_t input, strl_error *err)
+static bool make_slots(distribution *d, const strl_batch_pass *pass)
 {
-    size_t count;
-    strl_status status = strl_reader_rewind(reader, err);
-    while (!status) {
-        status = strl_reader_next(reader, d->batch, READ_BATCH, &count, err);
-        if (status || !count)
-            break;
-        status = take_batch(d, count, err);
-        if (!status)
-            status = strl__build_report(d->context, d->ingest->triangle_count, d->context->result->triangles_in, err);
+    d->slots = strl__alloc_zero(pass->window, sizeof *d->slots);
+    bool good = d->slots != NULL;
+    for (unsigned i = 0; i < pass->window && good; i++) {
+        d->slots[i].records = strl__alloc(pass->capacity, d->record_bytes);
+        d->slots[i].bucket = strl__alloc(pass->capacity, sizeof *d->slots[i].bucket);
+        good = d->slots[i].records && d->slots[i].bucket;
     }
-    return status ? status : add_names(d, reader, input, err);
+    return good;
+}
+
+static strl_status distribute_inputs(distribution *d, strl_reader *const *readers, strl_error *err)
+{
+    strl_batch_pass pass;
+    d->record_bytes = strl__soup_bucket_bytes(d->ingest);
+    strl_status status =
+        strl__batch_pass_create(d->context, d->record_bytes + sizeof *d->slots->bucket, &pass, err);
+    pass.work = place_batch;
+    pass.finish = put_batch;
+    pass.user = d;
+    if (!status && !make_slots(d, &pass))
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory to read the input");
+    for (uint32_t i = 0; i < d->context->desc->input_count && !status; i++) {
+        d->part_base = (uint32_t)d->ingest->parts.count;
+        d->material_base = (uint32_t)d->ingest->materials.count;
+        status = strl_reader_rewind(readers[i], err);
+        if (!status)
+            status = strl__batch_pass_run(&pass, readers[i], err);
+        if (!status)
+            status = add_names(d, readers[i], i, err);
+        if (d->context->desc->input_count > 1)
+            strl_reader_rest(readers[i]);
+    }
+    for (unsigned i = 0; d->slots && i < pass.window; i++) {
+        strl__free(d->slots[i].records);
+        strl__free(d->slots[i].bucket);
+    }
+    strl__free(d->slots);
+    strl__batch_pass_deinit(&pass);
+    return status;
 }
 
 strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, const model_survey *survey,
                              strl_ingest *ingest, bucket_set *buckets, strl_error *err)
 {
     distribution d = {.context = context, .ingest = ingest, .buckets = buckets};
-    for (int k = 0; k < 3; k++) {
-        ingest->box_min[k] = UINT32_MAX;
-        ingest->box_max[k] = 0;
-    }
     strl_status status = open_buckets(context, survey, ingest, buckets, err);
-    d.batch = strl__alloc(READ_BATCH, sizeof *d.batch);
-    if (!status && !d.batch)
-        status = strl__fail(err, STRL_ERR_MEMORY, "no memory to read the input");
-    for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
-        d.part_base = (uint32_t)ingest->parts.count;
-        d.material_base = (uint32_t)ingest->materials.count;
-        status = distribute_input(&d, readers[i], i, err);
-    }
+    if (!status)
+        status = distribute_inputs(&d, readers, err);
     for (size_t i = 0; i < ingest->palette_count && !status; i++)
         ingest->palette[i].rgba = ingest->materials.rgba[ingest->palette[i].material];
     if (!status && ingest->triangle_count == 0)
         status = strl__ingest_refuse_collapsed(context, ingest, survey->triangles, err);
-    strl__free(d.batch);
     strl__free(d.table.slots);
     return status;
 }

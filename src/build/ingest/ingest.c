@@ -1,36 +1,84 @@
 #include "build/ingest/ingest.h"
 
 #include <inttypes.h>
+#include <stdio.h>
+#include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
 #include "build/ingest/internal.h"
 #include "platform/file.h"
+#include "platform/thread.h"
 
 #define LEAST_READER_BYTES (8u << 20)
 /* Of a few nodes a level, what is used up and waits for a checkpoint is a large share of all. */
 #define KEEP_TRIANGLES 65536u
 
+/* Stored, never applied: what inputs say of themselves must agree, unless the caller says it. */
+static strl_status take_axes(const strl_build_context *context, const strl_reader_info *info, uint32_t input,
+                             strl_ingest *ingest, strl_error *err)
+{
+    const strl_build_desc *desc = context->desc;
+    const char *unit = desc->unit ? desc->unit : info->default_unit ? info->default_unit : "";
+    strl_axis up = desc->up_axis ? (strl_axis)(desc->up_axis - 1) : info->default_up;
+    if (input > 0 && up != ingest->up)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "%s and %s disagree about the up axis (%c and %c): say --up",
+                          desc->inputs[0], desc->inputs[input], 'x' + (int)ingest->up, 'x' + (int)up);
+    if (input > 0 && strcmp(unit, ingest->unit) != 0)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "%s and %s disagree about the unit (%s and %s): say --unit", desc->inputs[0],
+                          desc->inputs[input], *ingest->unit ? ingest->unit : "unknown", *unit ? unit : "unknown");
+    ingest->up = up;
+    snprintf(ingest->unit, sizeof ingest->unit, "%s", unit);
+    return STRL_OK;
+}
+
+/* For the child that reads a foreign format while this process waits, all of the budget that is left; this process
+ * grows by no more than the reserve meanwhile. */
+#define CHILD_RESERVE_BYTES (8u << 20)
+
+static bool go_on(void *context)
+{
+    return strl__build_report(context, 0, 0, NULL) == STRL_OK;
+}
+
+static strl_reader_child plan_child(strl_build_context *context)
+{
+    uint64_t held = strl_process_rss_bytes() + CHILD_RESERVE_BYTES;
+    return (strl_reader_child){
+        .importer = context->desc->importer,
+        .memory_bytes = context->memory_bytes > held ? context->memory_bytes - held : CHILD_RESERVE_BYTES,
+        .go_on = go_on,
+        .context = context,
+    };
+}
+
+static void note_costs(strl_build_context *context, const strl_reader *reader)
+{
+    strl_build_result *result = context->result;
+    strl_reader_costs costs;
+    strl_reader_costs_get(reader, &costs);
+    result->scratch_bytes += costs.scratch_bytes;
+    if (costs.child_rss_bytes > result->peak_rss_bytes)
+        result->peak_rss_bytes = costs.child_rss_bytes;
+}
+
 static strl_status open_readers(strl_build_context *context, strl_reader **readers, strl_ingest *ingest, strl_error *err)
 {
     strl_status status = STRL_OK;
-    uint64_t share = context->memory_bytes / 4 / context->desc->input_count;
+    uint64_t share = context->memory_bytes / 4; /* one at a time is read */
     for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
         strl_reader_desc desc = {.path = context->desc->inputs[i], .scratch_dir = context->scratch_dir,
-                                 .memory_bytes = share < LEAST_READER_BYTES ? LEAST_READER_BYTES : share};
+                                 .memory_bytes = share < LEAST_READER_BYTES ? LEAST_READER_BYTES : share,
+                                 .names_bytes = context->memory_bytes / 6,
+                                 .child = plan_child(context)};
         strl_reader_info info;
         status = strl_reader_open(&desc, &readers[i], err);
         if (status)
             break;
+        strl_reader_rest(readers[i]);
         strl_reader_info_get(readers[i], &info);
-        if (context->desc->up_axis)
-            ingest->up = (strl_axis)(context->desc->up_axis - 1);
-        else if (i == 0)
-            ingest->up = info.default_up;
-        else if (ingest->up != info.default_up)
-            status = strl__fail(err, STRL_ERR_ARGUMENT, "%s and %s disagree about the up axis (%c and %c): say --up",
-                                context->desc->inputs[0], context->desc->inputs[i], 'x' + (int)ingest->up,
-                                'x' + (int)info.default_up);
+        note_costs(context, readers[i]);
+        status = take_axes(context, &info, i, ingest, err);
     }
     return status;
 }
@@ -50,6 +98,9 @@ static void note_drops(strl_build_context *context, strl_reader *const *readers)
 
 /* Scratch of a build, most of it spilled triangles and base meshes. */
 #define SCRATCH_BYTES_OF_TRIANGLE 80u
+
+/* Of one input, for sums that do not overflow; no disk holds their scratch. */
+#define MOST_TRIANGLES ((uint64_t)1 << 48)
 
 /* Before anything is written: a build that cannot end should not begin. */
 static strl_status check_disk(const strl_build_context *context, uint64_t triangles, strl_error *err)
@@ -75,14 +126,26 @@ strl_status strl__ingest_check_memory(const strl_build_context *context, uint64_
                       " triangles needs, %" PRIu64 "M", context->memory_bytes >> 20, triangles, (least >> 20) + 1);
 }
 
+static uint64_t expected_triangles(const strl_reader_info *info)
+{
+    /* A file may announce more than it has room for: nothing tells of a triangle in less than a byte, unless one is read
+     * many times over. */
+    return info->hint_is_exact || info->triangles_hint < info->file_bytes ? info->triangles_hint : info->file_bytes;
+}
+
+/* Also refuses what is known not to fit the disk: parts that are used again and again can be far more triangles than a
+ * reading would end with soon. */
 static strl_status tell_estimate(strl_build_context *context, strl_reader *const *readers, strl_error *err)
 {
     strl_build_estimate estimate = {0};
+    uint64_t certain = 0;
     for (uint32_t i = 0; i < context->desc->input_count; i++) {
         strl_reader_info info;
         strl_reader_info_get(readers[i], &info);
-        /* A file may announce more than it has room for: nothing tells of a triangle in less than a byte. */
-        estimate.triangles += info.triangles_hint < info.file_bytes ? info.triangles_hint : info.file_bytes;
+        uint64_t triangles = expected_triangles(&info);
+        triangles = triangles < MOST_TRIANGLES ? triangles : MOST_TRIANGLES;
+        estimate.triangles += triangles;
+        certain += info.hint_is_exact ? triangles : 0;
     }
     strl__build_expect(context, estimate.triangles);
     estimate.seconds = context->estimate.seconds_left;
@@ -90,7 +153,7 @@ static strl_status tell_estimate(strl_build_context *context, strl_reader *const
     strl_status status = strl_path_free_bytes(context->scratch_dir, &estimate.scratch_free_bytes, err);
     if (!status && context->desc->estimate)
         context->desc->estimate(context->desc->context, &estimate);
-    return status;
+    return status ? status : check_disk(context, certain, err);
 }
 
 strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, strl_error *err)
@@ -99,12 +162,12 @@ strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, st
     bucket_set buckets = {0};
     pair_spills pairs = {0};
     *ingest = (strl_ingest){0};
+    strl__build_stage(context, "survey");
     strl_reader **readers = strl__alloc_zero(context->desc->input_count, sizeof *readers);
     strl_status status = readers ? open_readers(context, readers, ingest, err)
                                  : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u inputs", context->desc->input_count);
     if (status)
         goto done;
-    strl__build_stage(context, "survey");
     status = tell_estimate(context, readers, err);
     if (status)
         goto done;

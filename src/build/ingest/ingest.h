@@ -48,11 +48,10 @@ typedef struct strl_ingest {
     double finest_step;       /* that the extent allows */
     double short_edge;        /* 99 of 100 edges are longer; 0 = there is none */
     bool is_coarse;           /* the step had to be more than a sixteenth of short_edge */
-    uint32_t box_max[3];      /* lattice, of what was kept; the least corner is in box_min */
-    uint32_t box_min[3];
     unsigned curve_shift;     /* lattice coordinates lose so many bits on the curve, which has 21 of each axis */
     float leaf_error;         /* lattice units: what quantisation moves a point at most */
     strl_axis up;
+    char unit[16];            /* "" = unknown */
     bool has_normals, has_colours;
     bool lacks_normals;       /* some corner has none */
     uint64_t triangle_count;  /* kept */

@@ -20,16 +20,9 @@ static void write_numbers(const strl_ingest *ingest, strl_writer *writer)
     for (int k = 0; k < 3; k++)
         strl_writer_f64(writer, ingest->origin[k]);
     strl_writer_f64(writer, ingest->step);
-    strl_writer_f64(writer, ingest->finest_step);
-    strl_writer_f64(writer, ingest->short_edge);
-    for (int k = 0; k < 3; k++) {
-        strl_writer_u32(writer, ingest->box_min[k]);
-        strl_writer_u32(writer, ingest->box_max[k]);
-    }
-    strl_writer_u8(writer, ingest->is_coarse);
-    strl_writer_u8(writer, (uint8_t)ingest->curve_shift);
     strl_writer_f32(writer, ingest->leaf_error);
     strl_writer_u8(writer, (uint8_t)ingest->up);
+    strl_writer_bytes(writer, ingest->unit, sizeof ingest->unit);
     strl_writer_u8(writer, (uint8_t)(ingest->has_normals | ingest->has_colours << 1 | ingest->lacks_normals << 2));
     strl_writer_u64(writer, ingest->triangle_count);
     strl_writer_u32(writer, ingest->cell_count);
@@ -102,17 +95,13 @@ static bool read_numbers(strl_cursor *cursor, strl_ingest *ingest)
     for (int k = 0; k < 3; k++)
         ingest->origin[k] = strl_cursor_f64(cursor);
     ingest->step = strl_cursor_f64(cursor);
-    ingest->finest_step = strl_cursor_f64(cursor);
-    ingest->short_edge = strl_cursor_f64(cursor);
-    for (int k = 0; k < 3; k++) {
-        ingest->box_min[k] = strl_cursor_u32(cursor);
-        ingest->box_max[k] = strl_cursor_u32(cursor);
-    }
-    ingest->is_coarse = strl_cursor_u8(cursor);
-    ingest->curve_shift = strl_cursor_u8(cursor);
     ingest->leaf_error = strl_cursor_f32(cursor);
-    unsigned up = strl_cursor_u8(cursor), flags = strl_cursor_u8(cursor);
+    unsigned up = strl_cursor_u8(cursor);
+    const uint8_t *unit = strl_cursor_take(cursor, sizeof ingest->unit);
+    unsigned flags = strl_cursor_u8(cursor);
     ingest->up = (strl_axis)(up % 3);
+    if (unit)
+        memcpy(ingest->unit, unit, sizeof ingest->unit - 1);
     ingest->has_normals = flags & 1;
     ingest->has_colours = flags >> 1 & 1;
     ingest->lacks_normals = flags >> 2 & 1;

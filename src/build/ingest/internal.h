@@ -5,7 +5,6 @@
 #include "build/ingest/ingest.h"
 
 #define MAX_BUCKETS 384u
-#define READ_BATCH 8192u
 
 /* First pass: what must be known before a single position can be put on the lattice. */
 typedef struct model_survey {
@@ -45,6 +44,9 @@ uint64_t strl__curve_key_of_triangle(const strl_ingest *ingest, const strl_soup_
 /* Records of buckets: all that a triangle has. The soup's are the first strl_soup_bytes() of them. */
 size_t strl__soup_bucket_bytes(const strl_ingest *ingest);
 void strl__soup_pack(const strl_ingest *ingest, const strl_soup_triangle *triangle, uint8_t *bytes);
+/* Two corners in one lattice cell. */
+bool strl__soup_has_collapsed(const strl_soup_triangle *triangle);
+void strl__soup_set_palette(const strl_ingest *ingest, uint32_t palette, uint8_t *bytes);
 void strl__soup_unpack(const strl_ingest *ingest, const uint8_t *bytes, strl_soup_triangle *triangle);
 
 /* Triangles to buckets by curve range. */
@@ -94,6 +96,10 @@ strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest,
                                strl_error *err);
 /* Pairs to edges and shared positions. */
 strl_status strl__connect_cells(strl_build_context *context, strl_ingest *ingest, pair_spills *pairs, strl_error *err);
+
+/* How many items of this size may be under way at once: one a worker and one more where the budget allows, one in any case. Buckets and pair
+ * spills are of bounded number, so those of a very large model are larger than strl__bucket_bytes. */
+unsigned strl__ingest_window(const strl_build_context *context, uint64_t bytes_each);
 
 /* Bytes that one bucket or pair spill may take, so that every worker can hold one and its sort; the same for any number of workers. */
 uint64_t strl__bucket_bytes(const strl_build_context *context);

@@ -9,6 +9,8 @@
 #define CELL_TRIANGLES 48u
 #define CELL_BYTES_OF_MEMORY 1536u /* what a cell costs in cell table, graph and partition, generously */
 
+#define BYTES_OF_BUCKET 3u /* what sorting one takes, in its own size: records twice, keys twice, pairs */
+
 #define BLOCK 512u        /* triangles within which sheets are told apart */
 #define BLOCK_TABLE 4096u /* a power of two above 3 * BLOCK * 2 */
 
@@ -308,7 +310,10 @@ strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest,
     uint64_t most_cells = context->memory_bytes / CELL_BYTES_OF_MEMORY;
     uint64_t least = ingest->triangle_count * 2 / most_cells + 1;
     s.cell_triangles = least < CELL_TRIANGLES ? CELL_TRIANGLES : (uint32_t)least;
-    unsigned window = strl_pool_workers(context->pool);
+    uint64_t largest = 0;
+    for (uint32_t i = 0; i < buckets->count; i++)
+        largest = strl_spill_bytes(buckets->spill[i]) > largest ? strl_spill_bytes(buckets->spill[i]) : largest;
+    unsigned window = strl__ingest_window(context, BYTES_OF_BUCKET * largest);
     s.slots = strl__alloc_zero(strl_pool_window(context->pool, window), sizeof *s.slots);
     strl_status status = s.slots ? strl__build_open_stream(context, "soup", &ingest->soup, err)
                                  : strl__fail(err, STRL_ERR_MEMORY, "no memory to sort");

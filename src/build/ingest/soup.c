@@ -50,6 +50,11 @@ void strl__soup_pack(const strl_ingest *ingest, const strl_soup_triangle *triang
     memcpy(bytes, &triangle->palette, 4);
 }
 
+void strl__soup_set_palette(const strl_ingest *ingest, uint32_t palette, uint8_t *bytes)
+{
+    memcpy(bytes + strl__soup_bucket_bytes(ingest) - sizeof palette, &palette, sizeof palette);
+}
+
 /* Leaves the palette out. */
 static const uint8_t *unpack_corners(const strl_ingest *ingest, const uint8_t *bytes, strl_soup_triangle *triangle)
 {
@@ -90,6 +95,8 @@ strl_status strl_ingest_read(const strl_ingest *ingest, uint64_t first, uint32_t
         if (triangles[i].palette >= ingest->palette_count)
             status = strl__fail(err, STRL_ERR_INTERNAL, "triangle %" PRIu64 " has the part and material %" PRIu32 " of %zu",
                                 first + i, triangles[i].palette, ingest->palette_count);
+        else if (strl__soup_has_collapsed(&triangles[i]))
+            status = strl__fail(err, STRL_ERR_INTERNAL, "triangle %" PRIu64 " has two corners at one place", first + i);
     }
     return status;
 }
@@ -98,6 +105,18 @@ void strl_ingest_drop_cell(const strl_ingest *ingest, uint32_t cell)
 {
     size_t bytes = strl_soup_bytes(ingest);
     strl_spill_drop(ingest->soup, ingest->cells[cell].first * bytes, ingest->cells[cell].count * bytes);
+}
+
+static bool same_place(const uint32_t a[3], const uint32_t b[3])
+{
+    return a[0] == b[0] && a[1] == b[1] && a[2] == b[2];
+}
+
+bool strl__soup_has_collapsed(const strl_soup_triangle *triangle)
+{
+    const strl_soup_corner *corner = triangle->corner;
+    return same_place(corner[0].position, corner[1].position) || same_place(corner[1].position, corner[2].position) ||
+           same_place(corner[2].position, corner[0].position);
 }
 
 /* Spreads the low 21 bits so that two zeros stand between any two. */

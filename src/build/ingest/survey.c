@@ -1,10 +1,11 @@
-/* First pass over the inputs: bounds, edge lengths, a sample of centroids. Constant memory. */
+/* First pass over the inputs: bounds, edge lengths, a sample of centroids. Constant memory for each worker. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "build/ingest/batches.h"
 #include "build/ingest/internal.h"
 
 #define SAMPLE_CAPACITY 65536u
@@ -18,7 +19,21 @@
 #define LEAST_EXTENT 1e-140 /* steps below 2^-512 are not of the container's format */
 #define MOST_COORDINATE 1e150 /* nor those above 2^512; and squares of lengths stay finite */
 
-static void count_edges(model_survey *survey, const strl_triangle *triangle)
+/* What one worker has seen: no order in it. */
+typedef struct tally {
+    double min[3], max[3];
+    bool any_normal, any_colour;
+    uint64_t *edge_histogram; /* [EDGE_BINS] */
+} tally;
+
+typedef struct surveying {
+    strl_build_context *context;
+    model_survey *survey;
+    tally *tallies; /* [workers] */
+    uint64_t bytes_before, bytes_total; /* of the inputs before the one at hand, and of all */
+} surveying;
+
+static void count_edges(uint64_t *histogram, const strl_triangle *triangle)
 {
     for (int c = 0; c < 3; c++) {
         const double *a = triangle->position[c], *b = triangle->position[c == 2 ? 0 : c + 1];
@@ -26,21 +41,19 @@ static void count_edges(model_survey *survey, const strl_triangle *triangle)
         uint64_t bits;
         memcpy(&bits, &length2, sizeof bits);
         if (length2 > 0)
-            survey->edge_histogram[bits >> EDGE_BIN_SHIFT]++;
+            histogram[bits >> EDGE_BIN_SHIFT]++;
     }
 }
 
-/* Keeps one of sample_stride triangles; when the table is full, every other one goes. */
-static void take_sample(model_survey *survey, const strl_triangle *triangle)
+/* Keeps one of sample_stride triangles; when the table is full, every other one goes. index: of all triangles. */
+static void take_sample(model_survey *survey, const strl_triangle *triangle, uint64_t index)
 {
-    if (survey->triangles % survey->sample_stride)
-        return;
     if (survey->sample_count == SAMPLE_CAPACITY) {
         for (uint32_t i = 0; i < SAMPLE_CAPACITY / 2; i++)
             memcpy(survey->sample[i], survey->sample[2 * i], sizeof *survey->sample);
         survey->sample_count /= 2;
         survey->sample_stride *= 2;
-        if (survey->triangles % survey->sample_stride)
+        if (index % survey->sample_stride)
             return;
     }
     for (int k = 0; k < 3; k++)
@@ -49,56 +62,110 @@ static void take_sample(model_survey *survey, const strl_triangle *triangle)
     survey->sample_count++;
 }
 
-static void take(model_survey *survey, const strl_triangle *triangle)
+static void look_at(tally *s, const strl_triangle *triangle)
 {
     for (int c = 0; c < 3; c++)
         for (int k = 0; k < 3; k++) {
             double value = triangle->position[c][k];
-            survey->min[k] = value < survey->min[k] ? value : survey->min[k];
-            survey->max[k] = value > survey->max[k] ? value : survey->max[k];
+            s->min[k] = value < s->min[k] ? value : s->min[k];
+            s->max[k] = value > s->max[k] ? value : s->max[k];
         }
-    survey->any_normal |= (triangle->flags & STRL_TRIANGLE_HAS_NORMAL) != 0;
-    survey->any_colour |= (triangle->flags & STRL_TRIANGLE_HAS_COLOUR) != 0;
-    count_edges(survey, triangle);
-    take_sample(survey, triangle);
-    survey->triangles++;
+    s->any_normal |= (triangle->flags & STRL_TRIANGLE_HAS_NORMAL) != 0;
+    s->any_colour |= (triangle->flags & STRL_TRIANGLE_HAS_COLOUR) != 0;
+    count_edges(s->edge_histogram, triangle);
+}
+
+static strl_status look_at_batch(void *user, const strl_triangle_batch *batch, unsigned slot, unsigned worker,
+                                 strl_error *err)
+{
+    surveying *s = user;
+    (void)slot;
+    (void)err;
+    for (size_t t = 0; t < batch->count; t++)
+        look_at(&s->tallies[worker], &batch->triangle[t]);
+    return STRL_OK;
+}
+
+/* Samples go by a triangle's place in the order of the input. */
+static strl_status sample_batch(void *user, const strl_triangle_batch *batch, unsigned slot, strl_error *err)
+{
+    surveying *s = user;
+    model_survey *survey = s->survey;
+    uint64_t end = survey->triangles + batch->count, stride = survey->sample_stride;
+    (void)slot;
+    for (uint64_t index = (survey->triangles + stride - 1) / stride * stride; index < end;
+         index = (index / survey->sample_stride + 1) * survey->sample_stride)
+        take_sample(survey, &batch->triangle[index - survey->triangles], index);
+    survey->triangles = end;
+    return strl__build_report(s->context, s->bytes_before + batch->bytes_done, s->bytes_total, err);
+}
+
+static bool make_tallies(surveying *s, unsigned workers)
+{
+    s->tallies = strl__alloc_zero(workers, sizeof *s->tallies);
+    bool good = s->tallies != NULL;
+    for (unsigned w = 0; w < workers && good; w++) {
+        s->tallies[w] = (tally){.min = {INFINITY, INFINITY, INFINITY}, .max = {-INFINITY, -INFINITY, -INFINITY}};
+        s->tallies[w].edge_histogram = strl__alloc_zero(EDGE_BINS, sizeof *s->tallies[w].edge_histogram);
+        good = s->tallies[w].edge_histogram != NULL;
+    }
+    return good;
+}
+
+static void gather_tallies(const surveying *s, unsigned workers)
+{
+    model_survey *survey = s->survey;
+    for (unsigned w = 0; w < workers; w++) {
+        const tally *one = &s->tallies[w];
+        for (int k = 0; k < 3; k++) {
+            survey->min[k] = fmin(survey->min[k], one->min[k]) + 0.; /* zeros get one sign, whoever met which */
+            survey->max[k] = fmax(survey->max[k], one->max[k]) + 0.;
+        }
+        survey->any_normal |= one->any_normal;
+        survey->any_colour |= one->any_colour;
+        for (uint32_t i = 0; i < EDGE_BINS; i++)
+            survey->edge_histogram[i] += one->edge_histogram[i];
+    }
+}
+
+static uint64_t bytes_of(const strl_reader *reader)
+{
+    strl_reader_info info;
+    strl_reader_info_get(reader, &info);
+    return info.file_bytes;
 }
 
 strl_status strl__survey_run(strl_build_context *context, strl_reader *const *readers, model_survey *survey, strl_error *err)
 {
-    strl_status status = STRL_OK;
-    uint64_t bytes_before = 0, bytes_total = 0;
-    strl_triangle *batch = strl__alloc(READ_BATCH, sizeof *batch);
+    surveying s = {.context = context, .survey = survey};
+    unsigned workers = strl_pool_workers(context->pool);
+    strl_batch_pass pass;
+    strl_status status = strl__batch_pass_create(context, 0, &pass, err);
+    pass.work = look_at_batch;
+    pass.finish = sample_batch;
+    pass.user = &s;
     *survey = (model_survey){.min = {INFINITY, INFINITY, INFINITY}, .max = {-INFINITY, -INFINITY, -INFINITY},
                               .sample_stride = 1};
     survey->edge_histogram = strl__alloc_zero(EDGE_BINS, sizeof *survey->edge_histogram);
     survey->sample = strl__alloc(SAMPLE_CAPACITY, sizeof *survey->sample);
-    if (!batch || !survey->edge_histogram || !survey->sample) {
+    if (!status && (!make_tallies(&s, workers) || !survey->edge_histogram || !survey->sample))
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory to read the input");
-        goto done;
+    for (uint32_t i = 0; i < context->desc->input_count; i++)
+        s.bytes_total += bytes_of(readers[i]);
+    for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
+        status = strl_reader_rewind(readers[i], err);
+        if (!status)
+            status = strl__batch_pass_run(&pass, readers[i], err);
+        if (context->desc->input_count > 1)
+            strl_reader_rest(readers[i]);
+        s.bytes_before += bytes_of(readers[i]);
     }
-    for (uint32_t i = 0; i < context->desc->input_count; i++) {
-        strl_reader_info info;
-        strl_reader_info_get(readers[i], &info);
-        bytes_total += info.file_bytes;
-    }
-    for (uint32_t i = 0; i < context->desc->input_count; i++) {
-        size_t count;
-        do {
-            status = strl_reader_next(readers[i], batch, READ_BATCH, &count, err);
-            for (size_t t = 0; t < count && !status; t++)
-                take(survey, &batch[t]);
-            if (!status)
-                status = strl__build_report(context, bytes_before + strl_reader_bytes_done(readers[i]), bytes_total, err);
-            if (status)
-                goto done;
-        } while (count);
-        strl_reader_info info;
-        strl_reader_info_get(readers[i], &info);
-        bytes_before += info.file_bytes;
-    }
-done:
-    strl__free(batch);
+    if (!status)
+        gather_tallies(&s, workers);
+    for (unsigned w = 0; s.tallies && w < workers; w++)
+        strl__free(s.tallies[w].edge_histogram);
+    strl__free(s.tallies);
+    strl__batch_pass_deinit(&pass);
     return status;
 }
 

@@ -8,19 +8,24 @@
 #include "base/memory.h"
 #include "render/check.h"
 #include "render/glcommon/gl.h"
+#include "render/style.h"
 
 typedef struct gl3_renderer {
     strl_gl gl;
     uint64_t node_bytes; /* in buffers */
     uint16_t *lines;     /* scratch for ES, which has no polygon mode */
     size_t lines_capacity;
+    strl_vertex *styled; /* scratch */
+    size_t styled_capacity;
 } gl3_renderer;
 
 /* One draw call's worth of context. */
 typedef struct gl3_draw {
     gl3_renderer *self;
     uint64_t frame;
-    bool lines; /* draw expanded indices */
+    bool lines;    /* draw expanded indices */
+    bool discards; /* all fragments may be cut off: ES has no clip distances */
+    const strl_draw_options *options;
     strl_render_stats *stats;
 } gl3_draw;
 
@@ -85,12 +90,23 @@ static strl_status add(gl3_draw *draw, const strl_draw_item *item, strl_cache_en
     glGenBuffers(2, buffers);
     made->place.names.vertices = buffers[0], made->place.names.indices = buffers[1];
     glBindBuffer(GL_ARRAY_BUFFER, buffers[0]);
-    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)vertex_bytes, item->vertices, GL_STATIC_DRAW);
+    glBufferData(GL_ARRAY_BUFFER, (GLsizeiptr)vertex_bytes, NULL, GL_STATIC_DRAW);
     set_attributes();
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, buffers[1]);
     glBufferData(GL_ELEMENT_ARRAY_BUFFER, (GLsizeiptr)index_bytes, NULL, GL_DYNAMIC_DRAW);
-    draw->stats->uploaded_vertices += item->vertex_count;
     *entry = made;
+    return STRL_OK;
+}
+
+static strl_status upload_vertices(gl3_draw *draw, const strl_cache_entry *entry, const strl_draw_item *item, strl_error *err)
+{
+    gl3_renderer *self = draw->self;
+    const strl_vertex *vertices = strl__style_vertices(entry, item, draw->options, &self->styled, &self->styled_capacity);
+    if (!vertices)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for the styled vertices of node %" PRIu32, item->node);
+    glBindBuffer(GL_ARRAY_BUFFER, entry->place.names.vertices);
+    glBufferSubData(GL_ARRAY_BUFFER, 0, (GLsizeiptr)(item->vertex_count * sizeof *vertices), vertices);
+    draw->stats->uploaded_vertices += item->vertex_count;
     return STRL_OK;
 }
 
@@ -134,6 +150,7 @@ static strl_status make_resident(gl3_draw *draw, const strl_draw_item *item, str
         entry = NULL;
     }
     strl_cache_upload upload = strl__cache_plan(entry, item, draw->frame);
+    bool vertices = upload.vertices;
     if (entry) {
         glBindVertexArray(entry->place.names.array);
         strl__cache_touch(&draw->self->gl.cache, entry);
@@ -142,7 +159,10 @@ static strl_status make_resident(gl3_draw *draw, const strl_draw_item *item, str
         if (status != STRL_OK)
             return status;
     }
-    strl_status status = upload_indices(draw, item, upload, err);
+    vertices |= strl__style_update(entry, item, draw->options);
+    strl_status status = vertices ? upload_vertices(draw, entry, item, err) : STRL_OK;
+    if (status == STRL_OK)
+        status = upload_indices(draw, item, upload, err);
     if (status != STRL_OK) {
         release(draw->self, entry);
         return status;
@@ -158,7 +178,10 @@ static strl_status draw_item(gl3_draw *draw, const strl_draw_item *item, const s
     strl_status status = make_resident(draw, item, &entry, err);
     if (status != STRL_OK)
         return status;
-    const strl_gl_program *program = &draw->self->gl.programs[entry->translucent ? STRL_GL_NODE_ALPHA : STRL_GL_NODE];
+    if (entry->hidden)
+        return STRL_OK;
+    bool discards = entry->translucent || entry->hides || draw->discards;
+    const strl_gl_program *program = &draw->self->gl.programs[discards ? STRL_GL_NODE_ALPHA : STRL_GL_NODE];
     glUseProgram(program->name);
     glUniform4fv(program->rows, 6, record->rows[0]);
     glUniform4iv(program->base, 2, record->base[0]);
@@ -174,7 +197,13 @@ static strl_status gl3_draw_list(strl_renderer *renderer, const strl_draw_setup 
                                  strl_render_stats *stats, strl_error *err)
 {
     gl3_renderer *self = (gl3_renderer *)renderer;
-    gl3_draw draw = {self, list->frame, setup->options.wireframe && self->gl.dialect.es, stats};
+    bool es = self->gl.dialect.es;
+    gl3_draw draw = {.self = self,
+                     .frame = list->frame,
+                     .lines = setup->options.wireframe && es,
+                     .discards = strl__gl_has_section(setup) && es,
+                     .options = &setup->options,
+                     .stats = stats};
     strl_gl_placing placing = {0};
     strl_status status = STRL_OK;
     strl__gl_make_current(&self->gl);
@@ -204,6 +233,7 @@ static void gl3_destroy(strl_renderer *renderer)
         release(self, self->gl.cache.oldest);
     strl__gl_deinit(&self->gl);
     strl__free(self->lines);
+    strl__free(self->styled);
     strl__free(self);
 }
 

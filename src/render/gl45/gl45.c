@@ -10,6 +10,7 @@
 #include "render/check.h"
 #include "render/gl45/store.h"
 #include "render/glcommon/gl.h"
+#include "render/style.h"
 
 /* As glMultiDrawElementsIndirect reads it. */
 typedef struct gl45_command {
@@ -33,11 +34,14 @@ typedef struct gl45_renderer {
     uint64_t batch;       /* number of the batch being collected; nodes of it cannot be evicted */
     gl45_queued *queued;  /* [batch_most] */
     strl_gl_item *records; /* [batch_most] */
+    strl_vertex *styled;   /* scratch */
+    size_t styled_capacity;
 } gl45_renderer;
 
 typedef struct gl45_draw {
     gl45_renderer *self;
     uint64_t frame;
+    const strl_draw_options *options;
     strl_render_stats *stats;
 } gl45_draw;
 
@@ -131,13 +135,17 @@ static strl_status add(gl45_draw *draw, const strl_draw_item *item, strl_cache_e
     return STRL_OK;
 }
 
-static void upload(gl45_draw *draw, const strl_cache_entry *entry, const strl_draw_item *item, strl_cache_upload plan)
+static strl_status upload(gl45_draw *draw, const strl_cache_entry *entry, const strl_draw_item *item, strl_cache_upload plan,
+                          strl_error *err)
 {
     gl45_renderer *self = draw->self;
     uint32_t slab = entry->place.range.slab;
     if (plan.vertices) {
-        strl__gl_store_upload(&self->store, &self->ring, slab, (uint64_t)entry->place.range.vertex_at * STRL_GRANULE_BYTES,
-                              item->vertices, item->vertex_count * sizeof *item->vertices);
+        const strl_vertex *vertices = strl__style_vertices(entry, item, draw->options, &self->styled, &self->styled_capacity);
+        if (!vertices)
+            return strl__fail(err, STRL_ERR_MEMORY, "no memory for the styled vertices of node %" PRIu32, item->node);
+        strl__gl_store_upload(&self->store, &self->ring, slab, (uint64_t)entry->place.range.vertex_at * STRL_GRANULE_BYTES, vertices,
+                              item->vertex_count * sizeof *vertices);
         draw->stats->uploaded_vertices += item->vertex_count;
     }
     if (plan.index_count > 0) {
@@ -145,6 +153,7 @@ static void upload(gl45_draw *draw, const strl_cache_entry *entry, const strl_dr
         strl__gl_store_upload(&self->store, &self->ring, slab, at, item->indices + plan.first_index, plan.index_count * sizeof(uint16_t));
         draw->stats->uploaded_indices += plan.index_count;
     }
+    return STRL_OK;
 }
 
 static strl_status make_resident(gl45_draw *draw, const strl_draw_item *item, strl_cache_entry **out, strl_error *err)
@@ -174,7 +183,12 @@ static strl_status make_resident(gl45_draw *draw, const strl_draw_item *item, st
         if (status != STRL_OK)
             return status;
     }
-    upload(draw, entry, item, plan);
+    plan.vertices |= strl__style_update(entry, item, draw->options);
+    strl_status status = upload(draw, entry, item, plan, err);
+    if (status != STRL_OK) {
+        release(self, entry);
+        return status;
+    }
     strl__cache_commit(entry, item, draw->frame);
     *out = entry;
     return STRL_OK;
@@ -189,11 +203,14 @@ static strl_status queue_item(gl45_draw *draw, const strl_draw_item *item, const
     strl_status status = make_resident(draw, item, &entry, err);
     if (status != STRL_OK)
         return status;
+    if (entry->hidden)
+        return STRL_OK;
     uint32_t at = self->batch_count++;
     uint32_t first_index = entry->place.range.index_at * (STRL_GRANULE_BYTES / (uint32_t)sizeof(uint16_t));
     int32_t first_vertex = (int32_t)(entry->place.range.vertex_at * (STRL_GRANULE_BYTES / (uint32_t)sizeof(strl_vertex)));
     self->records[at] = *record;
-    self->queued[at] = (gl45_queued){{item->index_count, 1, first_index, first_vertex, at}, entry->place.range.slab, entry->translucent};
+    self->queued[at] = (gl45_queued){{item->index_count, 1, first_index, first_vertex, at}, entry->place.range.slab,
+                                     entry->translucent || entry->hides};
     entry->batch = self->batch;
     draw->stats->triangles += item->index_count / 3;
     draw->stats->items++;
@@ -209,7 +226,7 @@ static strl_status gl45_draw_list(strl_renderer *renderer, const strl_draw_setup
                                   strl_render_stats *stats, strl_error *err)
 {
     gl45_renderer *self = (gl45_renderer *)renderer;
-    gl45_draw draw = {self, list->frame, stats};
+    gl45_draw draw = {self, list->frame, &setup->options, stats};
     strl_gl_placing placing = {0};
     strl_status status = STRL_OK;
     strl__gl_make_current(&self->gl);
@@ -265,6 +282,7 @@ static void gl45_destroy(strl_renderer *renderer)
     strl__gl_deinit(&self->gl);
     strl__free(self->queued);
     strl__free(self->records);
+    strl__free(self->styled);
     strl__free(self);
 }
 

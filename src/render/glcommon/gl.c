@@ -98,11 +98,30 @@ static void set_projection(strl_gl *gl, const strl_draw_setup *setup)
     values[2] = (float)far, values[3] = (float)(1 / (far - near));
 }
 
+bool strl__gl_has_section(const strl_draw_setup *setup)
+{
+    const double *plane = setup->options.section;
+    return plane[0] != 0 || plane[1] != 0 || plane[2] != 0;
+}
+
+/* In view space: dot(xyz, p) + w >= 0 is drawn. */
+static void find_section(const strl_draw_setup *setup, float out[4])
+{
+    const strl_view *view = &setup->view;
+    const double *plane = setup->options.section, *axes[3] = {view->right, view->up, view->forward};
+    double rest = strl__gl_has_section(setup) ? plane[3] : 1;
+    for (int i = 0; i < 3; i++) {
+        rest -= plane[i] * view->eye[i];
+        out[i] = -(float)(axes[i][0] * plane[0] + axes[i][1] * plane[1] + axes[i][2] * plane[2]);
+    }
+    out[3] = (float)rest;
+}
+
 static void set_uniforms(strl_gl *gl, const strl_gl_program *program, const strl_draw_setup *setup)
 {
     const strl_draw_options *options = &setup->options;
     const double *axes[3] = {setup->view.right, setup->view.up, setup->view.forward};
-    float sky[3];
+    float sky[3], section[4];
     for (int i = 0; i < 3; i++)
         sky[i] = (float)(axes[i][0] * options->sky_up[0] + axes[i][1] * options->sky_up[1] + axes[i][2] * options->sky_up[2]);
     glUseProgram(program->name);
@@ -111,6 +130,8 @@ static void set_uniforms(strl_gl *gl, const strl_gl_program *program, const strl
     glUniform3fv(program->sky_up, 1, sky);
     glUniform1f(program->headlight, options->headlight);
     glUniform1i(program->flat, options->flat);
+    find_section(setup, section);
+    glUniform4fv(program->section, 1, section);
 }
 
 void strl__gl_begin_draw(strl_gl *gl, const strl_draw_setup *setup)
@@ -123,14 +144,18 @@ void strl__gl_begin_draw(strl_gl *gl, const strl_draw_setup *setup)
     if (!gl->dialect.es) {
         glDisable(GL_FRAMEBUFFER_SRGB);
         glPolygonMode(GL_FRONT_AND_BACK, setup->options.wireframe ? GL_LINE : GL_FILL);
+        if (strl__gl_has_section(setup))
+            glEnable(GL_CLIP_DISTANCE0);
     }
 }
 
 strl_status strl__gl_end_draw(strl_gl *gl, strl_error *err)
 {
     set_clip_control(&gl->dialect, false);
-    if (!gl->dialect.es)
+    if (!gl->dialect.es) {
         glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
+        glDisable(GL_CLIP_DISTANCE0);
+    }
     glBindVertexArray(0);
     glUseProgram(0);
     GLenum code = glGetError();

@@ -25,6 +25,8 @@ strl_status strl__gl_init(strl_gl *gl, const strl_renderer_class *klass, const s
 void strl__gl_deinit(strl_gl *gl);
 void strl__gl_make_current(strl_gl *gl);
 
+/* Whether the draw has a plane that cuts. */
+bool strl__gl_has_section(const strl_draw_setup *setup);
 /* Everything but the items: state, target, uniforms of both node programs. */
 void strl__gl_begin_draw(strl_gl *gl, const strl_draw_setup *setup);
 /* Leaves the context as others expect to find it. Fails where GL has recorded an error. */

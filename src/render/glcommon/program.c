@@ -41,6 +41,7 @@ static void find_uniforms(strl_gl_program *program)
     program->sky_up = glGetUniformLocation(name, "u_sky_up");
     program->headlight = glGetUniformLocation(name, "u_headlight");
     program->flat = glGetUniformLocation(name, "u_flat");
+    program->section = glGetUniformLocation(name, "u_section");
     program->rows = glGetUniformLocation(name, "u_rows");
     program->base = glGetUniformLocation(name, "u_base");
     program->samples = glGetUniformLocation(name, "u_samples");

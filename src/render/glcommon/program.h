@@ -16,7 +16,7 @@ typedef struct strl_gl_dialect {
 
 typedef struct strl_gl_program {
     GLuint name; /* 0 = not made yet */
-    GLint projection, orthographic, sky_up, headlight, flat, rows, base; /* -1 where the program has none */
+    GLint projection, orthographic, sky_up, headlight, flat, section, rows, base; /* -1 where the program has none */
     GLint samples, factor;
 } strl_gl_program;
 

@@ -2,8 +2,8 @@
  * specification. A path is the same for equal (bounds, up axis, seed, number of frames) and equal answers of `probe`.
  * A container and its input file differ in those by a lattice step, so to render both with the same cameras save the
  * path of one and load it for the other. */
-#ifndef STRL_CLI_CAMERA_PATH_H
-#define STRL_CLI_CAMERA_PATH_H
+#ifndef STRL_APPS_CAMERA_PATH_H
+#define STRL_APPS_CAMERA_PATH_H
 
 #include <stddef.h>
 #include <stdint.h>

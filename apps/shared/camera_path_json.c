@@ -7,8 +7,8 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
-#include "camera_path.h"
 #include "platform/output.h"
+#include "shared/camera_path.h"
 
 #define MOST_FRAMES 1000000u
 

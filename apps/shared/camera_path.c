@@ -1,4 +1,4 @@
-#include "camera_path.h"
+#include "shared/camera_path.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,0 +1,165 @@
+/* What comes from files and goes to them: the model, dropped files, settings. */
+#include <stdio.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+#include "shared/naming.h"
+#include "viewer/internal.h"
+
+static strl_status name_part(void *context, uint32_t part, char *name, size_t size, strl_error *err)
+{
+    return strl_container_part(context, part, name, size, err);
+}
+
+static strl_status open_walk(const strl__viewer *v, const char *path, strl_viewer_model **out, strl_error *err)
+{
+    strl_viewer_model *model = strl__alloc_zero(1, sizeof *model);
+    *out = NULL;
+    if (!model)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a model");
+    strl_status status = strl_viewer_model_open(model, path, v->desc.memory_bytes, v->desc.error_px, err);
+    if (status == STRL_OK)
+        *out = model;
+    else
+        strl__free(model);
+    return strl_name_file(path, status, err);
+}
+
+static void set_model(strl__viewer *v, strl_viewer_model *model)
+{
+    if (v->model)
+        strl_viewer_model_close(v->model);
+    strl__free(v->model);
+    v->model = model;
+    v->list = (strl_draw_list){0}; /* it was the old walk's */
+}
+
+void strl__viewer_set_title(strl__viewer *v)
+{
+    char title[256];
+    const char *slash = strrchr(v->path, '/');
+    snprintf(title, sizeof title, "%.200s - Stroll", slash ? slash + 1 : v->path);
+    if (v->window)
+        strl_window_set_title(v->window, title);
+}
+
+strl_status strl__viewer_make_renderer(strl__viewer *v, strl_error *err)
+{
+    const strl_renderer_desc desc = {.backend = v->desc.backend,
+                                     .width = v->size[0] ? v->size[0] : 1,
+                                     .height = v->size[1] ? v->size[1] : 1,
+                                     .gpu_memory_bytes = v->desc.gpu_memory_bytes,
+                                     .current_context = true};
+    strl_renderer *renderer = NULL;
+    strl_status status = strl_renderer_create(&desc, &renderer, err);
+    if (status != STRL_OK)
+        return status;
+    strl_renderer_destroy(v->renderer);
+    v->renderer = renderer;
+    return STRL_OK;
+}
+
+strl_status strl__viewer_open_model(strl__viewer *v, const char *path, strl_error *err)
+{
+    strl_viewer_model *model = NULL;
+    strl_parts parts = {0};
+    strl_status status = open_walk(v, path, &model, err);
+    if (status != STRL_OK)
+        return status;
+    const strl_container_info *info = strl_container_get_info(model->container);
+    status = strl_parts_init(&parts, info->part_count, name_part, model->container, err);
+    /* Keys of nodes are the walk's: what the renderer holds under them belongs to the old one. */
+    if (status == STRL_OK && v->renderer)
+        status = strl__viewer_make_renderer(v, err);
+    if (status != STRL_OK) {
+        strl_parts_deinit(&parts);
+        strl_viewer_model_close(model);
+        strl__free(model);
+        return strl_name_file(path, status, err);
+    }
+    set_model(v, model);
+    strl_part_index_destroy(v->index);
+    v->index = NULL;
+    v->look_waits = false;
+    strl_parts_deinit(&v->parts);
+    v->parts = parts;
+    v->controls.search[0] = 0;
+    snprintf(v->path, sizeof v->path, "%s", path);
+    strl__viewer_set_title(v);
+    strl_settings_get_bookmarks(&v->settings, info->model_id, &v->bookmarks);
+    strl__viewer_reset(v);
+    strl_journal_write(v->journal, "opened",
+                       json_pack("{s:s,s:I,s:i}", "file", path, "triangles", (json_int_t)model->triangles, "parts",
+                                 (int)info->part_count));
+    return STRL_OK;
+}
+
+/* The walk and the renderer begin anew, the rest stays. */
+strl_status strl__viewer_set_budgets(strl__viewer *v, strl_error *err)
+{
+    strl_viewer_model *model = NULL;
+    uint64_t memory = v->desc.memory_bytes, gpu_memory = v->desc.gpu_memory_bytes;
+    v->desc.memory_bytes = (uint64_t)((double)v->controls.memory_mib * (1 << 20));
+    v->desc.gpu_memory_bytes = (uint64_t)((double)v->controls.gpu_memory_mib * (1 << 20));
+    strl_status status = open_walk(v, v->path, &model, err);
+    if (status == STRL_OK)
+        status = strl__viewer_make_renderer(v, err);
+    if (status == STRL_OK) {
+        set_model(v, model);
+        return STRL_OK;
+    }
+    if (model)
+        strl_viewer_model_close(model);
+    strl__free(model);
+    v->desc.memory_bytes = memory, v->desc.gpu_memory_bytes = gpu_memory;
+    v->controls.memory_mib = (float)memory / (1 << 20), v->controls.gpu_memory_mib = (float)gpu_memory / (1 << 20);
+    return status;
+}
+
+/* ---- dropped files */
+
+static void open_built(strl__viewer *v)
+{
+    strl_error err = {0};
+    if (strl__viewer_open_model(v, v->news.container, &err) != STRL_OK)
+        strl__viewer_say(v, "%s", err.message);
+    v->frames_left = STRL__FRAMES_AFTER_INPUT;
+}
+
+void strl__viewer_poll_opener(strl__viewer *v)
+{
+    strl_opener_poll(v->opener, &v->news);
+    if (v->news.state == STRL_OPENER_READY)
+        open_built(v);
+    if (v->news.state == STRL_OPENER_FAILED) {
+        strl_journal_write(v->journal, "build", json_pack("{s:s}", "failed", v->news.error.message));
+        strl__viewer_say(v, "%s", v->news.error.status == STRL_ERR_CANCELLED ? "cancelled" : v->news.error.message);
+        v->frames_left = STRL__FRAMES_AFTER_INPUT;
+    }
+}
+
+/* ---- settings */
+
+/* What nobody has touched in the window stays as it was remembered, whatever the command line said this time. */
+void strl__viewer_remember(strl__viewer *v)
+{
+    strl_error err = {0};
+    strl_settings *settings = &v->settings;
+    if ((double)v->controls.error_px != v->begun.error_px)
+        settings->error_px = v->controls.error_px;
+    if (v->desc.memory_bytes != v->begun.memory_bytes)
+        settings->memory_bytes = v->desc.memory_bytes;
+    if (v->desc.gpu_memory_bytes != v->begun.gpu_memory_bytes)
+        settings->gpu_memory_bytes = v->desc.gpu_memory_bytes;
+    uint32_t size[2];
+    strl_window_size(v->window, size);
+    if (size[0] >= 64 && size[1] >= 64 && (size[0] != v->begun.size[0] || size[1] != v->begun.size[1]))
+        memcpy(settings->size, size, sizeof size);
+    settings->text_scale = v->controls.text_scale;
+    settings->show_parts = v->controls.parts;
+    settings->orthographic = v->controls.orthographic;
+    strl_settings_set_bookmarks(settings, strl_container_get_info(v->model->container)->model_id, &v->bookmarks);
+    if (strl_settings_save(settings, &err) != STRL_OK)
+        strl__viewer_say(v, "%s", err.message);
+}

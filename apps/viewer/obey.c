@@ -1,0 +1,290 @@
+/* What keys and panels ask for. */
+#include <math.h>
+#include <string.h>
+
+#include "viewer/internal.h"
+
+#define ERROR_STEP 1.25f
+/* Of the range in which a section meets the model. */
+#define SECTION_STEP 0.01
+
+void strl__viewer_reset(strl__viewer *v)
+{
+    strl_gui_controls old = v->controls;
+    v->controls = (strl_gui_controls){.error_px = (float)v->desc.error_px,
+                                      .help = old.help,
+                                      .parts = old.parts,
+                                      .memory_mib = old.memory_mib,
+                                      .gpu_memory_mib = old.gpu_memory_mib,
+                                      .text_scale = old.text_scale,
+                                      .requests = old.requests};
+    strl_navigator_init(&v->navigator, v->model->bounds, v->model->up_axis, v->model->unit_metres);
+    strl_recorder_stop(&v->recorder);
+    strl_parts_select(&v->parts, 0, 0);
+    strl_parts_show_all(&v->parts);
+    v->picks.count = 0;
+    v->section = (strl_section){0};
+}
+
+static void toggle_debug(strl__viewer *v, strl_debug_colour colour)
+{
+    v->controls.debug = v->controls.debug == colour ? STRL_DEBUG_NONE : colour;
+}
+
+static void scale_error(strl__viewer *v, float factor)
+{
+    /* --error may lie outside the slider's range: a key then leads no further out, and not to the other side. */
+    float error_px = v->controls.error_px, least = fminf(error_px, STRL_GUI_LEAST_ERROR_PX);
+    float most = fmaxf(error_px, STRL_GUI_MOST_ERROR_PX);
+    v->controls.error_px = fminf(fmaxf(error_px * factor, least), most);
+}
+
+/* ---- parts */
+
+/* The places that a request is about. False where it is about nothing. */
+static bool places_of(const strl__viewer *v, uint32_t node, uint32_t *first, uint32_t *count)
+{
+    const strl_part_tree *tree = &v->parts.tree;
+    *first = v->parts.selected_first, *count = v->parts.selected_count;
+    if (node < tree->node_count)
+        *first = tree->nodes[node].first_part, *count = tree->nodes[node].part_count;
+    return *count > 0;
+}
+
+static void obey_parts(strl__viewer *v, strl_request request)
+{
+    uint32_t first, count;
+    if (request.action == STRL_ACTION_SHOW_ALL) {
+        strl_parts_show_all(&v->parts);
+    } else if (!places_of(v, request.index, &first, &count)) {
+        strl__viewer_say(v, "nothing is selected: click a part, or a line of the list");
+        return;
+    } else if (request.action == STRL_ACTION_SELECT) {
+        strl_parts_select(&v->parts, first, count);
+        return;
+    } else if (request.action == STRL_ACTION_ISOLATE) {
+        strl_parts_isolate(&v->parts, first, count);
+    } else {
+        strl_parts_hide(&v->parts, first, count, request.action == STRL_ACTION_HIDE);
+    }
+    strl_journal_write(v->journal, "hidden", json_pack("{s:i}", "count", (int)v->parts.hidden_count));
+}
+
+/* ---- section */
+
+void strl__viewer_journal_section(strl__viewer *v)
+{
+    strl_journal_write(v->journal, "section",
+                       json_pack("{s:b,s:o,s:f}", "on", v->section.on, "normal", strl_journal_vector(v->section.normal),
+                                 "offset", v->section.offset));
+}
+
+static void toggle_section(strl__viewer *v)
+{
+    const double *n = v->section.normal;
+    if (n[0] == 0 && n[1] == 0 && n[2] == 0)
+        strl_section_by_axis(&v->section, v->model->up_axis, v->model->bounds);
+    else
+        v->section.on = !v->section.on;
+}
+
+static void section_by_picks(strl__viewer *v)
+{
+    double points[3][3];
+    if (v->picks.count < 3) {
+        strl__viewer_say(v, "a section through three points: pick three first");
+        return;
+    }
+    for (int i = 0; i < 3; i++)
+        memcpy(points[i], v->picks.items[i].pick.point, sizeof points[i]);
+    if (!strl_section_by_points(&v->section, (const double(*)[3])points, v->camera.eye))
+        strl__viewer_say(v, "the last three picks lie in a line: no section goes through them alone");
+}
+
+static void section_by_normal(strl__viewer *v)
+{
+    const strl_picked *newest = strl_picks_newest(&v->picks);
+    if (newest)
+        strl_section_by_normal(&v->section, newest->pick.point, newest->pick.normal);
+    else
+        strl__viewer_say(v, "a section along a surface: pick a point on it first");
+}
+
+static void obey_section(strl__viewer *v, strl_request request)
+{
+    const double *bounds = v->model->bounds;
+    switch (request.action) {
+    case STRL_ACTION_SECTION:
+        toggle_section(v);
+        break;
+    case STRL_ACTION_SECTION_AXIS:
+        strl_section_by_axis(&v->section, request.index, bounds);
+        break;
+    case STRL_ACTION_SECTION_NORMAL:
+        section_by_normal(v);
+        break;
+    case STRL_ACTION_SECTION_POINTS:
+        section_by_picks(v);
+        break;
+    case STRL_ACTION_SECTION_FLIP:
+        strl_section_flip(&v->section);
+        break;
+    default:
+        if (v->section.on)
+            strl_section_move(&v->section, bounds,
+                              request.action == STRL_ACTION_SECTION_FORTH ? SECTION_STEP : -SECTION_STEP);
+    }
+    v->controls.section_offset = v->section.offset;
+    strl__viewer_journal_section(v);
+}
+
+/* ---- bookmarks */
+
+static void go_bookmark(strl__viewer *v, const strl_bookmark *bookmark)
+{
+    if (!bookmark) {
+        strl__viewer_say(v, "there is no bookmark yet: B makes one");
+        return;
+    }
+    strl_recorder_stop(&v->recorder);
+    v->controls.orthographic = bookmark->orthographic;
+    strl_navigator_go(&v->navigator, &bookmark->pose, STRL__GO_SECONDS);
+    strl__viewer_say(v, "%s", bookmark->name);
+}
+
+static void obey_bookmarks(strl__viewer *v, strl_request request)
+{
+    if (request.action == STRL_ACTION_NEXT_BOOKMARK) {
+        go_bookmark(v, strl_bookmarks_next(&v->bookmarks));
+        return;
+    }
+    if (request.action == STRL_ACTION_GO_BOOKMARK) {
+        go_bookmark(v, request.index < v->bookmarks.count ? &v->bookmarks.items[request.index] : NULL);
+        return;
+    }
+    if (request.action == STRL_ACTION_DROP_BOOKMARK)
+        strl_bookmarks_remove(&v->bookmarks, request.index);
+    else if (strl_bookmarks_add(&v->bookmarks, v->controls.bookmark, &v->navigator))
+        strl__viewer_say(v, "bookmark %s", v->bookmarks.items[v->bookmarks.count - 1].name);
+    else
+        strl__viewer_say(v, "there is no room for more than %u bookmarks of a model", STRL_MOST_BOOKMARKS);
+    v->controls.bookmark[0] = 0;
+    strl__viewer_remember(v);
+}
+
+/* ---- camera and pictures */
+
+static void go_home(strl__viewer *v)
+{
+    strl_pose home = strl_navigator_home(&v->navigator);
+    strl_recorder_stop(&v->recorder);
+    strl_navigator_go(&v->navigator, &home, STRL__GO_SECONDS);
+}
+
+static void obey_camera(strl__viewer *v, strl_action action)
+{
+    switch (action) {
+    case STRL_ACTION_ORBIT:
+        v->controls.mode = STRL_NAVIGATOR_ORBIT;
+        break;
+    case STRL_ACTION_FLY:
+        v->controls.mode = STRL_NAVIGATOR_FLY;
+        break;
+    case STRL_ACTION_WALK:
+        v->controls.mode = STRL_NAVIGATOR_WALK;
+        break;
+    case STRL_ACTION_ORTHOGRAPHIC:
+        v->controls.orthographic = !v->controls.orthographic;
+        break;
+    case STRL_ACTION_HOME:
+        go_home(v);
+        break;
+    case STRL_ACTION_LOOK:
+        strl__viewer_look(v);
+        break;
+    case STRL_ACTION_RECORD:
+        strl__viewer_toggle_record(v);
+        break;
+    case STRL_ACTION_REPLAY:
+        strl__viewer_toggle_replay(v);
+        break;
+    default:
+        break;
+    }
+}
+
+static void obey_picture(strl__viewer *v, strl_action action)
+{
+    strl_gui_controls *controls = &v->controls;
+    switch (action) {
+    case STRL_ACTION_NO_COLOURS:
+        controls->debug = STRL_DEBUG_NONE;
+        break;
+    case STRL_ACTION_CLUSTER_COLOURS:
+        toggle_debug(v, STRL_DEBUG_CLUSTER);
+        break;
+    case STRL_ACTION_LEVEL_COLOURS:
+        toggle_debug(v, STRL_DEBUG_LEVEL);
+        break;
+    case STRL_ACTION_ERROR_COLOURS:
+        toggle_debug(v, STRL_DEBUG_ERROR);
+        break;
+    case STRL_ACTION_WIREFRAME:
+        controls->wireframe = !controls->wireframe;
+        break;
+    case STRL_ACTION_FLAT:
+        controls->flat = !controls->flat;
+        break;
+    case STRL_ACTION_FREEZE:
+        controls->frozen = !controls->frozen;
+        break;
+    case STRL_ACTION_COARSER:
+        scale_error(v, ERROR_STEP);
+        break;
+    case STRL_ACTION_FINER:
+        scale_error(v, 1 / ERROR_STEP);
+        break;
+    case STRL_ACTION_SCREENSHOT:
+        v->screenshot = true;
+        break;
+    default:
+        break;
+    }
+}
+
+static void set_budgets(strl__viewer *v)
+{
+    strl_error err = {0};
+    if (strl__viewer_set_budgets(v, &err) != STRL_OK)
+        strl__viewer_say(v, "%s", err.message);
+}
+
+bool strl__viewer_obey(strl__viewer *v, strl_request request)
+{
+    strl_action action = request.action;
+    if (action == STRL_ACTION_RESET)
+        strl__viewer_reset(v); /* now: the same frame's later keys change what it resets */
+    else if (action == STRL_ACTION_HELP)
+        v->controls.help = !v->controls.help;
+    else if (action == STRL_ACTION_PARTS)
+        v->controls.parts = !v->controls.parts;
+    else if (action == STRL_ACTION_FORGET_PICKS)
+        v->picks.count = 0;
+    else if (action == STRL_ACTION_OPEN_NODE)
+        strl_part_tree_toggle(&v->parts.tree, request.index);
+    else if (action == STRL_ACTION_BUDGETS)
+        set_budgets(v);
+    else if (action == STRL_ACTION_CANCEL_BUILD)
+        strl_opener_cancel(v->opener);
+    else if (action >= STRL_ACTION_SELECT && action <= STRL_ACTION_SHOW_ALL)
+        obey_parts(v, request);
+    else if (action >= STRL_ACTION_SECTION && action <= STRL_ACTION_SECTION_BACK)
+        obey_section(v, request);
+    else if (action >= STRL_ACTION_BOOKMARK && action <= STRL_ACTION_DROP_BOOKMARK)
+        obey_bookmarks(v, request);
+    else if (action >= STRL_ACTION_NO_COLOURS && action <= STRL_ACTION_SCREENSHOT)
+        obey_picture(v, action);
+    else
+        obey_camera(v, action);
+    return action == STRL_ACTION_QUIT;
+}

@@ -1,0 +1,207 @@
+/* What the drawn nodes use, checked once before anything is read: so that the number of triangles
+ * is known and a broken file is refused at once. */
+#include <inttypes.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "readers/gltf.h"
+
+#define TYPE(scalar) (1u << (scalar))
+
+/* What an accessor may be in one place. */
+typedef struct expectation {
+    const char *name;
+    unsigned components, more_components; /* either */
+    unsigned types;                       /* one bit each */
+    const char *sentence;
+} expectation;
+
+static const expectation expected_position = {"POSITION", 3, 3,
+                                              TYPE(STRL__F32) | TYPE(STRL__I8) | TYPE(STRL__U8) |
+                                                  TYPE(STRL__I16) | TYPE(STRL__U16),
+                                              "three floats, bytes or shorts"};
+static const expectation expected_normal = {"NORMAL", 3, 3,
+                                            TYPE(STRL__F32) | TYPE(STRL__I8) | TYPE(STRL__I16),
+                                            "three floats, signed bytes or shorts"};
+static const expectation expected_colour = {"COLOR_0", 3, 4,
+                                            TYPE(STRL__F32) | TYPE(STRL__U8) | TYPE(STRL__U16),
+                                            "three or four floats, unsigned bytes or shorts"};
+static const expectation expected_indices = {
+    "indices", 1, 1, TYPE(STRL__U8) | TYPE(STRL__U16) | TYPE(STRL__U32), "unsigned integers"};
+static const expectation expected_translation = {"TRANSLATION", 3, 3, TYPE(STRL__F32),
+                                                 "three floats"};
+static const expectation expected_rotation = {"ROTATION", 4, 4,
+                                              TYPE(STRL__F32) | TYPE(STRL__I8) | TYPE(STRL__I16),
+                                              "four floats, signed bytes or shorts"};
+static const expectation expected_scale = {"SCALE", 3, 3, TYPE(STRL__F32), "three floats"};
+
+/* The kind of an accessor, not its bytes. */
+static strl_status check_kind(const strl__gltf *gltf, uint32_t index, const expectation *expected,
+                              strl_error *err)
+{
+    const char *path = gltf->reader->path;
+    if (index >= gltf->accessor_count)
+        return strl__fail(err, STRL_ERR_FORMAT, "%s, %s: expected one of %zu accessors, found %u",
+                          path, expected->name, gltf->accessor_count, index);
+    const strl__gltf_column *column = &gltf->accessors[index].values;
+    if ((column->components == expected->components ||
+         column->components == expected->more_components) &&
+        expected->types >> column->type & 1)
+        return STRL_OK;
+    return strl__fail(err, STRL_ERR_FORMAT, "%s, accessors[%u]: expected %s as %s, found others",
+                      path, index, expected->sentence, expected->name);
+}
+
+static strl_status check_use(strl__gltf *gltf, uint32_t index, const expectation *expected,
+                             bool is_compressed, strl_error *err)
+{
+    strl_status status = check_kind(gltf, index, expected, err);
+    if (!status && !is_compressed)
+        status = strl__gltf_check_accessor(gltf, index, err);
+    return status;
+}
+
+/* NORMAL and COLOR_0 follow POSITION. Their integers are always normalized, said or not. */
+static strl_status check_companion(strl__gltf *gltf, const strl__gltf_primitive *primitive,
+                                   uint32_t index, const expectation *expected, bool is_compressed,
+                                   strl_error *err)
+{
+    if (index == STRL__NO_ITEM)
+        return STRL_OK;
+    strl_status status = check_use(gltf, index, expected, is_compressed, err);
+    if (status)
+        return status;
+    strl__gltf_accessor *accessor = &gltf->accessors[index];
+    accessor->values.normalized = accessor->values.type != STRL__F32;
+    if (accessor->sparse)
+        accessor->sparse->values.normalized = accessor->values.normalized;
+    if (accessor->count >= gltf->accessors[primitive->position].count)
+        return STRL_OK;
+    return strl__fail(err, STRL_ERR_FORMAT,
+                      "%s, accessors[%u]: expected %" PRIu64 " elements of %s, as many as POSITION "
+                      "has, found %" PRIu64,
+                      gltf->reader->path, index, gltf->accessors[primitive->position].count,
+                      expected->name, accessor->count);
+}
+
+static strl_status check_triangles(strl__gltf *gltf, const strl__gltf_primitive *primitive,
+                                   strl_error *err)
+{
+    const strl__gltf_draco_use *draco = primitive->draco;
+    strl_status status = check_use(gltf, primitive->position, &expected_position,
+                                   draco && draco->position != STRL__NO_ITEM, err);
+    if (!status)
+        status = check_companion(gltf, primitive, primitive->normal, &expected_normal,
+                                 draco && draco->normal != STRL__NO_ITEM, err);
+    if (!status)
+        status = check_companion(gltf, primitive, primitive->colour, &expected_colour,
+                                 draco && draco->colour != STRL__NO_ITEM, err);
+    if (!status && primitive->indices != STRL__NO_ITEM)
+        status = check_use(gltf, primitive->indices, &expected_indices, draco != NULL, err);
+    if (!status && draco)
+        status = strl__gltf_check_view(gltf, draco->view, err);
+    if (!status && draco && primitive->indices == STRL__NO_ITEM)
+        status = strl__fail(err, STRL_ERR_FORMAT,
+                            "%s: expected indices beside KHR_draco_mesh_compression, found none",
+                            gltf->reader->path);
+    return status;
+}
+
+uint64_t strl__gltf_element_count(const strl__gltf *gltf, const strl__gltf_primitive *primitive)
+{
+    uint32_t index = primitive->indices != STRL__NO_ITEM ? primitive->indices : primitive->position;
+    return index == STRL__NO_ITEM ? 0 : gltf->accessors[index].count;
+}
+
+uint64_t strl__gltf_triangle_count(unsigned mode, uint64_t elements)
+{
+    if (mode < 4)
+        return 0;
+    return mode == 4 ? elements / 3 : elements < 3 ? 0 : elements - 2;
+}
+
+static strl_status check_primitive(strl__gltf *gltf, strl__gltf_mesh *mesh,
+                                   const strl__gltf_primitive *primitive, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    if (primitive->material != STRL__NO_ITEM && primitive->material >= gltf->material_count)
+        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected one of %zu materials, found %u",
+                          gltf->reader->path, gltf->material_count, primitive->material);
+    if (primitive->position == STRL__NO_ITEM) /* nothing to draw, says the specification */
+        return STRL_OK;
+    if (primitive->mode >= 4)
+        status = check_triangles(gltf, primitive, err);
+    else
+        status = check_kind(gltf, primitive->position, &expected_position, err);
+    if (!status && primitive->mode < 4 && primitive->indices != STRL__NO_ITEM)
+        status = check_kind(gltf, primitive->indices, &expected_indices, err);
+    if (status)
+        return status;
+    uint64_t elements = strl__gltf_element_count(gltf, primitive);
+    mesh->triangles += strl__gltf_triangle_count(primitive->mode, elements);
+    mesh->vertices += gltf->accessors[primitive->position].count;
+    return STRL_OK;
+}
+
+static strl_status check_mesh(strl__gltf *gltf, uint32_t index, strl_error *err)
+{
+    strl__gltf_mesh *mesh = &gltf->meshes[index];
+    strl_status status = STRL_OK;
+    if (mesh->is_checked)
+        return STRL_OK;
+    for (uint32_t i = 0; i < mesh->primitive_count && !status; i++)
+        status = check_primitive(gltf, mesh, &gltf->primitives[mesh->first_primitive + i], err);
+    mesh->is_checked = true;
+    gltf->vertices += mesh->vertices;
+    return status ? strl__fail_context(err, status, "meshes[%u]", index) : STRL_OK;
+}
+
+static strl_status check_instances(strl__gltf *gltf, strl__gltf_instances *instances,
+                                   strl_error *err)
+{
+    const uint32_t accessors[3] = {instances->translation, instances->rotation, instances->scale};
+    const expectation *const expected[3] = {&expected_translation, &expected_rotation,
+                                            &expected_scale};
+    bool has_count = false;
+    for (unsigned i = 0; i < 3; i++) {
+        if (accessors[i] == STRL__NO_ITEM)
+            continue;
+        strl_status status = check_use(gltf, accessors[i], expected[i], false, err);
+        if (status)
+            return status;
+        strl__gltf_accessor *accessor = &gltf->accessors[accessors[i]];
+        if (has_count && accessor->count != instances->count)
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "%s, accessors[%u]: expected %" PRIu64 " instances, found %" PRIu64,
+                              gltf->reader->path, accessors[i], instances->count, accessor->count);
+        instances->count = accessor->count;
+        accessor->values.normalized = accessor->values.type != STRL__F32;
+        has_count = true;
+    }
+    return STRL_OK;
+}
+
+/* More than can be counted is as good as the largest number. */
+static void add_product(uint64_t *sum, uint64_t a, uint64_t b)
+{
+    uint64_t product;
+    if (__builtin_mul_overflow(a, b, &product) || __builtin_add_overflow(*sum, product, sum))
+        *sum = UINT64_MAX;
+}
+
+strl_status strl__gltf_check_scene(strl__gltf *gltf, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    while (!status && strl__gltf_next_node(gltf)) {
+        strl__gltf_node *node = &gltf->nodes[gltf->pass.node];
+        if (node->mesh == STRL__NO_ITEM)
+            continue;
+        status = check_mesh(gltf, node->mesh, err);
+        if (!status && node->instances)
+            status = check_instances(gltf, node->instances, err);
+        add_product(&gltf->triangles, gltf->meshes[node->mesh].triangles,
+                    node->instances ? node->instances->count : 1);
+    }
+    strl__gltf_rewind(gltf);
+    return status;
+}

@@ -1,0 +1,187 @@
+#include "readers/gltf_draco.h"
+
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <memory>
+#include <new>
+
+#include <draco/compression/decode.h>
+
+struct strl__draco {
+    std::unique_ptr<draco::Mesh> mesh;
+};
+
+namespace
+{
+
+/* The start of a bitstream, as its specification has it:
+ * https://google.github.io/draco/spec/ (header, metadata, connectivity). */
+struct start {
+    const uint8_t *at, *end;
+    bool failed = false;
+
+    uint64_t bytes(unsigned count)
+    {
+        uint64_t value = 0;
+        if (static_cast<size_t>(end - at) < count) {
+            failed = true;
+            return 0;
+        }
+        for (unsigned i = 0; i < count; i++)
+            value |= static_cast<uint64_t>(*at++) << (8 * i);
+        return value;
+    }
+    uint64_t varint()
+    {
+        uint64_t value = 0;
+        for (unsigned shift = 0; shift < 63; shift += 7) {
+            uint64_t byte = bytes(1);
+            value |= (byte & 127) << shift;
+            if (failed || byte < 128)
+                return value;
+        }
+        failed = true;
+        return 0;
+    }
+    void skip(uint64_t count)
+    {
+        if (static_cast<uint64_t>(end - at) < count)
+            failed = true;
+        else
+            at += count;
+    }
+    void skip_metadata(unsigned depth)
+    {
+        uint64_t entries = varint();
+        for (uint64_t i = 0; i < entries && !failed; i++) {
+            skip(bytes(1));
+            skip(varint());
+        }
+        uint64_t inner = varint();
+        failed = failed || depth > 16;
+        for (uint64_t i = 0; i < inner && !failed; i++) {
+            skip(bytes(1));
+            skip_metadata(depth + 1);
+        }
+    }
+};
+
+constexpr unsigned metadata_flag = 0x8000;
+constexpr unsigned triangular_mesh = 1;
+constexpr unsigned edgebreaker = 1;
+
+void skip_all_metadata(start &in)
+{
+    uint64_t attributes = in.varint();
+    for (uint64_t i = 0; i < attributes && !in.failed; i++) {
+        in.varint();
+        in.skip_metadata(0);
+    }
+    in.skip_metadata(0);
+}
+
+} // namespace
+
+int strl__draco_announced(const uint8_t *data, size_t size, uint64_t *faces, uint64_t *points)
+{
+    start in{data, data + size};
+    if (size < 11 || std::memcmp(data, "DRACO", 5) != 0)
+        return -1;
+    in.skip(5);
+    const unsigned major = static_cast<unsigned>(in.bytes(1));
+    const unsigned minor = static_cast<unsigned>(in.bytes(1));
+    const unsigned type = static_cast<unsigned>(in.bytes(1));
+    const unsigned method = static_cast<unsigned>(in.bytes(1));
+    const unsigned flags = static_cast<unsigned>(in.bytes(2));
+    if (major != 2 || minor < 2 || type != triangular_mesh)
+        return -1;
+    if (flags & metadata_flag)
+        skip_all_metadata(in);
+    if (method == edgebreaker) {
+        in.skip(1); /* the way of traversal */
+        *points = in.varint();
+        *faces = in.varint();
+    } else {
+        *faces = in.varint();
+        *points = in.varint();
+    }
+    return in.failed ? -1 : 0;
+}
+
+strl__draco *strl__draco_decode(const uint8_t *data, size_t size, char why[120])
+{
+    std::snprintf(why, 120, "no memory");
+    try {
+        draco::DecoderBuffer buffer;
+        draco::Decoder decoder;
+        buffer.Init(reinterpret_cast<const char *>(data), size);
+        auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
+        if (!decoded.ok()) {
+            std::snprintf(why, 120, "%s", decoded.status().error_msg());
+            return nullptr;
+        }
+        std::unique_ptr<strl__draco> mesh(new strl__draco);
+        mesh->mesh = std::move(decoded).value();
+        return mesh.release();
+    } catch (const std::exception &) {
+        return nullptr;
+    }
+}
+
+uint64_t strl__draco_face_count(const strl__draco *mesh)
+{
+    return mesh->mesh->num_faces();
+}
+
+uint64_t strl__draco_point_count(const strl__draco *mesh)
+{
+    return mesh->mesh->num_points();
+}
+
+void strl__draco_faces(const strl__draco *mesh, uint64_t first, size_t count, uint32_t *corners)
+{
+    for (size_t i = 0; i < count; i++) {
+        const auto &face = mesh->mesh->face(draco::FaceIndex(static_cast<uint32_t>(first + i)));
+        for (unsigned corner = 0; corner < 3; corner++)
+            corners[3 * i + corner] = face[corner].value();
+    }
+}
+
+unsigned strl__draco_components(const strl__draco *mesh, uint32_t id)
+{
+    const draco::PointAttribute *attribute = mesh->mesh->GetAttributeByUniqueId(id);
+    return attribute ? static_cast<unsigned>(attribute->num_components()) : 0;
+}
+
+int strl__draco_numbers(const strl__draco *mesh, uint32_t id, uint64_t first, size_t count,
+                        unsigned components, double *numbers)
+{
+    const draco::PointAttribute *attribute = mesh->mesh->GetAttributeByUniqueId(id);
+    if (!attribute || components > 4 || attribute->num_components() != static_cast<int>(components))
+        return -1;
+    for (size_t i = 0; i < count; i++) {
+        const auto value =
+            attribute->mapped_index(draco::PointIndex(static_cast<uint32_t>(first + i)));
+        float reals[4];
+        int32_t integers[4];
+        bool good = value.value() < attribute->size();
+        if (good && attribute->data_type() == draco::DT_FLOAT32)
+            good = attribute->ConvertValue<float>(value, static_cast<int8_t>(components), reals);
+        else if (good)
+            good =
+                attribute->ConvertValue<int32_t>(value, static_cast<int8_t>(components), integers);
+        if (!good)
+            return -1;
+        for (unsigned k = 0; k < components; k++)
+            numbers[i * components + k] = attribute->data_type() == draco::DT_FLOAT32
+                                              ? static_cast<double>(reals[k])
+                                              : integers[k];
+    }
+    return 0;
+}
+
+void strl__draco_close(strl__draco *mesh)
+{
+    delete mesh;
+}

@@ -1,0 +1,114 @@
+/* read_mesh FILE [MEMORY_BYTES [SCRATCH_DIR]]: what a reader gives, as one JSON object for scripts:
+ * the triangles (the first 4,096 of them), a hash of all positions, drops, parts, materials. Reads
+ * twice and exits 3 where the two passes differ. A refusal is {"error": SENTENCE}. */
+#include <inttypes.h>
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include "readers/reader.h"
+
+#define BATCH 509u
+#define SHOWN 4096u
+
+typedef struct pass_result {
+    uint64_t count, hash;
+    strl_reader_drops drops;
+    json_t *triangles; /* NULL: they are not listed */
+} pass_result;
+
+/* FNV-1a over the coordinates in 1/1024, so that a script can do the same sum. */
+static uint64_t hash_number(uint64_t hash, double value)
+{
+    int64_t rounded = (int64_t)floor(value * 1024 + 0.5);
+    for (unsigned i = 0; i < 8; i++)
+        hash = (hash ^ ((uint64_t)rounded >> (8 * i) & 255)) * 1099511628211u;
+    return hash;
+}
+
+static json_t *show(const strl_triangle *t)
+{
+    json_t *positions = json_array(), *normals = json_array(), *colours = json_array();
+    for (unsigned i = 0; i < 9; i++) {
+        json_array_append_new(positions, json_real(t->position[i / 3][i % 3]));
+        json_array_append_new(normals, json_real((double)t->normal[i / 3][i % 3]));
+    }
+    for (unsigned i = 0; i < 3; i++)
+        json_array_append_new(colours, json_integer(t->colour[i]));
+    return json_pack("{s:o,s:o,s:o,s:I,s:I,s:I}", "positions", positions, "normals", normals,
+                     "colours", colours, "part", (json_int_t)t->part, "material",
+                     (json_int_t)t->material, "flags", (json_int_t)t->flags);
+}
+
+static strl_status read_pass(strl_reader *reader, pass_result *pass, strl_error *err)
+{
+    static strl_triangle triangles[BATCH];
+    strl_status status;
+    size_t count;
+    pass->hash = 14695981039346656037u;
+    do {
+        status = strl_reader_next(reader, triangles, BATCH, &count, err);
+        for (size_t i = 0; i < count && !status; i++) {
+            for (unsigned k = 0; k < 9; k++)
+                pass->hash = hash_number(pass->hash, triangles[i].position[k / 3][k % 3]);
+            if (pass->triangles && pass->count < SHOWN)
+                json_array_append_new(pass->triangles, show(&triangles[i]));
+            pass->count++;
+        }
+    } while (!status && count);
+    strl_reader_drops_get(reader, &pass->drops);
+    return status;
+}
+
+static json_t *describe(const strl_reader *reader, const pass_result *pass)
+{
+    char hash[24];
+    strl_reader_info info;
+    json_t *parts = json_array(), *materials = json_array();
+    strl_reader_info_get(reader, &info);
+    for (uint32_t i = 0; i < strl_reader_part_count(reader); i++)
+        json_array_append_new(parts, json_string(strl_reader_part_name(reader, i)));
+    for (uint32_t i = 0; i < strl_reader_material_count(reader); i++) {
+        uint32_t rgba;
+        const char *name = strl_reader_material(reader, i, &rgba);
+        json_array_append_new(materials, json_pack("[s,I]", name, (json_int_t)rgba));
+    }
+    snprintf(hash, sizeof hash, "%016" PRIx64, pass->hash);
+    return json_pack("{s:s,s:s,s:i,s:I,s:b,s:I,s:I,s:I,s:I,s:s,s:I,s:I,s:I,s:I,s:o,s:o,s:O}",
+                     "format", info.format, "unit", info.default_unit ? info.default_unit : "",
+                     "up", (int)info.default_up, "hint", (json_int_t)info.triangles_hint, "exact",
+                     (int)info.hint_is_exact, "bytes", (json_int_t)info.file_bytes, "bytes_done",
+                     (json_int_t)strl_reader_bytes_done(reader), "vertices",
+                     (json_int_t)strl_reader_vertex_count(reader), "count", (json_int_t)pass->count,
+                     "hash", hash, "nonfinite", (json_int_t)pass->drops.nonfinite, "degenerate",
+                     (json_int_t)pass->drops.degenerate_faces, "lines",
+                     (json_int_t)pass->drops.lines, "points", (json_int_t)pass->drops.points,
+                     "parts", parts, "materials", materials, "triangles", pass->triangles);
+}
+
+int main(int argc, char **argv)
+{
+    const strl_reader_desc desc = {.path = argc > 1 ? argv[1] : "",
+                                   .scratch_dir = argc > 3 ? argv[3] : NULL,
+                                   .memory_bytes = argc > 2 ? strtoull(argv[2], NULL, 10) : 0};
+    strl_reader *reader = NULL;
+    strl_error err = {0};
+    pass_result first = {.triangles = json_array()}, second = {0};
+    strl_status status = strl_reader_open(&desc, &reader, &err);
+    if (!status)
+        status = read_pass(reader, &first, &err);
+    if (!status)
+        status = strl_reader_rewind(reader, &err);
+    if (!status)
+        status = read_pass(reader, &second, &err);
+    json_t *result = status ? json_pack("{s:s}", "error", err.message) : describe(reader, &first);
+    json_dumpf(result, stdout, JSON_COMPACT | JSON_REAL_PRECISION(17));
+    puts("");
+    json_decref(result);
+    json_decref(first.triangles);
+    strl_reader_close(reader);
+    if (!status && (first.count != second.count || first.hash != second.hash))
+        return 3;
+    return status ? 1 : 0;
+}

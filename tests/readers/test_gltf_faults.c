@@ -1,0 +1,105 @@
+/* glTF with its buffer beside it: rewinding, what changes under the reader, no memory, no reads. */
+#include "reader_test.h"
+
+#include "base/cursor.h"
+
+#define GRID 24u
+
+/* A sheet of GRID x GRID squares with its vertices, colours and indices in one file. */
+static void write_buffer(const char *name)
+{
+    strl_writer out = {0};
+    for (uint32_t i = 0; i < (GRID + 1) * (GRID + 1); i++) {
+        strl_writer_f32(&out, (float)(i % (GRID + 1)));
+        strl_writer_f32(&out, (float)(i / (GRID + 1)));
+        strl_writer_f32(&out, (float)(i * 7 % 5) / 4);
+    }
+    for (uint32_t i = 0; i < GRID * GRID; i++) {
+        uint32_t corner = i / GRID * (GRID + 1) + i % GRID;
+        const uint32_t corners[6] = {0, 1, GRID + 2, 0, GRID + 2, GRID + 1};
+        for (unsigned k = 0; k < 6; k++)
+            strl_writer_u16(&out, (uint16_t)(corner + corners[k]));
+    }
+    write_test_file(name, out.data, out.size);
+    strl__free(out.data);
+}
+
+static void write_sheet(const char *model, const char *buffer)
+{
+    char text[1200];
+    const unsigned vertices = (GRID + 1) * (GRID + 1), indices = 6 * GRID * GRID;
+    snprintf(text, sizeof text,
+             "{\"asset\":{\"version\":\"2.0\"},\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0,"
+             "\"name\":\"sheet\"}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},"
+             "\"indices\":1,\"material\":0}]}],\"materials\":[{\"name\":\"grey\"}],\"accessors\":[{"
+             "\"bufferView\":0,\"componentType\":5126,\"count\":%u,\"type\":\"VEC3\"},{"
+             "\"bufferView\":1,\"componentType\":5123,\"count\":%u,\"type\":\"SCALAR\"}],"
+             "\"bufferViews\":[{\"buffer\":0,\"byteLength\":%u},{\"buffer\":0,\"byteOffset\":%u,"
+             "\"byteLength\":%u}],\"buffers\":[{\"uri\":\"%s\",\"byteLength\":%u}]}",
+             vertices, indices, 12 * vertices, 12 * vertices, 2 * indices, buffer,
+             12 * vertices + 2 * indices);
+    write_test_text(model, text);
+    write_buffer(buffer);
+}
+
+static void a_second_pass_gives_the_same_triangles(void **state)
+{
+    (void)state;
+    write_sheet("sheet.gltf", "sheet.bin");
+    assert_rewinds("sheet.gltf", MEMORY_LEAST);
+    assert_rewinds("sheet.gltf", 0);
+}
+
+static void a_buffer_that_changes_is_refused_by_name(void **state)
+{
+    (void)state;
+    strl_reader *reader;
+    strl_error err;
+    read_result result;
+    write_sheet("sheet.gltf", "sheet.bin");
+    assert_int_equal(open_test_file("sheet.gltf", 0, &reader, &err), STRL_OK);
+    read_pass(reader, &result);
+    assert_int_equal(result.count, 2 * GRID * GRID);
+    free_result(&result);
+    FILE *file = fopen(test_path("sheet.bin"), "ab");
+    fputc('x', file);
+    fclose(file);
+    assert_int_equal(strl_reader_rewind(reader, &err), STRL_ERR_IO);
+    assert_non_null(strstr(err.message, "sheet.bin has changed"));
+    strl_reader_close(reader);
+}
+
+static void a_buffer_that_shrinks_while_it_is_read_is_refused(void **state)
+{
+    (void)state;
+    strl_reader *reader;
+    strl_error err;
+    read_result result;
+    write_sheet("sheet.gltf", "sheet.bin");
+    assert_int_equal(open_test_file("sheet.gltf", 0, &reader, &err), STRL_OK);
+    assert_int_equal(truncate(test_path("sheet.bin"), 500), 0);
+    read_pass(reader, &result);
+    assert_int_equal(result.status, STRL_ERR_FORMAT);
+    assert_non_null(strstr(result.err.message, "sheet.bin"));
+    strl_reader_close(reader);
+    free_result(&result);
+}
+
+static void a_failed_allocation_or_read_is_an_error(void **state)
+{
+    (void)state;
+    write_sheet("fault.gltf", "fault.bin");
+    read_through_faults("fault.gltf", strl__alloc_fail_after);
+    read_through_faults("fault.gltf", strl_file_fail_reads_after);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(a_second_pass_gives_the_same_triangles),
+        cmocka_unit_test(a_buffer_that_changes_is_refused_by_name),
+        cmocka_unit_test(a_buffer_that_shrinks_while_it_is_read_is_refused),
+        cmocka_unit_test(a_failed_allocation_or_read_is_an_error),
+    };
+    return cmocka_run_group_tests(tests, make_test_folder, remove_test_folder);
+}
