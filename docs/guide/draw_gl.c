@@ -382,11 +382,11 @@ static strl_status write_image(const char *path, strl_error *err)
 /* end: image */
 
 /* begin: main */
-/* Ten frames as they come, then one that waits for everything that the pixel error asks for. */
+/* Ten frames as they come, then frames of one place until everything is there that the pixel error asks for. */
 static strl_status walk_and_draw(drawer *d, strl_walk *walk, strl_error *err)
 {
     strl_status status = STRL_OK;
-    for (int frame = 0; status == STRL_OK && (frame < 10 || !strl_walk_settled(walk)); frame++) {
+    for (int frame = 0; status == STRL_OK && (frame <= 10 || !strl_walk_settled(walk)); frame++) {
         strl_camera camera = orbit(walk, 0.05 * (frame < 10 ? frame : 10), WIDTH, HEIGHT);
         strl_draw_list list;
         strl_walk_pump(walk, 4000000);
