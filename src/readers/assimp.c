@@ -65,18 +65,23 @@ const char *strl__assimp_extension(const char *path)
  * the result is the last place that was looked at. */
 static char *find_importer(const char *named, bool *found)
 {
+    /* Beside the program where it was built, then by the way from it where both were installed, which holds
+     * wherever that was moved to; last where the library was meant to be, for programs of others. */
+    static const char *const places[] = {STRL_IMPORTER, STRL_LIBEXEC_FROM_BIN "/" STRL_IMPORTER};
     char *path = NULL;
     *found = true;
     if (named && *named)
         return strl__strdup(named); /* the user's word: whether it is there, running it tells */
     char *folder = strl_program_folder();
-    if (folder) {
-        path = strl_path_join(folder, STRL_IMPORTER);
-        strl__free(folder);
-        if (path && strl_path_exists(path))
+    for (size_t i = 0; folder && i < sizeof places / sizeof *places; i++) {
+        path = strl_path_join(folder, places[i]);
+        if (path && strl_path_exists(path)) {
+            strl__free(folder);
             return path;
+        }
         strl__free(path);
     }
+    strl__free(folder);
     path = strl_path_join(STRL_LIBEXEC_DIR, STRL_IMPORTER);
     *found = path && strl_path_exists(path);
     return path;
