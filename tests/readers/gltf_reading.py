@@ -16,7 +16,8 @@ def read(path, memory=LEAST, scratch=True):
     """All that the reader gives; {"error": sentence} where it refuses."""
     words = [os.path.join(PROGRAMS, "read_mesh"), path, str(memory)]
     done = subprocess.run(words + ([os.path.dirname(path)] if scratch else []), capture_output=True, timeout=600)
-    assert done.returncode in (0, 1), f"{path}: exit {done.returncode}: {done.stderr.decode(errors='replace')}"
+    told = done.stderr.decode(errors="replace")
+    assert done.returncode in (0, 1) and done.stdout, f"{path}: exit {done.returncode}: {told}"
     result = json.loads(done.stdout)
     assert ("error" in result) == (done.returncode == 1), result
     return result

@@ -21,7 +21,7 @@ typedef struct pass_result {
 /* FNV-1a over the coordinates in 1/1024, so that a script can do the same sum. */
 static uint64_t hash_number(uint64_t hash, double value)
 {
-    int64_t rounded = (int64_t)floor(value * 1024 + 0.5);
+    int64_t rounded = fabs(value) < 1e15 ? (int64_t)floor(value * 1024 + 0.5) : INT64_MAX;
     for (unsigned i = 0; i < 8; i++)
         hash = (hash ^ ((uint64_t)rounded >> (8 * i) & 255)) * 1099511628211u;
     return hash;
