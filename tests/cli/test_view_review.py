@@ -192,6 +192,32 @@ def check_parts(session):
     assert viewer.event("hidden")["count"] == 0
 
 
+def check_list(session):
+    """Finds a part by typing, and looks at it from the list."""
+    viewer = session.viewer
+    viewer.key("r")  # the picks so far have marks
+    whole = session.view()
+    viewer.key("t")
+    viewer.press(1100, 50)  # the search field
+    viewer.tool("type", "CHIMNEY")
+    session.view()
+    viewer.press(1120, 166)  # below site and house
+    viewer.key("i")
+    assert viewer.event("hidden")["count"] == len(session.boxes) - 1
+    viewer.key("v")
+    eye = viewer.event("arrived")["eye"]
+    _, low, high = session.boxes["site/house/chimney"]
+    assert math.dist(eye, [(a + b) / 2 for a, b in zip(low, high)]) < 4 * math.dist(low, high), eye
+    viewer.point(998, 114)  # the box before the whole site, of which something is shown
+    viewer.tool("click", "1")
+    assert viewer.event("hidden")["count"] == len(session.boxes)
+    viewer.press(1100, 50)
+    viewer.key("ctrl+a", "BackSpace")
+    viewer.press(640, 760)
+    viewer.key("t", "r")
+    assert differing_share(whole, session.view()) < 1e-4, "the list leaves something behind"
+
+
 def check_section(session):
     viewer = session.viewer
     whole = session.view()
@@ -400,6 +426,7 @@ def run_session(stroll, display, container, boxes, folder, pictures, *options):
         viewer.rest()
         check_picks(session)
         check_parts(session)
+        check_list(session)
         check_section(session)
         check_bookmarks(session)
         check_path(session, stroll, container)

@@ -188,6 +188,12 @@ class Viewer:
         self.tool("click", "1")
         return self.event("pick")
 
+    def press(self, x, y):
+        """A click on a panel."""
+        self.point(x, y)
+        self.tool("click", "1")
+        self.rest()  # the panel has seen the button go down and up where it is
+
     def drag(self, button, from_x, from_y, to_x, to_y):
         self.tool("mousemove", str(from_x), str(from_y))
         time.sleep(0.3)  # the panel sees in its next frame that the cursor is not over it
