@@ -20,26 +20,25 @@ static bool order_vertices(const strl_mesh *mesh, const strl_simplified *simplif
     uint32_t steps = simplified->collapse_count;
     o->point_step = strl_arena_alloc_zero(arena, mesh->point_count, sizeof *o->point_step);
     o->step_first = strl_arena_alloc_zero(arena, (size_t)steps + 2, sizeof *o->step_first);
-    o->wedge_vertex = strl_arena_alloc(arena, mesh->wedge_count, sizeof *o->wedge_vertex);
+    o->wedge_vertex = strl_arena_alloc(arena, simplified->wedge_count, sizeof *o->wedge_vertex);
     o->point_vertex = strl_arena_alloc_zero(arena, mesh->point_count, sizeof *o->point_vertex);
     if (!o->point_step || !o->step_first || !o->wedge_vertex || !o->point_vertex)
         return false;
     for (uint32_t i = 0; i < steps; i++)
         o->point_step[simplified->collapses[i].from] = steps - i;
-    for (uint32_t w = 0; w < mesh->wedge_count; w++)
-        o->step_first[o->point_step[mesh->wedge[w].point] + 1]++;
+    for (uint32_t w = 0; w < simplified->wedge_count; w++)
+        o->step_first[o->point_step[simplified->wedge[w].point] + 1]++;
     for (uint32_t i = 0; i <= steps; i++)
         o->step_first[i + 1] += o->step_first[i];
-    for (uint32_t w = 0; w < mesh->wedge_count; w++)
-        o->point_vertex[mesh->wedge[w].point] = o->wedge_vertex[w] =
-            o->step_first[o->point_step[mesh->wedge[w].point]]++;
+    for (uint32_t w = 0; w < simplified->wedge_count; w++)
+        o->point_vertex[simplified->wedge[w].point] = o->wedge_vertex[w] =
+            o->step_first[o->point_step[simplified->wedge[w].point]]++;
     /* step_first[i] is now the end of step i */
     return true;
 }
 
-static bool allocate(strl_pm *pm, const strl_mesh *mesh, uint32_t steps, strl_arena *arena)
+static bool allocate(strl_pm *pm, uint32_t vertices, uint32_t triangles, uint32_t steps, strl_arena *arena)
 {
-    uint32_t vertices = mesh->wedge_count, triangles = mesh->triangle_count;
     *pm = (strl_pm){.vertex_count = vertices, .triangle_count = triangles, .step_count = steps};
     pm->position = strl_arena_alloc(arena, vertices, sizeof *pm->position);
     pm->normal = strl_arena_alloc(arena, vertices, sizeof *pm->normal);
@@ -56,13 +55,13 @@ static bool allocate(strl_pm *pm, const strl_mesh *mesh, uint32_t steps, strl_ar
 }
 
 /* Palette ids in order of first use by wedges. */
-static bool fill_palette(strl_pm *pm, const strl_mesh *mesh, const ordering *o, const strl_palette_entry *palette,
+static bool fill_palette(strl_pm *pm, const strl_simplified *simplified, const ordering *o, const strl_palette_entry *palette,
                          strl_arena *arena)
 {
     uint32_t capacity = 16, *ids = strl_arena_alloc(arena, capacity, sizeof *ids), last = 0;
     pm->palette_count = 0;
-    for (uint32_t w = 0; w < mesh->wedge_count && ids; w++) {
-        uint32_t id = mesh->wedge[w].palette, at = last;
+    for (uint32_t w = 0; w < simplified->wedge_count && ids; w++) {
+        uint32_t id = simplified->wedge[w].palette, at = last;
         if (!pm->palette_count || ids[at] != id)
             for (at = 0; at < pm->palette_count && ids[at] != id; at++)
                 ;
@@ -91,8 +90,8 @@ static bool fill_palette(strl_pm *pm, const strl_mesh *mesh, const ordering *o, 
 static void fill_vertices(strl_pm *pm, const strl_mesh *mesh, const strl_simplified *simplified, const ordering *o)
 {
     bool white = true;
-    for (uint32_t w = 0; w < mesh->wedge_count; w++) {
-        const strl_wedge *wedge = &mesh->wedge[w];
+    for (uint32_t w = 0; w < simplified->wedge_count; w++) {
+        const strl_wedge *wedge = &simplified->wedge[w];
         uint32_t v = o->wedge_vertex[w];
         memcpy(pm->position[v], mesh->position[wedge->point], sizeof *pm->position);
         memcpy(pm->normal[v], wedge->normal, sizeof *pm->normal);
@@ -147,15 +146,15 @@ strl_status strl_pm_record(const strl_mesh *mesh, const strl_simplified *simplif
                            uint32_t palette_count, strl_arena *arena, strl_pm *pm, strl_error *err)
 {
     ordering order;
-    for (uint32_t w = 0; w < mesh->wedge_count; w++)
-        if (mesh->wedge[w].palette >= palette_count)
-            return strl__fail(err, STRL_ERR_FORMAT, "a wedge has entry %u of a palette of %u", mesh->wedge[w].palette,
+    for (uint32_t w = 0; w < simplified->wedge_count; w++)
+        if (simplified->wedge[w].palette >= palette_count)
+            return strl__fail(err, STRL_ERR_FORMAT, "a wedge has entry %u of a palette of %u", simplified->wedge[w].palette,
                               palette_count);
-    if (mesh->wedge_count > STRL_PM_MAX_VERTICES || mesh->triangle_count > STRL_PM_MAX_TRIANGLES)
+    if (simplified->wedge_count > STRL_PM_MAX_VERTICES || mesh->triangle_count > STRL_PM_MAX_TRIANGLES)
         return strl__fail(err, STRL_ERR_LIMIT, "a node has %u vertices and %u triangles; the limits are %u and %u",
-                          mesh->wedge_count, mesh->triangle_count, STRL_PM_MAX_VERTICES, STRL_PM_MAX_TRIANGLES);
-    if (!order_vertices(mesh, simplified, arena, &order) || !allocate(pm, mesh, simplified->collapse_count, arena) ||
-        !fill_palette(pm, mesh, &order, palette, arena))
+                          simplified->wedge_count, mesh->triangle_count, STRL_PM_MAX_VERTICES, STRL_PM_MAX_TRIANGLES);
+    if (!order_vertices(mesh, simplified, arena, &order) || !allocate(pm, simplified->wedge_count, mesh->triangle_count, simplified->collapse_count, arena) ||
+        !fill_palette(pm, simplified, &order, palette, arena))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", mesh->triangle_count);
     fill_vertices(pm, mesh, simplified, &order);
     fill_triangles(pm, mesh, simplified, &order);
@@ -168,15 +167,15 @@ static void renumber(const strl_mesh *mesh, const strl_simplified *simplified, u
                      strl_mesh *counts)
 {
     memset(points, 0xff, mesh->point_count * sizeof *points);
-    memset(wedges, 0xff, mesh->wedge_count * sizeof *wedges);
+    memset(wedges, 0xff, simplified->wedge_count * sizeof *wedges);
     for (uint32_t t = 0; t < mesh->triangle_count; t++)
         for (int c = 0; c < 3 && simplified->removed_at[t] == NO_INDEX; c++)
-            wedges[simplified->corner[t][c]] = points[mesh->wedge[simplified->corner[t][c]].point] = 0;
+            wedges[simplified->corner[t][c]] = points[simplified->wedge[simplified->corner[t][c]].point] = 0;
     *counts = (strl_mesh){.triangle_count = simplified->triangles_left};
     for (uint32_t p = 0; p < mesh->point_count; p++)
         if (points[p] == 0)
             points[p] = counts->point_count++;
-    for (uint32_t w = 0; w < mesh->wedge_count; w++)
+    for (uint32_t w = 0; w < simplified->wedge_count; w++)
         if (wedges[w] == 0)
             wedges[w] = counts->wedge_count++;
 }
@@ -185,7 +184,7 @@ strl_status strl_mesh_after(const strl_mesh *mesh, const strl_simplified *simpli
                             strl_arena *arena, strl_mesh *base, strl_error *err)
 {
     uint32_t *points = point_map ? point_map : strl_arena_alloc(arena, mesh->point_count, sizeof *points);
-    uint32_t *wedges = strl_arena_alloc(arena, mesh->wedge_count, sizeof *wedges);
+    uint32_t *wedges = strl_arena_alloc(arena, simplified->wedge_count, sizeof *wedges);
     strl_mesh counts;
     if (!points || !wedges)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a mesh of %u triangles", mesh->triangle_count);
@@ -199,10 +198,10 @@ strl_status strl_mesh_after(const strl_mesh *mesh, const strl_simplified *simpli
             memcpy(base->position[points[p]], mesh->position[p], sizeof *base->position);
             base->flags[points[p]] = mesh->flags[p];
         }
-    for (uint32_t w = 0; w < mesh->wedge_count; w++)
+    for (uint32_t w = 0; w < simplified->wedge_count; w++)
         if (wedges[w] != NO_INDEX) {
-            base->wedge[wedges[w]] = mesh->wedge[w];
-            base->wedge[wedges[w]].point = points[mesh->wedge[w].point];
+            base->wedge[wedges[w]] = simplified->wedge[w];
+            base->wedge[wedges[w]].point = points[simplified->wedge[w].point];
             memcpy(base->wedge[wedges[w]].normal, simplified->normal[w], sizeof simplified->normal[w]);
         }
     uint32_t to = 0;

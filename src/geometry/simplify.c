@@ -62,13 +62,29 @@ static uint32_t heap_pop(simplifier *s)
     return first;
 }
 
+/* One more wedge at v that looks like this one of u. */
+static uint32_t carry_wedge(simplifier *s, uint32_t wedge, uint32_t to, strl_simplified *result)
+{
+    uint32_t added = s->wedge_count++;
+    s->wedge[added] = s->wedge[wedge];
+    s->wedge[added].point = to;
+    memcpy(s->normal[added], s->normal[wedge], sizeof *s->normal);
+    memcpy(s->colour[added], s->colour[wedge], sizeof *s->colour);
+    memset(s->normal_sum[added], 0, sizeof *s->normal_sum);
+    s->sites[to].only_wedge = NO_INDEX;
+    result->wedge_parent[added] = added;
+    return added;
+}
+
 /* Where every wedge of u goes. */
 static void map_wedges(simplifier *s, const strl_star *star, uint32_t to, strl_simplified *result)
 {
     for (uint32_t i = 0; i < star->wedge_count; i++) {
         uint32_t wedge = star->wedge[i];
-        bool exact;
-        uint32_t target = strl__wedge_target(s, star, to, wedge, &exact);
+        wedge_fate fate;
+        uint32_t target = strl__wedge_target(s, star, to, wedge, &fate);
+        if (fate == WEDGE_CARRIED)
+            target = carry_wedge(s, wedge, to, result);
         result->wedge_parent[wedge] = target;
         for (int k = 0; k < 3; k++)
             s->normal_sum[target][k] += s->normal_sum[wedge][k];

@@ -46,6 +46,9 @@ typedef struct strl_collapse {
 typedef struct strl_simplified {
     uint32_t collapse_count;
     strl_collapse *collapses;    /* [collapse_count] in order */
+    uint32_t wedge_count;        /* the mesh's, then those that came to be: where what a point shows fits nothing at the point that it falls
+                                  * onto, its wedge goes with it (the rim of a plate onto the other side's, say) */
+    strl_wedge *wedge;           /* [wedge_count] */
     uint32_t *wedge_parent;      /* [wedge_count] the wedge that a removed one fell onto; itself where it was kept */
     uint16_t (*normal)[2];       /* [wedge_count] octahedral: the mean over what fell onto the wedge, for the mesh after; the wedge's own
                                   * where its point is STRL_POINT_OUTSIDE, because others look at it too */

@@ -277,7 +277,7 @@ static float farthest(const simplifier *s, const strl_star *star, uint32_t to)
 static void begin_watch(const simplifier *s, const strl_star *star, uint32_t to, bool has_view, watch *seen,
                         collapse_effect *effect)
 {
-    bool exact;
+    wedge_fate fate;
     seen->own = s->corner[star->triangle[0]][star->corner[0]];
     seen->normals = s->sites[star->point].only_wedge != NO_INDEX; /* along a crease each side has its own */
     seen->colours = s->has_colours && colours_vary(s, star, seen->own);
@@ -285,7 +285,8 @@ static void begin_watch(const simplifier *s, const strl_star *star, uint32_t to,
     if (!seen->colours && !seen->normals)
         return;
     effect->spoke_reach = farthest(s, star, to);
-    seen->target = strl__wedge_target(s, star, to, seen->own, &exact);
+    seen->target = strl__wedge_target(s, star, to, seen->own, &fate);
+    seen->target = fate == WEDGE_CARRIED ? seen->own : seen->target;
     if (!has_view || seen->target == NO_INDEX) {
         effect->spoke_colour = seen->colours ? 1 : 0;
         seen->normals = seen->colours = false;

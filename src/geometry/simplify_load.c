@@ -87,10 +87,17 @@ static void *allocate_lines(strl_arena *arena, size_t count)
     return block ? block + (CACHE_LINE - (uintptr_t)block % CACHE_LINE) % CACHE_LINE : NULL;
 }
 
+/* A payload's vertices are bounded; where a mesh is beyond them already, it is no node yet. */
+static uint32_t wedge_room(uint32_t count)
+{
+    uint32_t room = count + count / 2 + STAR_MAX;
+    return count <= STRL_PM_MAX_VERTICES && room > STRL_PM_MAX_VERTICES ? STRL_PM_MAX_VERTICES : room;
+}
+
 static bool allocate(simplifier *s, strl_arena *arena)
 {
     _Static_assert(sizeof(site) == CACHE_LINE && sizeof(face) == CACHE_LINE, "one cache line each");
-    uint32_t points = s->mesh->point_count, wedges = s->mesh->wedge_count;
+    uint32_t points = s->mesh->point_count, wedges = s->wedge_room;
     s->sites = allocate_lines(arena, points);
     s->faces = allocate_lines(arena, s->mesh->triangle_count);
     s->pulls = strl_arena_alloc(arena, s->mesh->triangle_count, sizeof *s->pulls);
@@ -110,14 +117,15 @@ static bool allocate_result(const simplifier *s, strl_simplified *result, strl_a
     const strl_mesh *mesh = s->mesh;
     uint32_t triangles = mesh->triangle_count;
     result->collapses = strl_arena_alloc(arena, mesh->point_count, sizeof *result->collapses);
-    result->wedge_parent = strl_arena_alloc(arena, mesh->wedge_count, sizeof *result->wedge_parent);
-    result->normal = strl_arena_alloc(arena, mesh->wedge_count, sizeof *result->normal);
+    result->wedge = strl_arena_alloc(arena, s->wedge_room, sizeof *result->wedge);
+    result->wedge_parent = strl_arena_alloc(arena, s->wedge_room, sizeof *result->wedge_parent);
+    result->normal = strl_arena_alloc(arena, s->wedge_room, sizeof *result->normal);
     result->removed_at = strl_arena_alloc(arena, triangles, sizeof *result->removed_at);
     result->corner = strl_arena_alloc(arena, triangles, sizeof *result->corner);
     result->drift = strl_arena_alloc(arena, triangles, sizeof *result->drift);
     result->deviation = strl_arena_alloc(arena, triangles, sizeof *result->deviation);
     result->shift = strl_arena_alloc(arena, triangles, sizeof *result->shift);
-    return result->collapses && result->wedge_parent && result->normal && result->removed_at && result->corner && result->drift &&
+    return result->collapses && result->wedge && result->wedge_parent && result->normal && result->removed_at && result->corner && result->drift &&
            result->deviation && result->shift;
 }
 
@@ -147,6 +155,8 @@ static void load_points(simplifier *s)
 static void load_wedges(simplifier *s, strl_simplified *result)
 {
     const strl_mesh *mesh = s->mesh;
+    memcpy(s->wedge, mesh->wedge, mesh->wedge_count * sizeof *s->wedge);
+    s->wedge_count = mesh->wedge_count;
     for (uint32_t w = 0; w < mesh->wedge_count; w++) {
         uint32_t *only = &s->sites[mesh->wedge[w].point].only_wedge;
         *only = *only == NO_INDEX ? w : SEVERAL;
@@ -186,9 +196,11 @@ static void load_triangle(simplifier *s, uint32_t t, strl_simplified *result)
 
 bool strl__simplify_load(simplifier *s, strl_arena *arena, strl_simplified *result)
 {
+    s->wedge_room = wedge_room(s->mesh->wedge_count);
     if (!allocate_result(s, result, arena) || !allocate(s, arena))
         return false;
     s->corner = result->corner;
+    s->wedge = result->wedge;
     memset(s->heap, 0xff, (s->mesh->point_count + HEAP_WAYS) * sizeof *s->heap); /* NO_CANDIDATE */
     load_points(s);
     load_wedges(s, result);
@@ -207,8 +219,9 @@ bool strl__simplify_load(simplifier *s, strl_arena *arena, strl_simplified *resu
 /* A vertex of the mesh after stands for a region; with its own normal alone it would show the noise of one place. */
 static void mean_normals(const simplifier *s, strl_simplified *result)
 {
-    for (uint32_t w = 0; w < s->mesh->wedge_count; w++) {
-        const strl_wedge *wedge = &s->mesh->wedge[w];
+    result->wedge_count = s->wedge_count;
+    for (uint32_t w = 0; w < s->wedge_count; w++) {
+        const strl_wedge *wedge = &s->wedge[w];
         const float *sum = s->normal_sum[w], *own = s->normal[w];
         bool others_look = s->mesh->flags[wedge->point] & STRL_POINT_OUTSIDE;
         if (!others_look && sum[0] * own[0] + sum[1] * own[1] + sum[2] * own[2] > 0)

@@ -123,9 +123,9 @@ static bool wedges_can_follow(const simplifier *s, const strl_star *u_star, uint
     if (u->only_wedge != NO_INDEX && v->only_wedge != NO_INDEX && u->palette == v->palette)
         return true;
     for (uint32_t i = 0; i < u_star->wedge_count; i++) {
-        bool exact;
-        uint32_t target = strl__wedge_target(s, u_star, to, u_star->wedge[i], &exact);
-        if (target == NO_INDEX || (!exact && s->rung < STRL_SIMPLIFY_SEAMS))
+        wedge_fate fate;
+        uint32_t target = strl__wedge_target(s, u_star, to, u_star->wedge[i], &fate);
+        if (target == NO_INDEX || (fate != WEDGE_EXACT && s->rung < STRL_SIMPLIFY_SEAMS))
             return false;
         for (uint32_t k = 0; k < i && s->rung < STRL_SIMPLIFY_SEAMS; k++)
             if (targets[k] == target)
@@ -167,12 +167,13 @@ static float attribute_change(const simplifier *s, const strl_star *star, uint32
 {
     float worst = 0, mixed_normal[3] = {0}, mixed_colour[3] = {0};
     uint32_t own = NO_INDEX;
-    bool exact;
+    wedge_fate fate;
     if (effect->image != NO_INDEX) {
         const uint32_t *corner = s->corner[star->triangle[effect->image]];
         unsigned c = star->corner[effect->image];
         own = corner[c];
-        uint32_t corners[3] = {strl__wedge_target(s, star, to, own, &exact), corner[(c + 1) % 3], corner[(c + 2) % 3]};
+        uint32_t corners[3] = {strl__wedge_target(s, star, to, own, &fate), corner[(c + 1) % 3], corner[(c + 2) % 3]};
+        corners[0] = fate == WEDGE_CARRIED ? own : corners[0];
         if (corners[0] == NO_INDEX)
             own = NO_INDEX;
         for (unsigned k = 0; k < 3 && own != NO_INDEX; k++)
@@ -191,9 +192,11 @@ static float attribute_change(const simplifier *s, const strl_star *star, uint32
             worst = strl__larger(worst, wedge_change(s, wedge, mixed_normal, mixed_colour));
             continue;
         }
-        uint32_t target = strl__wedge_target(s, star, to, wedge, &exact);
+        uint32_t target = strl__wedge_target(s, star, to, wedge, &fate);
         if (target == NO_INDEX)
             return s->desc->normal_weight + s->desc->colour_weight;
+        if (fate == WEDGE_CARRIED)
+            continue;
         worst = strl__larger(worst, wedge_change(s, wedge, s->normal[target], s->colour[target]));
     }
     return worst;

@@ -6,6 +6,10 @@
 /* Larger than any difference of attributes. */
 #define OTHER_PALETTE 1e6f
 
+/* Attributes that differ by more are not merged where no triangle says that they go on into each other: a normal by 44 degrees, or
+ * a third of black to white. */
+#define UNLIKE 0.3f
+
 /* Stamps for `count` neighbours, and one more; all begin anew where numbers end. */
 static uint32_t take_stamps(simplifier *s, uint32_t count)
 {
@@ -227,13 +231,9 @@ static float attribute_difference(const simplifier *s, uint32_t a, uint32_t b)
     return s->desc->normal_weight * sqrtf(normal) + s->desc->colour_weight * sqrtf(colour);
 }
 
-uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32_t to, uint32_t wedge, bool *exact)
+/* The wedge of v in a triangle that has this wedge of u and the edge; NO_INDEX = none. */
+static uint32_t wedge_beside(const simplifier *s, const strl_star *u_star, uint32_t to, uint32_t wedge)
 {
-    const site *u = &s->sites[u_star->point], *v = &s->sites[to];
-    if (u->only_wedge != NO_INDEX && v->only_wedge != NO_INDEX && u->palette == v->palette && strl__star_uses(s, u_star, to)) {
-        *exact = true;
-        return v->only_wedge;
-    }
     for (uint32_t i = 0; i < u_star->count; i++) {
         const uint32_t *corner = s->corner[u_star->triangle[i]];
         unsigned c = u_star->corner[i];
@@ -241,14 +241,22 @@ uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32
             continue;
         for (unsigned k = 1; k < 3; k++) {
             uint32_t other = corner[(c + k) % 3];
-            if (s->mesh->wedge[other].point == to && s->mesh->wedge[other].palette == s->mesh->wedge[wedge].palette) {
-                *exact = true;
+            if (s->wedge[other].point == to && s->wedge[other].palette == s->wedge[wedge].palette)
                 return other;
-            }
         }
     }
-    *exact = false;
-    uint32_t best = NO_INDEX;
+    return NO_INDEX;
+}
+
+uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32_t to, uint32_t wedge, wedge_fate *fate)
+{
+    const site *u = &s->sites[u_star->point], *v = &s->sites[to];
+    *fate = WEDGE_EXACT;
+    if (u->only_wedge != NO_INDEX && v->only_wedge != NO_INDEX && u->palette == v->palette && strl__star_uses(s, u_star, to))
+        return v->only_wedge;
+    uint32_t best = wedge_beside(s, u_star, to, wedge);
+    if (best != NO_INDEX)
+        return best;
     float least = INFINITY;
     uint32_t scanned = 0;
     for (uint32_t corner = s->sites[to].head, next; corner != NO_INDEX && scanned < SCAN_MAX; corner = next) {
@@ -258,7 +266,7 @@ uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32
             continue;
         scanned++;
         float difference = attribute_difference(s, wedge, other);
-        if (s->mesh->wedge[other].palette != s->mesh->wedge[wedge].palette) {
+        if (s->wedge[other].palette != s->wedge[wedge].palette) {
             if (s->rung < STRL_SIMPLIFY_DISJOINT)
                 continue;
             difference += OTHER_PALETTE; /* only where v has none of its own part */
@@ -268,5 +276,6 @@ uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32
             best = other;
         }
     }
+    *fate = least > UNLIKE && s->wedge_count + u_star->wedge_count <= s->wedge_room ? WEDGE_CARRIED : WEDGE_LIKE;
     return best;
 }

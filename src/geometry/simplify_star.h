@@ -150,6 +150,8 @@ typedef struct simplifier {
     float (*normal)[4];     /* per wedge, decoded; the last is 0 */
     float (*colour)[4];     /* per wedge, 0..1; the last is 0 */
     float (*normal_sum)[3]; /* per wedge, weighted by area, of it and all that fell onto it */
+    strl_wedge *wedge;      /* the result's: the mesh's and those that collapses add */
+    uint32_t wedge_count, wedge_room;
     bool has_colours;       /* not all wedges are of one colour */
     uint32_t tick;
     uint32_t triangles_left;
@@ -231,9 +233,16 @@ static inline uint32_t strl__neighbour_at(const simplifier *s, const strl_star *
     uint32_t stamp = s->sites[point].stamp;
     return stamp > star->stamp ? stamp - star->stamp - 1 : NO_INDEX;
 }
-/* The wedge of v that a wedge of u falls onto. *exact: a triangle of the edge says so; else it is the one of v's that looks most
- * like it, of the same palette where the rung does not allow others. NO_INDEX = none. */
-uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32_t to, uint32_t wedge, bool *exact);
+/* How a wedge of u finds its place at v. */
+typedef enum wedge_fate {
+    WEDGE_EXACT,  /* a triangle of the edge says which wedge of v goes on */
+    WEDGE_LIKE,   /* it falls onto the one of v's that looks most like it */
+    WEDGE_CARRIED /* none looks like it: v gets one more */
+} wedge_fate;
+
+/* The wedge of v that a wedge of u falls onto or, where it is carried, comes nearest to; of the same palette where the rung
+ * does not allow others. NO_INDEX = none. */
+uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32_t to, uint32_t wedge, wedge_fate *fate);
 
 /* The bound of u -> v and what it does to attributes (simplify_bound.c). */
 void strl__collapse_effect(const simplifier *s, const strl_star *star, uint32_t to, collapse_effect *effect);

@@ -58,7 +58,7 @@ void run_keep_some(run *r, uint64_t seed)
 
 uint32_t run_resolve(const run *r, uint32_t wedge, uint32_t state)
 {
-    while (r->removed_by[r->mesh.wedge[wedge].point] < state) {
+    while (r->removed_by[r->result.wedge[wedge].point] < state) {
         assert_int_not_equal(r->result.wedge_parent[wedge], wedge);
         wedge = r->result.wedge_parent[wedge];
     }
@@ -72,7 +72,7 @@ uint32_t run_points_of_state(const run *r, uint32_t state, uint32_t (*triangle)[
         if (r->result.removed_at[t] < state)
             continue;
         for (int c = 0; c < 3; c++)
-            triangle[count][c] = r->mesh.wedge[run_resolve(r, r->mesh.triangle[t][c], state)].point;
+            triangle[count][c] = r->result.wedge[run_resolve(r, r->mesh.triangle[t][c], state)].point;
         count++;
     }
     return count;
@@ -163,15 +163,15 @@ void run_check_order(const run *r)
 
 void run_check_wedges(const run *r)
 {
-    for (uint32_t w = 0; w < r->mesh.wedge_count; w++) {
-        uint32_t parent = r->result.wedge_parent[w], at = r->removed_by[r->mesh.wedge[w].point];
-        assert_true(parent < r->mesh.wedge_count);
+    for (uint32_t w = 0; w < r->result.wedge_count; w++) {
+        uint32_t parent = r->result.wedge_parent[w], at = r->removed_by[r->result.wedge[w].point];
+        assert_true(parent < r->result.wedge_count);
         if (parent == w)
             continue;
         assert_int_not_equal(at, RUN_NEVER);
-        assert_int_equal(r->mesh.wedge[parent].point, r->result.collapses[at].to);
+        assert_int_equal(r->result.wedge[parent].point, r->result.collapses[at].to);
         if (r->result.rung < STRL_SIMPLIFY_DISJOINT)
-            assert_int_equal(r->mesh.wedge[parent].palette, r->mesh.wedge[w].palette);
+            assert_int_equal(r->result.wedge[parent].palette, r->result.wedge[w].palette);
     }
     for (uint32_t t = 0; t < r->mesh.triangle_count; t++)
         for (int c = 0; c < 3 && r->result.removed_at[t] == RUN_NEVER; c++)

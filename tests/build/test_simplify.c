@@ -207,7 +207,7 @@ static double edge_moved(const run *r, uint32_t state)
             continue;
         double p[3][2], shade[3];
         for (int c = 0; c < 3; c++) {
-            const strl_wedge *wedge = &r->mesh.wedge[run_resolve(r, r->mesh.triangle[t][c], state)];
+            const strl_wedge *wedge = &r->result.wedge[run_resolve(r, r->mesh.triangle[t][c], state)];
             p[c][0] = r->mesh.position[wedge->point][0], p[c][1] = r->mesh.position[wedge->point][1];
             shade[c] = wedge->colour == 0xffffffffu;
         }

@@ -344,6 +344,8 @@ static void raise_to_children(const level_stage *stage, uint32_t self, strl_node
         include_box(group_least, group_most, child->group_box_min, child->group_box_max);
         record->geometric_min = fmaxf(record->geometric_min, fmaxf(child->geometric_max, child->group_geometric));
         record->appearance_min = fmaxf(record->appearance_min, fmaxf(child->appearance_max, child->group_appearance));
+        if (child->rung == STRL_SIMPLIFY_CLUSTERING) /* its rims end where they did not in the input: whoever holds them says so */
+            record->rung = child->rung;
     }
     record->geometric_max = fmaxf(record->geometric_max, record->geometric_min);
     record->appearance_max = fmaxf(record->appearance_max, record->appearance_min);
