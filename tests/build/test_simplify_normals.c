@@ -376,6 +376,113 @@ static void where_nothing_collapses_nothing_changes(void **state)
     }
 }
 
+/* ---- a plate ---- */
+#define PLATE_CELLS 24
+#define PLATE_CELL 100 /* lattice units */
+#define PLATE_THICKNESS 8
+
+static uint32_t plate_point(int x, int y, int z)
+{
+    return (uint32_t)((z * (PLATE_CELLS + 1) + y) * (PLATE_CELLS + 1) + x);
+}
+
+/* Two triangles, flat: each of the six directions has wedges of its own. */
+static void add_plate_quad(strl_mesh *mesh, int direction, uint32_t a, uint32_t b, uint32_t c, uint32_t d)
+{
+    const uint32_t corner[6] = {a, b, c, a, c, d};
+    const float normal[3] = {(float)((direction == 1) - (direction == 0)), (float)((direction == 3) - (direction == 2)),
+                             (float)((direction == 5) - (direction == 4))};
+    for (int i = 0; i < 6; i++) {
+        uint32_t w = 0;
+        while (w < mesh->wedge_count && (mesh->wedge[w].point != corner[i] || mesh->wedge[w].palette != (uint32_t)direction))
+            w++;
+        if (w == mesh->wedge_count) {
+            mesh->wedge[w] = (strl_wedge){.point = corner[i], .colour = 0xffffffffu, .palette = (uint32_t)direction};
+            strl_oct_encode(normal, mesh->wedge[mesh->wedge_count++].normal);
+        }
+        mesh->triangle[mesh->triangle_count + (uint32_t)i / 3][i % 3] = w;
+    }
+    mesh->triangle_count += 2;
+}
+
+/* A slab with sharp rims, thin beside its length: two faces of a grid, and a strip round them. */
+static void make_plate(strl_mesh *mesh, uint64_t seed, strl_arena *arena)
+{
+    const int n = PLATE_CELLS;
+    uint32_t points = 2 * (PLATE_CELLS + 1) * (PLATE_CELLS + 1), triangles = 4 * PLATE_CELLS * PLATE_CELLS + 8 * PLATE_CELLS;
+    (void)seed;
+    assert_true(strl_mesh_create(mesh, points, 3 * triangles, triangles, arena));
+    mesh->wedge_count = mesh->triangle_count = 0;
+    for (int z = 0; z < 2; z++)
+        for (int y = 0; y <= n; y++)
+            for (int x = 0; x <= n; x++) {
+                int32_t *at = mesh->position[plate_point(x, y, z)];
+                at[0] = x * PLATE_CELL, at[1] = y * PLATE_CELL, at[2] = z * PLATE_THICKNESS;
+            }
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < n; j++) {
+            add_plate_quad(mesh, 5, plate_point(i, j, 1), plate_point(i + 1, j, 1), plate_point(i + 1, j + 1, 1), plate_point(i, j + 1, 1));
+            add_plate_quad(mesh, 4, plate_point(i, j, 0), plate_point(i, j + 1, 0), plate_point(i + 1, j + 1, 0), plate_point(i + 1, j, 0));
+        }
+        add_plate_quad(mesh, 2, plate_point(i, 0, 0), plate_point(i + 1, 0, 0), plate_point(i + 1, 0, 1), plate_point(i, 0, 1));
+        add_plate_quad(mesh, 3, plate_point(i, n, 0), plate_point(i, n, 1), plate_point(i + 1, n, 1), plate_point(i + 1, n, 0));
+        add_plate_quad(mesh, 0, plate_point(0, i, 0), plate_point(0, i, 1), plate_point(0, i + 1, 1), plate_point(0, i + 1, 0));
+        add_plate_quad(mesh, 1, plate_point(n, i, 0), plate_point(n, i + 1, 0), plate_point(n, i + 1, 1), plate_point(n, i, 1));
+    }
+    for (uint32_t w = 0; w < mesh->wedge_count; w++)
+        mesh->wedge[w].palette = 0;
+    memset(mesh->drift, 0, triangles * sizeof *mesh->drift);
+    memset(mesh->deviation, 0, triangles * sizeof *mesh->deviation);
+    memset(mesh->shift, 0, triangles * sizeof *mesh->shift);
+    mesh->start_error = mesh->most_error = 0;
+    mesh->holders = NULL;
+}
+
+/* Triangles of a state that are wider than the plate is thick are shaded as they lie. Returns how many there are. */
+static uint32_t check_faces(const run *r, uint32_t state)
+{
+    uint32_t wide = 0;
+    for (uint32_t t = 0; t < r->mesh.triangle_count; t++) {
+        double e[2][3], n[3];
+        uint32_t wedge[3];
+        if (r->result.removed_at[t] < state)
+            continue;
+        for (int c = 0; c < 3; c++)
+            wedge[c] = run_resolve(r, r->mesh.triangle[t][c], state);
+        for (int c = 0; c < 2; c++)
+            for (int k = 0; k < 3; k++)
+                e[c][k] = (double)r->mesh.position[r->result.wedge[wedge[c + 1]].point][k] -
+                          r->mesh.position[r->result.wedge[wedge[0]].point][k];
+        for (int k = 0; k < 3; k++)
+            n[k] = e[0][(k + 1) % 3] * e[1][(k + 2) % 3] - e[0][(k + 2) % 3] * e[1][(k + 1) % 3];
+        if (fabs(n[2]) < 0.5 * PLATE_CELL * PLATE_CELL) /* the strips; they are as thin as the plate */
+            continue;
+        for (int c = 0; c < 3; c++)
+            assert_true(angle_of_code(r->result.wedge[wedge[c]].normal, n) < PI / 4);
+        wide++;
+    }
+    return wide;
+}
+
+static void a_plate_that_gets_thin_is_shaded_as_it_lies(void **state)
+{
+    static const mesh_kind plate = {.name = "plate", .make = make_plate, .closed = true, .manifold = true};
+    (void)state;
+    for (int last = STRL_SIMPLIFY_SEAMS; last <= STRL_SIMPLIFY_CLUSTERING; last++) {
+        run r;
+        run_begin(&r, &plate, 1, (strl_simplify_rung)last);
+        r.desc.error_limit = 3 * PLATE_THICKNESS;
+        run_simplify(&r);
+        run_check_order(&r);
+        run_check_wedges(&r);
+        assert_true(r.result.triangles_left < 12);               /* not even a box is left: the strips have gone, */
+        assert_true(r.result.wedge_count > r.mesh.wedge_count); /* and what they joined did not become one */
+        for (uint32_t i = 0; i <= 64; i++)
+            assert_true(check_faces(&r, (uint32_t)((uint64_t)r.result.collapse_count * i / 64)) >= 4);
+        run_end(&r);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -384,6 +491,7 @@ int main(void)
         cmocka_unit_test(a_mean_that_points_the_other_way_is_not_taken),
         cmocka_unit_test(points_known_outside_keep_their_normals_bit_for_bit),
         cmocka_unit_test(a_crease_keeps_both_directions),
+        cmocka_unit_test(a_plate_that_gets_thin_is_shaded_as_it_lies),
         cmocka_unit_test(where_nothing_collapses_nothing_changes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
