@@ -76,7 +76,7 @@ class Curves:
 
     def add(self, name, model, settings, files, **facts):
         """Measures one curve's cuts, logs them and deletes them."""
-        source = self.bench.input_of(model)
+        source = self.bench.inputs_of(model)[0]
         kept = self.worth(files, source)
         if not kept:
             raise measure.Failed(f"no cut of {name} is worth measuring: --errors are too small or too large")
@@ -103,7 +103,7 @@ class Curves:
         if kept and not self.options.again:
             return
         diagonal = self.diagonal(self.bench.container_of(model))
-        outcome = measure.run([peer, self.bench.input_of(model), self.options.scratch / f"{model}_peer",
+        outcome = measure.run([peer, self.bench.inputs_of(model)[0], self.options.scratch / f"{model}_peer",
                                *(repr(error * diagonal) for error in self.options.errors)])
         facts, *cuts = json_lines(outcome.output)
         version = f"{facts['library'] // 1000}.{facts['library'] % 1000 // 10}"
@@ -216,7 +216,7 @@ def main():
     curves, skipped, failures = Curves(options), [], 0
     for model in must_show.words_of(options.models):
         try:
-            curves.bench.input_of(model)
+            curves.bench.inputs_of(model)
         except measure.Failed as absent:
             print(f"curve: {model} is skipped: {absent}", file=sys.stderr)
             skipped.append(model)

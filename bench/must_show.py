@@ -3,8 +3,9 @@
 
     bench/must_show.py --data DIR [--models a,b] [--parts build,images,...] [--frames N] [--again] [--write-docs]
 
-A model is a file of DIR (NAME.ply, .stl, .obj, or those with .zst) or isosurface_N or boxes_N (isosurface_10m), which is
-generated, with _shuffled behind it in a random order, with _stl behind that as STL. --models replaces each part's own
+A model is a file of DIR (NAME.ply, .stl, .obj, .glb, or those with .zst), an archive (NAME.tar or .tar.zst) whose .gltf files
+make one model, or isosurface_N, boxes_N or plant_N (isosurface_10m), which is generated, with _shuffled behind it in a random
+order, with _stl behind that as STL. --models replaces each part's own
 models. Parts:
 
     build         one build under --memory 1G: counts, bytes per triangle, peak memory, root      (all models)
@@ -17,7 +18,9 @@ models. Parts:
     sizes         bytes per triangle, as built by default and with --compact; verify of both      (models of several kinds)
     dependencies  with and without: locked vertices per level, triangles drawn at one pixel       (isosurface_10m)
     walk          select_ms and frame_ms of all models on one smooth path                         (isosurface_1m, _10m)
-    roots         builds every PLY, STL and OBJ file of DIR: the root's size                      (all files)
+    roots         builds every model of DIR: the root's size                                      (all files)
+    models        builds, verifies and draws every model of DIR: a row and a contact sheet each   (all files)
+    assemblies    builds of many parts against the first one's rate; what a frame draws of them   (isosurface_10m, clinic, plant_10m)
     scale         builds of one surface of ever more triangles, under --memory 1G           (isosurface_1m to _372m)
     shapes        builds of other kinds of models, against the first one's rate      (isosurface_10m, shuffled, STL, boxes, scans)
     claims        builds with and without --certify: claimed over measured, level by level; CPU time     (isosurface_1m, terrain, scans)
@@ -42,6 +45,7 @@ import sys
 import time
 
 import counts
+import file_parts
 import measure
 import promise_parts
 import scale_parts
@@ -51,8 +55,9 @@ import tables
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 MODELS = ("terrain_n49e011", "dragon_scans", "iso_engine", "motorBike", "turbineblade", "isosurface_10m")
 PATHS = ("orbit", "flythrough")
-SUFFIXES = (".ply", ".stl", ".obj")
-SCENE = re.compile(r"(isosurface|boxes)_(\d+)([km]?)(_shuffled)?(_stl)?")
+SUFFIXES = (".ply", ".stl", ".obj", ".glb")
+ARCHIVES = (".tar", ".tar.zst")
+SCENE = re.compile(r"(isosurface|boxes|plant)_(\d+)([km]?)(_shuffled)?(_stl)?")
 BACKEND_FRAMES = 8
 WALK_FRAMES_A_FRAME = 5  # 300 where the others have 60: a smooth path
 
@@ -73,37 +78,62 @@ class Bench:
         print(f"must_show: {name} {model}{': kept' if kept else ''}", flush=True)
         return kept
 
-    def input_of(self, model):
-        """The model's file, generated or unpacked where it must be."""
+    def inputs_of(self, model):
+        """The model's files, generated or unpacked where they must be."""
         if scene_triangles(model):
             path = self.scene_path(model)
             if not self.is_fresh(path):
                 name, shuffled = SCENE.fullmatch(model).group(1, 4)
                 self.program("scene", name, "--triangles", scene_triangles(model), "--seed", 1, "-o", path,
                              *(["--shuffle"] if shuffled else []))
-            return path
+            return [path]
         for path in sorted(self.data.rglob(f"{model}.*")):
-            if path.suffix in SUFFIXES:
-                return path
-            if path.suffix == ".zst" and path.with_suffix("").suffix in SUFFIXES:
+            name = path.name.removeprefix(model)
+            if name in ARCHIVES:
+                return self.unpacked_archive(path, self.scratch / model)
+            if name in SUFFIXES:
+                return [path]
+            if name.removesuffix(".zst") in SUFFIXES:
                 unpacked = self.scratch / path.with_suffix("").name
                 if not unpacked.exists():
                     measure.run(["zstd", "-q", "-d", path, "-o", unpacked])
-                return unpacked
-        raise measure.Failed(f"{self.data} holds no {model}.ply, .stl or .obj")
+                return [unpacked]
+        raise measure.Failed(f"{self.data} holds no {model} with one of {', '.join(SUFFIXES + ARCHIVES)}")
+
+    def unpacked_archive(self, path, folder):
+        if not folder.exists():
+            folder.mkdir()
+            measure.run(["tar", "-x", *(["--zstd"] if path.suffix == ".zst" else []), "-f", path, "-C", folder])
+        return sorted(folder.rglob("*.gltf"))
+
+    def reference_of(self, model):
+        """What is drawn as the model itself: its one file as read, or the finest level of what many files became."""
+        inputs = self.inputs_of(model)
+        return inputs[0] if len(inputs) == 1 else self.container_of(model)
+
+    def names_of_data(self):
+        """All that --data holds, each once."""
+        names = {path.name: path for path in self.data.rglob("*") if path.is_file()}
+        endings = [suffix + packed for suffix in SUFFIXES + (".tar",) for packed in ("", ".zst")]
+        return sorted({name.removesuffix(ending) for name, path in names.items() for ending in endings
+                       if name.endswith(ending) and not name.startswith("nasty")
+                       and "nasty" not in path.relative_to(self.data).parts})
 
     def triangles_of(self, model):
         """As asked for, of a scene; 0 of a file."""
         return scene_triangles(model)
 
     def scene_path(self, model):
-        return self.scratch / f"{model}.{'stl' if SCENE.fullmatch(model)[5] else 'ply'}"
+        scene = SCENE.fullmatch(model)
+        return self.scratch / f"{model}.{'stl' if scene[5] else 'gltf' if scene[1] == 'plant' else 'ply'}"
 
     def forget_scenes(self, models):
         """Those that anybody can generate again."""
         for model in () if self.options.keep else models:
             if scene_triangles(model):
                 self.scene_path(model).unlink(missing_ok=True)
+                for beside in self.scratch.glob(f"{model}*.bin"):
+                    beside.unlink()
 
     def is_fresh(self, path):
         """Made by the program as it is now."""
@@ -112,7 +142,7 @@ class Bench:
     def container_of(self, model, *options):
         path = self.scratch / f"{model}{''.join(options)}.stroll"
         if not self.is_fresh(path):
-            self.program("build", self.input_of(model), "-o", path, "--memory", "1G", *options)
+            self.program("build", *self.inputs_of(model), "-o", path, "--memory", "1G", *options)
         return path
 
     def render(self, model_file, target, path, *options):
@@ -132,7 +162,7 @@ class Bench:
 
 
 def scene_triangles(model):
-    """How many triangles isosurface_N or boxes_N has; 0 = it is a file."""
+    """How many triangles isosurface_N, boxes_N or plant_N has; 0 = it is a file."""
     match = SCENE.fullmatch(model)
     return int(match[2]) * {"": 1, "k": 10**3, "m": 10**6}[match[3]] if match else 0
 
@@ -140,10 +170,10 @@ def scene_triangles(model):
 def part_build(bench, model):
     if bench.kept("build", model, {}):
         return
-    source, container = bench.input_of(model), bench.scratch / f"{model}.stroll"
-    outcome = bench.program("build", source, "-o", container, "--memory", "1G", "--json")
+    sources, container = bench.inputs_of(model), bench.scratch / f"{model}.stroll"
+    outcome = bench.program("build", *sources, "-o", container, "--memory", "1G", "--json")
     report = outcome.json()
-    bench.log.add("build", model, {}, report=report, seconds=outcome.seconds, bytes_in=source.stat().st_size,
+    bench.log.add("build", model, {}, report=report, seconds=outcome.seconds, bytes_in=sum(source.stat().st_size for source in sources),
                   system_peak_rss_bytes=outcome.peak_rss_bytes,
                   bytes_per_triangle=report["bytes_out"] / max(1, report["triangles_in"]))
 
@@ -151,7 +181,7 @@ def part_build(bench, model):
 def compare_pair(bench, model, path, frames, options, limits, sheet=None):
     """Container against the input as read, with the input's cameras: paths made from both differ by a lattice step."""
     reference, ours = bench.scratch / f"{model}_{path}_reference", bench.scratch / f"{model}_{path}"
-    _, reference_seconds = bench.render(bench.input_of(model), reference, path, "--frames", frames, "--full", *options)
+    _, reference_seconds = bench.render(bench.reference_of(model), reference, path, "--frames", frames, "--full", *options)
     stats, seconds = bench.render(bench.container_of(model), ours, reference / "path.json", *options)
     outcome = bench.program("compare", reference, ours, "--error", 1, "--json", *limits, allowed=(0, 1))
     compared = outcome.json()
@@ -189,7 +219,7 @@ def part_psnr(bench, model):
 def part_verify(bench, model):
     if bench.kept("verify", model, {}):
         return
-    outcome = bench.program("verify", bench.container_of(model), "--against", bench.input_of(model), "--memory", "1G",
+    outcome = bench.program("verify", bench.container_of(model), "--against", *bench.inputs_of(model), "--memory", "1G",
                             "--json", allowed=(0, 1))
     bench.log.add("verify", model, {}, report=outcome.json(), holds=outcome.status == 0, said=outcome.errors,
                   seconds=outcome.seconds, system_peak_rss_bytes=outcome.peak_rss_bytes)
@@ -216,13 +246,13 @@ def part_rate(bench, model):
     settings = {"pairs": bench.options.pairs}
     if bench.kept("rate", model, settings):
         return
-    source, container = bench.input_of(model), bench.scratch / f"{model}_rate.stroll"
+    sources, container = bench.inputs_of(model), bench.scratch / f"{model}_rate.stroll"
     pairs = []
     for _ in range(settings["pairs"]):
         rates = []
         for cores in (1, 2):
             container.unlink(missing_ok=True)
-            outcome = bench.program("build", source, "-o", container, "--memory", "1G", "--jobs", cores, "--json",
+            outcome = bench.program("build", *sources, "-o", container, "--memory", "1G", "--jobs", cores, "--json",
                                     cores=cores)
             rates.append(outcome.json()["triangles_in"] / outcome.seconds)
         pairs.append(rates)
@@ -237,7 +267,7 @@ def part_bytes(bench, model):
         return
     digests, container = {}, bench.scratch / f"{model}_jobs.stroll"
     for jobs in (1, 2, 3, 8):
-        bench.program("build", bench.input_of(model), "-o", container, "--jobs", jobs)
+        bench.program("build", *bench.inputs_of(model), "-o", container, "--jobs", jobs)
         digests[jobs] = measure.digest(container)
         container.unlink()
     bench.log.add("bytes", model, {}, digests=digests, holds=len(set(digests.values())) == 1)
@@ -246,8 +276,8 @@ def part_bytes(bench, model):
 def size_of(bench, model, *options):
     """One build, and what verify says of it against the input."""
     container = bench.scratch / f"{model}_sizes.stroll"
-    report = bench.program("build", bench.input_of(model), "-o", container, "--memory", "1G", "--json", *options).json()
-    outcome = bench.program("verify", container, "--against", bench.input_of(model), "--memory", "1G", "--json", allowed=(0, 1))
+    report = bench.program("build", *bench.inputs_of(model), "-o", container, "--memory", "1G", "--json", *options).json()
+    outcome = bench.program("verify", container, "--against", *bench.inputs_of(model), "--memory", "1G", "--json", allowed=(0, 1))
     verified = outcome.json()
     finest = verified["uniform_cuts"][0]
     container.unlink()
@@ -325,13 +355,13 @@ def part_walk(bench, models):
 
 
 def part_roots(bench, _):
-    for source in sorted(path for path in bench.data.iterdir() if path.suffix in SUFFIXES):
-        if bench.kept("root", source.stem, {}):
+    for model in bench.names_of_data():
+        if bench.kept("root", model, {}):
             continue
         container = bench.scratch / "roots.stroll"
-        outcome = bench.program("build", source, "-o", container, "--memory", "1G", "--json", allowed=(0, 1))
+        outcome = bench.program("build", *bench.inputs_of(model), "-o", container, "--memory", "1G", "--json", allowed=(0, 1))
         report = outcome.json() if outcome.status == 0 else {}
-        bench.log.add("root", source.stem, {}, report=report, holds=outcome.status == 0, said=outcome.errors)
+        bench.log.add("root", model, {}, report=report, holds=outcome.status == 0, said=outcome.errors)
         container.unlink(missing_ok=True)
 
 
@@ -342,7 +372,7 @@ PARTS = {"build": (part_build, MODELS), "images": (part_images, MODELS), "psnr":
          "sizes": (part_sizes, ("isosurface_1m", "isosurface_10m", "dragon_scans", "terrain_n49e011", "iso_cthead", "boxes_1m")),
          "dependencies": (part_dependencies, ("isosurface_10m",)),
          "walk": (part_walk, (("isosurface_1m", "isosurface_10m"),)), "roots": (part_roots, ("",)), **scale_parts.PARTS,
-         **promise_parts.PARTS}
+         **promise_parts.PARTS, **file_parts.PARTS}
 
 
 def models_of(part, chosen):

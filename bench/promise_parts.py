@@ -14,16 +14,16 @@ def part_claims(bench, model):
     settings = {"runs": bench.options.runs}
     if bench.kept("claims", model, settings):
         return
-    source, reports, cpu = bench.input_of(model), {}, {side: [] for side in SIDES}
+    sources, reports, cpu = bench.inputs_of(model), {}, {side: [] for side in SIDES}
     containers = {side: bench.scratch / f"{model}_{side}.stroll" for side in SIDES}
     for _ in range(settings["runs"]):
         for side, options in SIDES.items():
-            outcome = bench.program("build", source, "-o", containers[side], "--memory", "1G", "--json", *options)
+            outcome = bench.program("build", *sources, "-o", containers[side], "--memory", "1G", "--json", *options)
             reports[side] = outcome.json()
             cpu[side].append(outcome.cpu_seconds)
     record = {}
     for side, container in containers.items():
-        outcome = bench.program("verify", container, "--against", source, "--memory", "1G", "--json", allowed=(0, 1))
+        outcome = bench.program("verify", container, "--against", *sources, "--memory", "1G", "--json", allowed=(0, 1))
         levels = outcome.json()["levels"]
         record[side] = {"report": reports[side], "cpu_seconds": measure.spread(cpu[side]), "holds": outcome.status == 0,
                         "levels": [level["claimed_over_measured"] for level in levels]}

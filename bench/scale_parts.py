@@ -23,10 +23,10 @@ WALK_FRAMES_A_FRAME = 5
 
 def build_once(bench, model, memory=MEMORY, **settings):
     """One build by the clock and by the system's account; the container stays."""
-    source, container = bench.input_of(model), bench.scratch / f"{model}.stroll"
+    sources, container = bench.inputs_of(model), bench.scratch / f"{model}.stroll"
     container.unlink(missing_ok=True)
     with measure.DiskWatch(f"{container}.tmp") as disk:
-        outcome = bench.program("build", source, "-o", container, "--memory", memory, "--json", **settings)
+        outcome = bench.program("build", *sources, "-o", container, "--memory", memory, "--json", **settings)
     if outcome.status != 0:
         return outcome, None
     report = outcome.json()

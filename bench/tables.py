@@ -4,7 +4,8 @@ import csv
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 PATHS = ("orbit", "flythrough")
 # What a part's records are called where it is not as the part.
-MEASURES = {"images": ("images_orbit", "images_flythrough"), "psnr": ("psnr_orbit", "psnr_flythrough"), "roots": ("root",)}
+MEASURES = {"images": ("images_orbit", "images_flythrough"), "psnr": ("psnr_orbit", "psnr_flythrough"), "roots": ("root",), "models": ("model",),
+            "assemblies": ("assembly",)}
 MOST_ROOT_TRIANGLES = 16384
 
 
@@ -240,6 +241,42 @@ def cold_rows(records):
                    mebibytes(walk["disk_read_bytes"]), mebibytes(walk["system_peak_rss_bytes"]))
 
 
+def model_rows(records):
+    for record in records_of(records, "model"):
+        report, compare, filtered = record["report"], record["compare"], record["filtered"]
+        dropped = sum(report["dropped"][kind] for kind in ("nonfinite", "degenerate"))
+        yield (record["model"], number(report["triangles_in"]), number(dropped), number(report["root_triangles"]),
+               number(report["bytes_out"] / max(1, report["triangles_in"])), mebibytes(record["system_peak_rss_bytes"]),
+               number(report["triangles_in"] / record["cpu_seconds"] * 1e-6, 3),
+               number(record["holds"]) if record["holds"] else record["said"],
+               f"{record['verified']['cracked_cuts']} of {record['verified']['cuts']}", number(int(record["drawn"]["triangles"]["median"])),
+               number(int(record["drawn"]["draws"]["median"])), number(compare["uncovered_pixels"] + compare["overcovered_pixels"]),
+               percent(compare["depth_within"]), number(filtered["psnr_median_db"]), number(filtered["psnr_min_db"]))
+
+
+ASSEMBLY_LIMIT = 1.5
+
+
+def assembly_rows(records):
+    """Each figure and how many times the first model's it is."""
+    rows = records_of(records, "assembly")
+    names = rows[0]["settings"]["models"] if rows else ()
+    of = {record["model"]: record for record in rows}
+    for model in names if names and names[0] in of else ():
+        record, base = of.get(model), of[names[0]]
+        if not record:
+            continue
+        triangles, base_triangles = (one["report"]["triangles_in"] for one in (record, base))
+        ratios = (rate_of(base, "cpu_seconds") / rate_of(record, "cpu_seconds"),
+                  record["bytes_per_triangle"] / base["bytes_per_triangle"],
+                  record["system_peak_rss_bytes"] / base["system_peak_rss_bytes"])
+        yield (model, number(triangles), number(record["report"]["parts"]), number(record["report"]["root_triangles"]),
+               number(record["report"]["root_triangles"] <= MOST_ROOT_TRIANGLES), number(rate_of(record, "cpu_seconds"), 3),
+               number(record["bytes_per_triangle"]), mebibytes(record["system_peak_rss_bytes"]),
+               *(f"x {number(ratio)}" for ratio in ratios), number(max(ratios) <= ASSEMBLY_LIMIT),
+               number(int(record["drawn"]["triangles"]["median"])), number(int(record["drawn"]["draws"]["median"])))
+
+
 def scale_lines(records):
     """How much the largest model costs more than the smallest, and its walk than the smaller one's."""
     sizes = sorted(records_of(records, "scale"), key=lambda record: record["report"]["triangles_in"])
@@ -345,6 +382,14 @@ TABLES = (
      ("model", "file", "frames", "frame_ms, median", "p99", "select_ms, median", "p99", "triangles, median",
       "missing nodes, p99", "resident, most", "GPU, most", "frames over a budget", "frames that waited for the disk",
       "read from disk", "peak memory"), cold_rows),
+    ("models", "Every model: built, verified, and an orbit at one pixel against the input",
+     ("model", "triangles in", "dropped", "root triangles", "bytes per triangle", "peak memory", "M triangles per CPU second",
+      "verify holds", "cracked cuts", "triangles a frame", "draws a frame", "coverage violations", "depth within",
+      "PSNR, 4 x 4 samples, median dB", "least dB"), model_rows),
+    ("assemblies", "Models of many parts",
+     ("model", "triangles in", "parts", "root triangles", f"at most {MOST_ROOT_TRIANGLES:,}", "M triangles per CPU second",
+      "bytes per triangle", "peak memory", "CPU time a triangle", "bytes", "memory", f"all within {ASSEMBLY_LIMIT}",
+      "triangles a frame", "draws a frame"), assembly_rows),
     ("roots", "Roots", ("file", "triangles in", "root triangles", f"at most {MOST_ROOT_TRIANGLES:,}"), root_rows),
 )
 
