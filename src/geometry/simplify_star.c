@@ -10,6 +10,10 @@
  * a third of black to white. */
 #define UNLIKE 0.3f
 
+/* Then a wedge goes with its triangles where they reach so many times the way that it goes: what falls onto a wedge that looks otherwise
+ * shows as far as they reach. Where they are as small as the way, the error covers that, and each wedge costs bytes. */
+#define CARRY_REACH 4.0
+
 /* Stamps for `count` neighbours, and one more; all begin anew where numbers end. */
 static uint32_t take_stamps(simplifier *s, uint32_t count)
 {
@@ -248,6 +252,29 @@ static uint32_t wedge_beside(const simplifier *s, const strl_star *u_star, uint3
     return NO_INDEX;
 }
 
+/* How far from v the triangles that stay with this wedge of u reach, where their corner comes to lie. */
+static double squared_reach(const simplifier *s, const strl_star *u_star, uint32_t to, uint32_t wedge)
+{
+    double most = 0;
+    const double *v = s->sites[to].position;
+    for (uint32_t i = 0; i < u_star->count; i++) {
+        if (s->corner[u_star->triangle[i]][u_star->corner[i]] != wedge || u_star->next[i] == to || u_star->previous[i] == to)
+            continue;
+        double next = strl__distance2(s->sites[u_star->next[i]].position, v);
+        double previous = strl__distance2(s->sites[u_star->previous[i]].position, v);
+        most = fmax(most, fmax(next, previous));
+    }
+    return most;
+}
+
+/* Whether the wedge shall go with its point although its like is not at v. */
+static bool is_carried(const simplifier *s, const strl_star *u_star, uint32_t to, uint32_t wedge)
+{
+    double way = strl__distance2(s->sites[u_star->point].position, s->sites[to].position);
+    return s->wedge_count + u_star->wedge_count <= s->wedge_room &&
+           squared_reach(s, u_star, to, wedge) > CARRY_REACH * CARRY_REACH * way;
+}
+
 uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32_t to, uint32_t wedge, wedge_fate *fate)
 {
     const site *u = &s->sites[u_star->point], *v = &s->sites[to];
@@ -276,6 +303,6 @@ uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32
             best = other;
         }
     }
-    *fate = least > UNLIKE && s->wedge_count + u_star->wedge_count <= s->wedge_room ? WEDGE_CARRIED : WEDGE_LIKE;
+    *fate = best != NO_INDEX && least > UNLIKE && is_carried(s, u_star, to, wedge) ? WEDGE_CARRIED : WEDGE_LIKE;
     return best;
 }
