@@ -69,25 +69,74 @@ static void copy_cut(const uint8_t *text, size_t bytes, char *name, size_t size)
     }
 }
 
-static strl_status get_name(strl_container *container, strl__table *table, uint32_t index, uint32_t head_bytes,
-                            uint8_t *head, char *name, size_t size, strl_error *err)
+static strl_status name_fault(const strl__table *table, uint64_t item, uint32_t bytes, strl_error *err)
+{
+    return strl__fail(err, STRL_ERR_FORMAT,
+                      "table of %s: item %" PRIu64 " of %" PRIu32
+                      " bytes is not a name in UTF-8 of at most %u bytes that begins as the one before it",
+                      table->name, item, bytes, STRL__MAX_NAME_BYTES);
+}
+
+/* The name after table->last in the page that begins with item `first`, or the first one there: then it is told by nothing. */
+static strl_status next_name(strl__table *table, const uint8_t *item, uint32_t bytes, uint32_t head_bytes, uint64_t index,
+                             uint64_t first, strl_error *err)
+{
+    strl__name *name = table->last;
+    uint32_t head = head_bytes + 2, before = index == first ? 0 : name->bytes;
+    uint32_t shared = bytes < head ? 0 : (uint32_t)strl__load_le(item + head_bytes, 2);
+    if (bytes < head || shared > before || bytes - head > STRL__MAX_NAME_BYTES - shared)
+        return name_fault(table, index, bytes, err);
+    memcpy(name->text + shared, item + head, bytes - head);
+    name->bytes = shared + bytes - head;
+    name->item = index;
+    name->first = first;
+    return STRL_OK;
+}
+
+/* From the page's first name, or from the one that was asked for last where that comes before. */
+static strl_status find_name(strl_container *container, strl__table *table, uint32_t index, uint32_t head_bytes, uint8_t *head,
+                             strl_error *err)
 {
     const uint8_t *item;
     uint32_t bytes;
+    uint64_t first, other;
+    strl_status status = strl__page_table_get(table, container->source, index, &item, &bytes, &first, err);
+    if (status != STRL_OK)
+        return status;
+    if (!table->last) {
+        table->last = strl__alloc(1, sizeof *table->last);
+        if (!table->last)
+            return strl__fail(err, STRL_ERR_MEMORY, "no memory for a name of the table of %s", table->name);
+        table->last->first = UINT64_MAX;
+    }
+    bool goes_on = table->last->first == first && table->last->item <= index;
+    uint64_t at = goes_on ? table->last->item + 1 : first;
+    for (; at <= index && status == STRL_OK; at++) {
+        status = strl__page_table_get(table, container->source, at, &item, &bytes, &other, err);
+        if (status == STRL_OK)
+            status = next_name(table, item, bytes, head_bytes, at, first, err);
+    }
+    if (status != STRL_OK)
+        table->last->first = UINT64_MAX;
+    else if (head_bytes) { /* where the name was there already, no item is at hand */
+        status = strl__page_table_get(table, container->source, index, &item, &bytes, &other, err);
+        if (status == STRL_OK)
+            memcpy(head, item, head_bytes);
+    }
+    return status;
+}
+
+static strl_status get_name(strl_container *container, strl__table *table, uint32_t index, uint32_t head_bytes,
+                            uint8_t *head, char *name, size_t size, strl_error *err)
+{
     if (size)
         name[0] = 0;
-    strl_status status = strl__page_table_get(table, container->source, index, &item, &bytes, err);
-    if (status == STRL_OK && (bytes < head_bytes || bytes > head_bytes + STRL__MAX_NAME_BYTES ||
-                              !strl__utf8_is_name(item + head_bytes, bytes - head_bytes)))
-        status =
-            strl__fail(err, STRL_ERR_FORMAT,
-                       "table of %s: item %" PRIu32 " of %" PRIu32 " bytes is not a name in UTF-8 of at most %u bytes",
-                       table->name, index, bytes, STRL__MAX_NAME_BYTES);
+    strl_status status = find_name(container, table, index, head_bytes, head, err);
+    if (status == STRL_OK && !strl__utf8_is_name(table->last->text, table->last->bytes))
+        status = name_fault(table, index, table->last->bytes, err);
     if (status != STRL_OK)
         return strl_source_fail(container->source, status, err);
-    if (head_bytes)
-        memcpy(head, item, head_bytes);
-    copy_cut(item + head_bytes, bytes - head_bytes, name, size);
+    copy_cut(table->last->text, table->last->bytes, name, size);
     return STRL_OK;
 }
 

@@ -34,7 +34,8 @@ strl_status strl_container_placement(strl_container *container, uint64_t index, 
     const uint8_t *item;
     uint32_t bytes;
     *placement = (strl_placement){0};
-    strl_status status = strl__page_table_get(&container->placements, container->source, index, &item, &bytes, err);
+    uint64_t first;
+    strl_status status = strl__page_table_get(&container->placements, container->source, index, &item, &bytes, &first, err);
     if (status == STRL_OK)
         status = decode(container, index, item, bytes, placement, err);
     return strl_source_fail(container->source, status, err);

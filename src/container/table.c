@@ -105,10 +105,11 @@ static void descend(const strl__page_table_page *page, uint64_t index, strl_tree
 }
 
 strl_status strl__page_table_get(strl__table *table, strl_source *source, uint64_t index, const uint8_t **item,
-                                 uint32_t *bytes, strl_error *err)
+                                 uint32_t *bytes, uint64_t *page_first, strl_error *err)
 {
     *item = NULL;
     *bytes = 0;
+    *page_first = 0;
     uint64_t first = 0, end = table->section.item_count;
     if (index >= end)
         return strl__fail(err, STRL_ERR_ARGUMENT, "there is no item %" PRIu64 " in the table of %" PRIu64 " %s", index,
@@ -128,6 +129,7 @@ strl_status strl__page_table_get(strl__table *table, strl_source *source, uint64
     uint32_t start = within ? (uint32_t)strl__load_le(ends + 4 * (within - 1), 4) : 0;
     *bytes = (uint32_t)strl__load_le(ends + 4 * within, 4) - start;
     *item = ends + 4 * (end - first) + start;
+    *page_first = first;
     return STRL_OK;
 }
 
@@ -135,4 +137,5 @@ void strl__page_table_deinit(strl__table *table)
 {
     for (unsigned depth = 0; depth <= STRL__TABLE_MAX_DEPTH; depth++)
         strl__free(table->pages[depth].data);
+    strl__free(table->last);
 }

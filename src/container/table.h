@@ -20,7 +20,9 @@ typedef struct strl__page_table_writer strl__page_table_writer;
 strl_status strl__page_table_writer_create(strl__page_table_writer **table, strl_error *err);
 void strl__page_table_writer_destroy(strl__page_table_writer *table); /* NULL is legal */
 uint64_t strl__page_table_writer_count(const strl__page_table_writer *table);
-/* The item is head followed by body; together at most STRL__MAX_NAME_BYTES + 4. */
+/* Whether the next item will be its page's first if it has so many bytes. */
+bool strl__page_table_writer_begins(const strl__page_table_writer *table, uint32_t bytes);
+/* The item is head followed by body; together at most STRL__MAX_NAME_BYTES + 6. */
 strl_status strl__page_table_writer_add(strl__page_table_writer *table, strl__sink *sink, const void *head,
                                         uint32_t head_bytes, const void *body, uint32_t body_bytes, strl_error *err);
 /* Writes what is pending; section gets depth, count and root. At least one item was added. */
@@ -34,15 +36,23 @@ typedef struct strl__page_table_page {
     uint64_t first, end; /* items that the page stands for; end 0: nothing is held */
 } strl__page_table_page;
 
+/* A name as it is told by the one before. */
+typedef struct strl__name {
+    uint64_t item, first; /* of the table; of its page */
+    uint32_t bytes;
+    uint8_t text[STRL__MAX_NAME_BYTES];
+} strl__name;
+
 typedef struct strl__table {
     const char *name; /* "parts"; static */
     strl__section section;
     strl__page_table_page pages[STRL__TABLE_MAX_DEPTH + 1]; /* by depth; 0 = leaf */
+    strl__name *last; /* the name that was asked for last, owned; NULL = none yet, or no table of names */
 } strl__table;
 
-/* *item is borrowed until the next call. */
+/* *item is borrowed until the next call; *first: the first item of its page. */
 strl_status strl__page_table_get(strl__table *table, strl_source *source, uint64_t index, const uint8_t **item,
-                                 uint32_t *bytes, strl_error *err);
+                                 uint32_t *bytes, uint64_t *first, strl_error *err);
 void strl__page_table_deinit(strl__table *table);
 
 #endif

@@ -115,11 +115,16 @@ static strl_status flush_leaf(strl__page_table_writer *table, strl__sink *sink, 
     return STRL_OK;
 }
 
+bool strl__page_table_writer_begins(const strl__page_table_writer *table, uint32_t bytes)
+{
+    uint64_t used = 4 + 4 * ((uint64_t)table->leaf_count + 1) + table->leaf_bytes;
+    return table->leaf_count == 0 || used + bytes > STRL__TABLE_PAGE_BYTES;
+}
+
 strl_status strl__page_table_writer_add(strl__page_table_writer *table, strl__sink *sink, const void *head,
                                         uint32_t head_bytes, const void *body, uint32_t body_bytes, strl_error *err)
 {
-    uint64_t used = 4 + 4 * ((uint64_t)table->leaf_count + 1) + table->leaf_bytes;
-    if (used + head_bytes + body_bytes > STRL__TABLE_PAGE_BYTES) {
+    if (table->leaf_count && strl__page_table_writer_begins(table, head_bytes + body_bytes)) {
         strl_status status = flush_leaf(table, sink, err);
         if (status != STRL_OK)
             return status;

@@ -113,7 +113,29 @@ strl_status strl_container_writer_add_placement(strl_container_writer *writer, c
     return status;
 }
 
-static strl_status add_name(strl_container_writer *writer, strl__page_table_writer *table, const void *head,
+/* How many bytes two names begin with alike. */
+static uint32_t shared_bytes(const strl__name *last, const uint8_t *name, uint32_t bytes)
+{
+    uint32_t most = bytes < last->bytes ? bytes : last->bytes, shared = 0;
+    while (shared < most && name[shared] == last->text[shared])
+        shared++;
+    return shared;
+}
+
+/* Told by the name before it in its page (docs/format.md, "Part"). head has room for the two bytes behind it. */
+static strl_status add_after(strl_container_writer *writer, strl__page_table_writer *table, strl__name *last, uint8_t *head,
+                             uint32_t head_bytes, const uint8_t *name, uint32_t bytes, strl_error *err)
+{
+    uint32_t shared = shared_bytes(last, name, bytes);
+    if (strl__page_table_writer_begins(table, head_bytes + 2 + bytes - shared))
+        shared = 0;
+    strl__store_le(head + head_bytes, 2, shared);
+    memcpy(last->text + shared, name + shared, bytes - shared);
+    last->bytes = bytes;
+    return strl__page_table_writer_add(table, &writer->sink, head, head_bytes + 2, name + shared, bytes - shared, err);
+}
+
+static strl_status add_name(strl_container_writer *writer, strl__page_table_writer *table, strl__name *last, uint8_t *head,
                             uint32_t head_bytes, const char *name, strl_error *err)
 {
     uint8_t clean[STRL__MAX_NAME_BYTES];
@@ -126,22 +148,23 @@ static strl_status add_name(strl_container_writer *writer, strl__page_table_writ
         status =
             strl__fail(err, STRL_ERR_LIMIT, "a container holds at most %" PRIu32 " names of a kind", STRL_NONE - 1);
     else
-        status = strl__page_table_writer_add(table, &writer->sink, head, head_bytes, clean, (uint32_t)bytes, err);
+        status = add_after(writer, table, last, head, head_bytes, clean, (uint32_t)bytes, err);
     writer->failed |= status != STRL_OK;
     return status;
 }
 
 strl_status strl_container_writer_add_part(strl_container_writer *writer, const char *name, strl_error *err)
 {
-    return add_name(writer, writer->parts, NULL, 0, name, err);
+    uint8_t head[2];
+    return add_name(writer, writer->parts, &writer->last_part, head, 0, name, err);
 }
 
 strl_status strl_container_writer_add_material(strl_container_writer *writer, const char *name, uint32_t rgba,
                                                strl_error *err)
 {
-    uint8_t head[STRL__MATERIAL_HEAD_BYTES];
-    strl__store_le(head, sizeof head, rgba);
-    return add_name(writer, writer->materials, head, sizeof head, name, err);
+    uint8_t head[STRL__MATERIAL_HEAD_BYTES + 2];
+    strl__store_le(head, STRL__MATERIAL_HEAD_BYTES, rgba);
+    return add_name(writer, writer->materials, &writer->last_material, head, STRL__MATERIAL_HEAD_BYTES, name, err);
 }
 
 static strl_status add_defaults(strl_container_writer *writer, strl_error *err)

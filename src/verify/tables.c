@@ -17,8 +17,10 @@
 typedef struct table {
     strl__model *model;
     unsigned kind;
-    const char *name;
+    const char *name_of_kind;
     double bounds[6]; /* of the placements so far */
+    size_t name_bytes; /* of the name before, in the same page */
+    uint8_t name[MOST_NAME_BYTES];
 } table;
 
 #define TABLE_RULE(table, condition, key, ...)                                                                         \
@@ -46,13 +48,27 @@ static size_t utf8_sequence(const uint8_t *text, size_t left)
     return size;
 }
 
-static void check_name(table *self, uint64_t item, const uint8_t *text, size_t bytes)
+/* Puts the name together: so many bytes of the one before, then the rest. False where it can't be. */
+static bool read_name(table *self, uint64_t item, const uint8_t *tail, size_t bytes)
 {
-    size_t at = 0, step = 1;
+    size_t shared = bytes < 2 ? SIZE_MAX : tail[0] | (size_t)tail[1] << 8;
+    bool good = shared <= self->name_bytes && shared + bytes - 2 <= MOST_NAME_BYTES;
+    TABLE_RULE(self, good, item, "%s %" PRIu64 ": %zu bytes after %zu of the %zu of the name before", self->name_of_kind, item,
+               bytes, shared, self->name_bytes);
+    if (good) {
+        memcpy(self->name + shared, tail + 2, bytes - 2);
+        self->name_bytes = shared + bytes - 2;
+    }
+    return good;
+}
+
+static void check_name(table *self, uint64_t item)
+{
+    const uint8_t *text = self->name;
+    size_t at = 0, step = 1, bytes = self->name_bytes;
     while (at < bytes && (step = utf8_sequence(text + at, bytes - at)) != 0)
         at += step;
-    TABLE_RULE(self, at == bytes && bytes <= MOST_NAME_BYTES, item,
-               "%s %" PRIu64 ": its name of %zu bytes is not UTF-8 of at most 32000 bytes (byte %zu)", self->name, item,
+    TABLE_RULE(self, at == bytes, item, "%s %" PRIu64 ": its name of %zu bytes is not UTF-8 (byte %zu)", self->name_of_kind, item,
                bytes, at);
 }
 
@@ -98,9 +114,9 @@ static void check_item(table *self, uint64_t item, const uint8_t *bytes, size_t 
         return;
     }
     size_t head = self->kind == STRL__MATERIALS ? 4 : 0;
-    TABLE_RULE(self, size >= head, item, "%s %" PRIu64 ": %zu bytes are too few", self->name, item, size);
-    if (size >= head)
-        check_name(self, item, bytes + head, size - head);
+    TABLE_RULE(self, size >= head, item, "%s %" PRIu64 ": %zu bytes are too few", self->name_of_kind, item, size);
+    if (size >= head && read_name(self, item, bytes + head, size - head))
+        check_name(self, item);
 }
 
 static void check_leaf(table *self, const uint8_t *bytes, size_t size, uint64_t first, uint64_t count)
@@ -108,15 +124,16 @@ static void check_leaf(table *self, const uint8_t *bytes, size_t size, uint64_t 
     strl_cursor cursor = strl_cursor_make(bytes, size);
     uint32_t items = strl_cursor_u32(&cursor);
     bool good = items == count && items <= (size - 4) / 4;
-    TABLE_RULE(self, good, first, "%s page from item %" PRIu64 ": %u items, expected %" PRIu64, self->name, first,
+    TABLE_RULE(self, good, first, "%s page from item %" PRIu64 ": %u items, expected %" PRIu64, self->name_of_kind, first,
                items, count);
     if (!good)
         return;
     size_t head = 4 + (size_t)items * 4, before = 0;
+    self->name_bytes = 0;
     for (uint32_t i = 0; i < items; i++) {
         size_t end = strl_cursor_u32(&cursor);
         good = end >= before && end <= size - head && (i + 1 < items || end == size - head);
-        TABLE_RULE(self, good, first + i, "%s %" PRIu64 ": ends at %zu of %zu, after %zu", self->name, first + i, end,
+        TABLE_RULE(self, good, first + i, "%s %" PRIu64 ": ends at %zu of %zu, after %zu", self->name_of_kind, first + i, end,
                    size - head, before);
         if (!good)
             return;
@@ -134,7 +151,7 @@ static strl_status check_index(table *self, const uint8_t *bytes, size_t size, u
     strl_cursor cursor = strl_cursor_make(bytes, size);
     uint32_t refs = strl_cursor_u32(&cursor), reserved = strl_cursor_u32(&cursor);
     bool good = refs >= 1 && refs <= MOST_REFS && reserved == 0 && size == 8 + (size_t)refs * REF_BYTES;
-    TABLE_RULE(self, good, first, "%s index page from item %" PRIu64 ": %u references in %zu bytes", self->name, first,
+    TABLE_RULE(self, good, first, "%s index page from item %" PRIu64 ": %u references in %zu bytes", self->name_of_kind, first,
                refs, size);
     strl_status status = STRL_OK;
     for (uint32_t i = 0; good && status == STRL_OK && i < refs; i++) {
@@ -147,7 +164,7 @@ static strl_status check_index(table *self, const uint8_t *bytes, size_t size, u
             end = strl__load_le(bytes + cursor.at + 8, 8);
         good = zero == 0 && place.bytes <= PAGE_BYTES && from < end && end <= first + count && (i > 0 || from == first);
         TABLE_RULE(self, good, from,
-                   "%s index page from item %" PRIu64 ": reference %u is for items %" PRIu64 " to %" PRIu64, self->name,
+                   "%s index page from item %" PRIu64 ": reference %u is for items %" PRIu64 " to %" PRIu64, self->name_of_kind,
                    first, i, from, end);
         if (good)
             status = check_page(self, &place, depth - 1, from, end - from, err);
@@ -159,14 +176,14 @@ static strl_status check_page(table *self, const strl__place *place, uint32_t de
                               strl_error *err)
 {
     bool good = place->bytes >= 8 && place->bytes <= PAGE_BYTES;
-    TABLE_RULE(self, good, first, "%s page from item %" PRIu64 ": %u bytes, expected 8 to 65536", self->name, first,
+    TABLE_RULE(self, good, first, "%s page from item %" PRIu64 ": %u bytes, expected 8 to 65536", self->name_of_kind, first,
                place->bytes);
     if (!good)
         return STRL_OK;
     uint8_t *bytes = strl__alloc(place->bytes, 1);
     if (!bytes)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a page of names");
-    strl_status status = strl__v_fetch(self->model, place, self->name, first, bytes, &good, err);
+    strl_status status = strl__v_fetch(self->model, place, self->name_of_kind, first, bytes, &good, err);
     if (status == STRL_OK && good && depth > 0)
         status = check_index(self, bytes, place->bytes, depth, first, count, err);
     else if (status == STRL_OK && good)
@@ -196,7 +213,7 @@ strl_status strl__v_read_tables(strl__model *model, strl_error *err)
         const strl__section *section = &model->sections[kind];
         table self = {.model = model,
                       .kind = kind,
-                      .name = names[kind],
+                      .name_of_kind = names[kind],
                       .bounds = {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY}};
         status = check_page(&self, &section->place, section->depth, 0, section->item_count, err);
         if (status == STRL_OK && kind == STRL__PLACEMENTS)

@@ -219,7 +219,8 @@ static const damage damages[] = {
     {"bad-placement-tree.stroll", PLACEMENTS, 8, 4, 1},
     {"bad-placement-nan.stroll", PLACEMENTS, 16, 8, 0x7ff0000000000000u},
     {"bad-name-ends.stroll", PARTS, 8, 4, 5000},
-    {"bad-name-utf8.stroll", PARTS, 24, 1, 0xff},
+    {"bad-name-utf8.stroll", PARTS, 26, 1, 0xff},
+    {"bad-name-shared.stroll", PARTS, 24, 2, 1}, /* with the name before the first */
     {"bad-payload-version.stroll", PAGE, 0, 1, 0xee},
 };
 #define DAMAGES (sizeof damages / sizeof *damages)
