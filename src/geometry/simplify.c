@@ -12,6 +12,7 @@
 #define SMALL_SHARE 5e-4 /* of a piece's diagonal: errors below are never out of proportion */
 #define LARGE_SHARE 0.01 /* of a piece's diagonal: errors above are out of proportion where not even half of what is wanted is done */
 #define LEAST_ERROR 1.f  /* lattice units: below, all errors count as equal */
+#define MEAN_COSINE 0.7f /* normals that are further apart belong to two faces: no mean says what either looks like */
 
 static candidate candidate_of(uint32_t point, float key)
 {
@@ -62,6 +63,11 @@ static uint32_t heap_pop(simplifier *s)
     return first;
 }
 
+static float cosine(const float a[4], const float b[4])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
 /* One more wedge at v that looks like this one of u. */
 static uint32_t carry_wedge(simplifier *s, uint32_t wedge, uint32_t to, strl_simplified *result)
 {
@@ -86,7 +92,8 @@ static void map_wedges(simplifier *s, const strl_star *star, uint32_t to, strl_s
         if (fate == WEDGE_CARRIED)
             target = carry_wedge(s, wedge, to, result);
         result->wedge_parent[wedge] = target;
-        for (int k = 0; k < 3; k++)
+        bool counts = fate != WEDGE_LIKE || cosine(s->normal[target], s->normal[wedge]) > MEAN_COSINE;
+        for (int k = 0; k < 3 && counts; k++)
             s->normal_sum[target][k] += s->normal_sum[wedge][k];
     }
 }
