@@ -26,7 +26,7 @@ models. Parts:
     claims        builds with and without --certify: claimed over measured, level by level; CPU time     (isosurface_1m, terrain, scans)
     decode        payloads decoded on one thread, as built by default and with --compact          (models of several kinds)
     kills         a build killed at random moments and resumed, until --kills of them            (isosurface_10m)
-    cap           a build under the system's own limit, which ends a program that passes it       (isosurface_10m)
+    cap           a build under the system's own limit, which ends a program that passes it   (isosurface_10m, plant_1m)
     walk_cold     a walk under --memory 600M, the file cold and warm                   (isosurface_10m, isosurface_372m)
 
 The largest scene takes 9 GB of --scratch, its build 30 GB more. Parts scale, shapes and walk_cold delete the scenes that

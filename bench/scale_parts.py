@@ -122,5 +122,5 @@ def part_walk_cold(bench, models):
         bench.log.add("walk_cold", model, settings, cold=walk_once(bench, model, path), warm=walk_once(bench, model, path))
 
 
-PARTS = {"scale": (part_scale, SIZES), "shapes": (part_shapes, (SHAPES,)), "cap": (part_cap, ("isosurface_10m",)),
+PARTS = {"scale": (part_scale, SIZES), "shapes": (part_shapes, (SHAPES,)), "cap": (part_cap, ("isosurface_10m", "plant_1m")),
          "walk_cold": (part_walk_cold, (("isosurface_10m", "isosurface_372m"),))}

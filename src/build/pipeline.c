@@ -135,9 +135,9 @@ static strl_status open_part_scratch(const char *target, const char *own, strl_s
     return status;
 }
 
-/* What a worker holds at most, measured on soups and scans: a group's meshes, merged, and what simplifies them. */
-#define WORKER_BYTES (24ull << 20)
-#define SHARED_BYTES (32ull << 20)
+/* What a worker holds at most, measured on soups, scans and plants: a group's meshes, merged, and what simplifies them. */
+#define WORKER_BYTES (36ull << 20)
+#define SHARED_BYTES (28ull << 20)
 
 /* As many threads as were asked for, but no more than the memory feeds. The output does not depend on their number. */
 static unsigned count_workers(const strl_build_desc *desc, uint64_t memory_bytes)

@@ -365,19 +365,13 @@ static bool climb_ladder(simplifier *s, float start, strl_arena *arena, strl_sim
     return true;
 }
 
-strl_status strl_simplify(const strl_mesh *mesh, const strl_simplify_desc *desc, strl_arena *arena,
-                          strl_simplified *result, strl_error *err)
+static strl_status simplify(simplifier *s, strl_arena *work, strl_arena *arena, strl_simplified *result, strl_error *err)
 {
-    simplifier *s = strl_arena_alloc_zero(arena, 1, sizeof *s);
-    *result = (strl_simplified){0};
-    if (!s)
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory to simplify %u triangles", mesh->triangle_count);
-    s->mesh = mesh;
-    s->desc = desc;
-    if (!strl__simplify_load(s, arena, result))
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory to simplify %u triangles", mesh->triangle_count);
+    const strl_simplify_desc *desc = s->desc;
+    if (!strl__simplify_load(s, work, arena, result))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory to simplify %u triangles", s->mesh->triangle_count);
     s->free_key = strl__larger(result->geometric, result->appearance) * (1 + 1e-5f); /* claims are rounded up */
-    s->diagonal = diagonal_of(mesh);
+    s->diagonal = diagonal_of(s->mesh);
     float reached = strl__larger(result->geometric, LEAST_ERROR);
     if (s->triangles_left > desc->target_triangles / FREE_DIVISOR)
         reached = strl__larger(reached, run_rung(s, first_rung_limit(s, reached), true, result));
@@ -387,8 +381,24 @@ strl_status strl_simplify(const strl_mesh *mesh, const strl_simplify_desc *desc,
         s->rung = STRL_SIMPLIFY_TOPOLOGY;
     }
     uint32_t enough = desc->even_error > 0 ? desc->most_triangles : desc->target_triangles;
-    if (s->triangles_left > enough && !climb_ladder(s, reached, arena, result))
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory to simplify %u triangles", mesh->triangle_count);
+    if (s->triangles_left > enough && !climb_ladder(s, reached, work, result))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory to simplify %u triangles", s->mesh->triangle_count);
     strl__simplify_store(s, result);
     return STRL_OK;
+}
+
+strl_status strl_simplify(const strl_mesh *mesh, const strl_simplify_desc *desc, strl_arena *arena,
+                          strl_simplified *result, strl_error *err)
+{
+    simplifier *s = strl__alloc_zero(1, sizeof *s);
+    strl_arena work = {0}; /* several times what the result takes */
+    *result = (strl_simplified){0};
+    if (!s)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory to simplify %u triangles", mesh->triangle_count);
+    s->mesh = mesh;
+    s->desc = desc;
+    strl_status status = simplify(s, &work, arena, result, err);
+    strl_arena_deinit(&work);
+    strl__free(s);
+    return status;
 }

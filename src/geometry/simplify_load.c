@@ -194,10 +194,10 @@ static void load_triangle(simplifier *s, uint32_t t, strl_simplified *result)
     result->appearance = strl__larger(result->appearance, mesh->shift[t]);
 }
 
-bool strl__simplify_load(simplifier *s, strl_arena *arena, strl_simplified *result)
+bool strl__simplify_load(simplifier *s, strl_arena *work, strl_arena *arena, strl_simplified *result)
 {
     s->wedge_room = wedge_room(s->mesh->wedge_count);
-    if (!allocate_result(s, result, arena) || !allocate(s, arena))
+    if (!allocate_result(s, result, arena) || !allocate(s, work))
         return false;
     s->corner = result->corner;
     s->wedge = result->wedge;

@@ -16,8 +16,8 @@ bool strl__plan_best(simplifier *s, uint32_t point, collapse_plan *plan);
 /* The cost of a given collapse, allowed or not, and its effect. */
 void strl__plan_collapse(const simplifier *s, const strl_star *star, uint32_t to, collapse_plan *plan, collapse_effect *effect);
 
-/* Sets up all of s but mesh and desc; the arrays of the result. False without memory. */
-bool strl__simplify_load(simplifier *s, strl_arena *arena, strl_simplified *result);
+/* Sets up all of s but mesh and desc, from `work`, and the arrays of the result, from `arena`. False without memory. */
+bool strl__simplify_load(simplifier *s, strl_arena *work, strl_arena *arena, strl_simplified *result);
 /* What is left, into the result. */
 void strl__simplify_store(const simplifier *s, strl_simplified *result);
 /* Adds a corner to its point. */

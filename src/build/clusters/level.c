@@ -42,7 +42,7 @@ typedef struct group_work {
     uint32_t count;              /* members */
     const uint32_t *member;      /* node indices of the level */
     uint32_t child_count;
-    strl_node_mesh child[2 * STRL_GROUP_MAX];
+    uint32_t child_triangles[2 * STRL_GROUP_MAX];
     strl_node_mesh merged;
     uint32_t *owner;             /* per triangle of merged: index of the member */
     uint32_t *outside_first, *outside; /* per point: holders that are not members, ascending */
@@ -69,14 +69,16 @@ static strl_status read_child(const strl_level *children, uint32_t index, strl_a
     return status ? status : strl_node_mesh_read(mesh, state->mesh_bytes, given, arena, child, err);
 }
 
-static strl_status read_children(const level_stage *stage, group_work *work, strl_arena *arena, strl_error *err)
+static strl_status read_children(const level_stage *stage, group_work *work, strl_node_mesh *child, strl_arena *arena,
+                                 strl_error *err)
 {
     strl_arena scratch = {0};
     strl_arena_mark mark = strl_arena_get_mark(&scratch);
     strl_status status = STRL_OK;
     for (uint32_t i = 0; i < 2 * work->count && !status; i++) {
-        status = read_child(stage->children, 2 * work->member[i / 2] + (i & 1), arena, &scratch, &work->child[i], err);
+        status = read_child(stage->children, 2 * work->member[i / 2] + (i & 1), arena, &scratch, &child[i], err);
         strl_arena_rewind(&scratch, mark);
+        work->child_triangles[i] = status ? 0 : child[i].mesh.triangle_count;
     }
     strl_arena_deinit(&scratch);
     work->child_count = 2 * work->count;
@@ -105,12 +107,12 @@ static int compare_outsiders(const void *a, const void *b)
 }
 
 /* Fills the merged mesh's holders and flags, and the list of outsiders of each point. */
-static bool find_holders(group_work *work, uint32_t *const *point_of, strl_arena *arena)
+static bool find_holders(group_work *work, const strl_node_mesh *children, uint32_t *const *point_of, strl_arena *arena)
 {
     strl_mesh *mesh = &work->merged.mesh;
     size_t total = 0, count = 0;
     for (uint32_t i = 0; i < work->child_count; i++)
-        total += work->child[i].share_first ? work->child[i].share_first[work->child[i].mesh.point_count] : 0;
+        total += children[i].share_first ? children[i].share_first[children[i].mesh.point_count] : 0;
     outsider *list = strl_arena_alloc(arena, total, sizeof *list);
     mesh->holders = strl_arena_alloc_zero(arena, mesh->point_count, 1);
     work->outside_first = strl_arena_alloc(arena, (size_t)mesh->point_count + 1, sizeof *work->outside_first);
@@ -118,7 +120,7 @@ static bool find_holders(group_work *work, uint32_t *const *point_of, strl_arena
     if (!list || !mesh->holders || !work->outside_first || !work->outside)
         return false;
     for (uint32_t i = 0; i < work->child_count; i++) {
-        const strl_node_mesh *child = &work->child[i];
+        const strl_node_mesh *child = &children[i];
         for (uint32_t p = 0; p < child->mesh.point_count; p++) {
             mesh->holders[point_of[i][p]] |= (uint8_t)(1u << i / 2);
             for (uint32_t s = child->share_first ? child->share_first[p] : 0;
@@ -158,12 +160,13 @@ static float diagonal_of_group(const level_stage *stage, const group_work *work)
     return nextafterf((float)sqrt(squared) + work->merged.mesh.start_error, INFINITY);
 }
 
-static strl_status merge_children(const level_stage *stage, group_work *work, strl_arena *arena, strl_error *err)
+static strl_status merge_into_one(const level_stage *stage, group_work *work, const strl_node_mesh *children, strl_arena *arena,
+                                  strl_error *err)
 {
     const strl_node_mesh *list[2 * STRL_GROUP_MAX];
     uint32_t *point_of[2 * STRL_GROUP_MAX];
     for (uint32_t i = 0; i < work->child_count; i++)
-        list[i] = &work->child[i];
+        list[i] = &children[i];
     strl_status status = strl_node_mesh_merge(list, work->child_count, arena, &work->merged, &work->owner, point_of, err);
     if (status)
         return status;
@@ -177,7 +180,20 @@ static strl_status merge_children(const level_stage *stage, group_work *work, st
         work->steps += dropped;
         work->rung = dropped ? STRL_SIMPLIFY_CLUSTERING : work->rung;
     }
-    return find_holders(work, point_of, arena) ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for a group");
+    return find_holders(work, children, point_of, arena) ? STRL_OK
+                                                         : strl__fail(err, STRL_ERR_MEMORY, "no memory for a group");
+}
+
+/* The children's own meshes are gone again when this ends. */
+static strl_status merge_children(const level_stage *stage, group_work *work, strl_arena *arena, strl_error *err)
+{
+    strl_node_mesh children[2 * STRL_GROUP_MAX];
+    strl_arena own = {0};
+    strl_status status = read_children(stage, work, children, &own, err);
+    if (!status)
+        status = merge_into_one(stage, work, children, arena, err);
+    strl_arena_deinit(&own);
+    return status;
 }
 
 static float boundary_limit(const level_stage *stage, const group_work *work)
@@ -192,16 +208,15 @@ static float boundary_limit(const level_stage *stage, const group_work *work)
 
 /* Collapses points that several members have and nobody else (paper, 4.4), on the merged mesh, before any progressive mesh
  * of the level begins. */
-static strl_status simplify_boundary(const level_stage *stage, group_work *work, strl_arena *arena, strl_error *err)
+static strl_status collapse_boundary(const level_stage *stage, group_work *work, strl_arena *own, strl_arena *arena,
+                                     strl_error *err)
 {
     strl_simplify_desc desc = {.error_limit = boundary_limit(stage, work), .last_rung = STRL_SIMPLIFY_SEAMS,
                                .normal_weight = STRL_NORMAL_WEIGHT, .colour_weight = STRL_COLOUR_WEIGHT};
     strl_mesh *mesh = &work->merged.mesh, after;
     strl_simplified simplified;
-    if (work->count == 1)
-        return STRL_OK;
-    uint32_t *point_map = strl_arena_alloc(arena, mesh->point_count, sizeof *point_map);
-    strl_status status = point_map ? strl_simplify(mesh, &desc, arena, &simplified, err)
+    uint32_t *point_map = strl_arena_alloc(own, mesh->point_count, sizeof *point_map);
+    strl_status status = point_map ? strl_simplify(mesh, &desc, own, &simplified, err)
                                    : strl__fail(err, STRL_ERR_MEMORY, "no memory for a group");
     if (!status)
         status = strl_mesh_after(mesh, &simplified, point_map, arena, &after, err);
@@ -225,6 +240,17 @@ static strl_status simplify_boundary(const level_stage *stage, group_work *work,
     work->rung = simplified.rung > work->rung ? simplified.rung : work->rung;
     *mesh = after;
     return STRL_OK;
+}
+
+/* What the simplifier holds of a whole group is gone again when this ends. */
+static strl_status simplify_boundary(const level_stage *stage, group_work *work, strl_arena *arena, strl_error *err)
+{
+    strl_arena own = {0};
+    if (work->count == 1)
+        return STRL_OK;
+    strl_status status = collapse_boundary(stage, work, &own, arena, err);
+    strl_arena_deinit(&own);
+    return status;
 }
 
 /* Who has each point after the boundary has changed: from the triangles. */
@@ -282,7 +308,7 @@ static strl_status extract_member(const group_work *work, uint32_t which, strl_a
 
 static uint32_t half_of_children(const group_work *work, uint32_t which)
 {
-    uint32_t sum = work->child[2 * which].mesh.triangle_count + work->child[2 * which + 1].mesh.triangle_count;
+    uint32_t sum = work->child_triangles[2 * which] + work->child_triangles[2 * which + 1];
     return (sum + 1) / 2;
 }
 
@@ -296,9 +322,7 @@ static strl_status make_group(void *context, uint64_t index, unsigned slot, unsi
     group_work work = {.count = stage->groups.first[index + 1] - stage->groups.first[index],
                        .member = stage->groups.member + stage->groups.first[index]};
     *made = (made_group){.count = work.count};
-    strl_status status = read_children(stage, &work, arena, err);
-    if (!status)
-        status = merge_children(stage, &work, arena, err);
+    strl_status status = merge_children(stage, &work, arena, err);
     if (!status)
         status = simplify_boundary(stage, &work, arena, err);
     if (!status && !recount_holders(&work, arena))
