@@ -59,6 +59,7 @@ struct strl_reader {
     uint64_t all_bytes; /* with the files that this one names, where they count; else 0 */
     uint64_t triangles_hint;
     bool hint_is_exact;
+    bool is_certain; /* not its name alone says what the file is */
     uint64_t listed_vertices; /* where the table of vertices does not hold them all, or was given back; else 0 */
     strl__input input;
     strl__table vertices, normals;

@@ -22,6 +22,7 @@ typedef struct obj_state {
     bool has_colour;        /* some vertex has one */
     uint64_t vertices_seen; /* of this pass, so far: what negative indices count from */
     uint64_t normals_seen;
+    uint64_t others;        /* lines that no statement read here begins */
     obj_name object, group, material;
     uint32_t part_index, material_index;
     bool part_known, material_known; /* the indices fit the names */
@@ -235,6 +236,7 @@ static strl_status read_libraries(strl_reader *reader, strl_error *err)
 
 static strl_status gather(strl_reader *reader, strl_error *err)
 {
+    obj_state *obj = reader->state;
     strl__input *input = &reader->input;
     strl_status status = STRL_OK;
     for (; !status; strl__text_skip_line(input)) {
@@ -250,6 +252,9 @@ static strl_status gather(strl_reader *reader, strl_error *err)
             break;
         case OBJ_LIBRARY:
             status = read_libraries(reader, err);
+            break;
+        case OBJ_OTHER:
+            obj->others += *input->at != '#' && !strl__text_at_line_end(input);
             break;
         default:
             break;
@@ -288,6 +293,7 @@ static strl_status obj_prepare(strl_reader *reader, strl_error *err)
     strl__names_init(&obj->library, (size_t)(reader->memory_bytes / 32));
     obj->has_library = true;
     obj->has_colour = false;
+    obj->others = 0;
     build_tables(reader);
     strl__input_seek(&reader->input, 0, 1);
     strl__text_skip_byte_order_mark(&reader->input);
@@ -297,6 +303,7 @@ static strl_status obj_prepare(strl_reader *reader, strl_error *err)
     if (!status)
         status = strl__table_finish(&reader->normals, err);
     reader->vertices.layout.has_colour = obj->has_colour;
+    reader->is_certain = reader->is_certain || obj->others == 0;
     return status ? status : strl__reader_init_batch(reader, true, err);
 }
 

@@ -54,6 +54,7 @@ static strl_status recognise(strl_reader *reader, strl_error *err)
         if (!(foreign && formats[i]->weak) &&
             formats[i]->recognises(&reader->input, reader->opened.bytes))
             reader->format = formats[i];
+    reader->is_certain = reader->format != NULL;
     for (size_t i = 0; i < sizeof formats / sizeof *formats && !reader->format; i++)
         if (strl__has_extension(reader->path, formats[i]->name))
             reader->format = formats[i];
@@ -162,6 +163,7 @@ void strl_reader_info_get(const strl_reader *reader, strl_reader_info *info)
         .default_unit = reader->default_unit,
         .triangles_hint = reader->triangles_hint,
         .hint_is_exact = reader->hint_is_exact,
+        .is_certain = reader->is_certain,
         .file_bytes = reader->all_bytes ? reader->all_bytes : reader->opened.bytes,
     };
 }

@@ -50,22 +50,6 @@ void strl__ingest_name_inputs(const strl_build_desc *desc, char *text, size_t si
         snprintf(text, size, "%s and %u more", desc->inputs[0], desc->input_count - 1);
 }
 
-strl_status strl__ingest_refuse_empty(const strl_build_context *context, strl_reader *const *readers, strl_error *err)
-{
-    char inputs[STRL_INPUTS_NAME_BYTES];
-    sentence found = {.length = 0};
-    uint64_t vertices = 0;
-    for (uint32_t i = 0; i < context->desc->input_count; i++)
-        vertices += strl_reader_vertex_count(readers[i]);
-    add_drops(&found, context->result, 0);
-    if (!found.length) {
-        add_count(&found, vertices, "vertex", "vertices");
-        add(&found, "%sno face", found.length ? " and " : "");
-    }
-    strl__ingest_name_inputs(context->desc, inputs, sizeof inputs);
-    return strl__fail(err, STRL_ERR_FORMAT, "%s: expected a triangle, found %s", inputs, found.text);
-}
-
 strl_status strl__ingest_refuse_collapsed(const strl_build_context *context, const strl_ingest *ingest,
                                           uint64_t collapsed, strl_error *err)
 {
@@ -93,6 +77,30 @@ __attribute__((format(printf, 2, 3))) static void warn(const strl_build_context 
     vsnprintf(text, sizeof text, format, arguments);
     va_end(arguments);
     context->desc->warn(context->desc->context, text);
+}
+
+/* A model of lines alone is a model, and a script that builds a hundred files should not end at it. But of a text or a program
+ * whose name ends in .obj an empty model would be no answer. */
+strl_status strl__ingest_check_empty(const strl_build_context *context, strl_reader *const *readers, strl_error *err)
+{
+    char inputs[STRL_INPUTS_NAME_BYTES];
+    sentence found = {.length = 0};
+    uint64_t vertices = 0;
+    bool certain = true;
+    for (uint32_t i = 0; i < context->desc->input_count; i++) {
+        strl_reader_info info;
+        strl_reader_info_get(readers[i], &info);
+        certain = certain && info.is_certain;
+        vertices += strl_reader_vertex_count(readers[i]);
+    }
+    add_drops(&found, context->result, 0);
+    if (!found.length)
+        add_count(&found, vertices, "vertex", "vertices");
+    strl__ingest_name_inputs(context->desc, inputs, sizeof inputs);
+    if (!found.length && !certain)
+        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected a triangle, found no vertex and no face", inputs);
+    warn(context, "%s: found %s%sno triangle: the model is empty", inputs, found.text, found.length ? " and " : "");
+    return STRL_OK;
 }
 
 static void warn_of_missing(strl_build_context *context, strl_reader *const *readers)
