@@ -101,12 +101,7 @@ static bool obj_recognises(const strl__input *input, uint64_t file_bytes)
 
 static strl_status obj_open(strl_reader *reader, strl_error *err)
 {
-    strl__input *input = &reader->input;
-    strl__input_want(input, 2);
-    if (input->end - input->at >= 2 &&
-        (memcmp(input->at, "\xff\xfe", 2) == 0 || memcmp(input->at, "\xfe\xff", 2) == 0))
-        return strl__fail(err, STRL_ERR_UNSUPPORTED,
-                          "%s, byte 0: expected text in UTF-8, found UTF-16", reader->path);
+    (void)err;
     reader->triangles_hint = reader->opened.bytes / 60 + 1;
     return STRL_OK;
 }
@@ -190,13 +185,26 @@ static strl_status note_missing(strl_reader *reader, const strl_error *why, strl
                   : STRL_OK;
 }
 
+/* Bytes of a name before a comment that the line ends in; the whole where there is none. */
+static size_t before_comment(const char *name, size_t length)
+{
+    for (size_t i = 1; i < length; i++)
+        if (name[i] == '#' && strl__is_blank(name[i - 1])) {
+            while (i > 0 && strl__is_blank(name[i - 1]))
+                i--;
+            return i;
+        }
+    return length;
+}
+
 /* Each word of the line as a name, but one of whole_length bytes, which was tried. */
 static strl_status read_words(strl_reader *reader, size_t whole_length, bool note, bool *found,
                               strl_error *err)
 {
     strl__input *input = &reader->input;
     strl_status status = STRL_OK;
-    for (; !status && !strl__text_at_line_end(input); strl__text_skip_blanks(input)) {
+    for (; !status && !strl__text_at_line_end(input) && *input->at != '#';
+         strl__text_skip_blanks(input)) {
         size_t length = strl__text_token(input);
         strl_error why = {0};
         if (length != whole_length) {
@@ -218,11 +226,16 @@ static strl_status read_libraries(strl_reader *reader, strl_error *err)
     strl__input *input = &reader->input;
     strl__text_skip_blanks(input);
     const uint64_t offset = strl__input_offset(input), line = input->line;
-    const size_t length = strl__text_rest_of_line(input);
+    const size_t whole = strl__text_rest_of_line(input);
+    const size_t length = before_comment(input->at, whole);
     strl_error why = {0};
     if (length == 0)
         return STRL_OK;
-    strl_status status = read_library(reader, input->at, length, &why, err);
+    strl_status status = read_library(reader, input->at, whole, &why, err);
+    if (!status && why.status && length < whole) {
+        why = (strl_error){0};
+        status = read_library(reader, input->at, length, &why, err);
+    }
     if (status || !why.status)
         return status;
     bool found = false;

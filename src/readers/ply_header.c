@@ -172,7 +172,7 @@ static strl_status check_counts(const strl__ply_header *header, const strl__inpu
                               "%s: element '%s' announces %" PRIu64 " records of at least %" PRIu64
                               " bytes, but at most %" PRIu64
                               " bytes are left of the file's %" PRIu64,
-                              strl_file_path(input->file), element->name, element->count, record,
+                              input->name, element->name, element->count, record,
                               left - 1, input->file_bytes);
         left -= needed;
     }
@@ -210,6 +210,9 @@ static strl_status read_statement(strl__ply_header *header, strl__input *input, 
         pass_token(input);
         return read_property(header, input, err);
     }
+    /* Some programs sign their files without the word: before the first element no property can be lost by it. */
+    if (header->element_count == 0 && *has_format)
+        return STRL_OK;
     return strl__text_expected(input, "'element', 'property', 'comment' or 'end_header'", err);
 }
 

@@ -19,6 +19,7 @@ typedef struct strl_reader_drops {
     uint64_t degenerate_faces; /* faces with fewer than three corners */
     uint64_t lines;     /* line elements */
     uint64_t points;    /* point elements; not unused vertices */
+    uint64_t unread_bytes; /* behind what the file announces */
 } strl_reader_drops;
 
 #define STRL_TRIANGLE_HAS_NORMAL 1u

@@ -79,9 +79,35 @@ __attribute__((format(printf, 2, 3))) static void warn(const strl_build_context 
     context->desc->warn(context->desc->context, text);
 }
 
-/* A model of lines alone is a model, and a script that builds a hundred files should not end at it. But of a text or a program
- * whose name ends in .obj an empty model would be no answer. */
-strl_status strl__ingest_check_empty(const strl_build_context *context, strl_reader *const *readers, strl_error *err)
+static void warn_of_missing(strl_build_context *context, strl_reader *const *readers)
+{
+    uint32_t told = 0;
+    for (uint32_t i = 0; i < context->desc->input_count; i++) {
+        uint32_t count = strl_reader_missing_count(readers[i]);
+        context->result->missing_libraries += count;
+        for (uint32_t m = 0; m < count && told < MOST_MISSING_TOLD; m++, told++)
+            warn(context, "%s: %s; the materials that it would define are white", context->desc->inputs[i],
+                 strl_reader_missing(readers[i], m));
+    }
+    if (told < context->result->missing_libraries)
+        warn(context, "%" PRIu64 " more material libraries cannot be read", context->result->missing_libraries - told);
+}
+
+static void warn_of_unread(const strl_build_context *context, strl_reader *const *readers)
+{
+    for (uint32_t i = 0; i < context->desc->input_count; i++) {
+        strl_reader_drops drops;
+        strl_reader_drops_get(readers[i], &drops);
+        if (drops.unread_bytes)
+            warn(context, "%s: %" PRIu64 " byte%s behind the last record that its header announces %s not read: a count in the header may "
+                 "be too small", context->desc->inputs[i], drops.unread_bytes, drops.unread_bytes == 1 ? "" : "s",
+                 drops.unread_bytes == 1 ? "is" : "are");
+    }
+}
+
+/* A model of lines alone is a model, and a script that builds a hundred files should not end at it. But where triangles were read
+ * none of which could be kept something is broken, and of a text whose name ends in .obj an empty model would be no answer. */
+strl_status strl__ingest_check_empty(strl_build_context *context, strl_reader *const *readers, strl_error *err)
 {
     char inputs[STRL_INPUTS_NAME_BYTES];
     sentence found = {.length = 0};
@@ -97,29 +123,19 @@ strl_status strl__ingest_check_empty(const strl_build_context *context, strl_rea
     if (!found.length)
         add_count(&found, vertices, "vertex", "vertices");
     strl__ingest_name_inputs(context->desc, inputs, sizeof inputs);
-    if (!found.length && !certain)
-        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected a triangle, found no vertex and no face", inputs);
+    if (context->result->dropped_nonfinite || (!found.length && !certain))
+        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected a triangle, found %s", inputs,
+                          found.length ? found.text : "no vertex and no face");
+    warn_of_missing(context, readers);
+    warn_of_unread(context, readers);
     warn(context, "%s: found %s%sno triangle: the model is empty", inputs, found.text, found.length ? " and " : "");
     return STRL_OK;
-}
-
-static void warn_of_missing(strl_build_context *context, strl_reader *const *readers)
-{
-    uint32_t told = 0;
-    for (uint32_t i = 0; i < context->desc->input_count; i++) {
-        uint32_t count = strl_reader_missing_count(readers[i]);
-        context->result->missing_libraries += count;
-        for (uint32_t m = 0; m < count && told < MOST_MISSING_TOLD; m++, told++)
-            warn(context, "%s: %s; the materials that it would define are white", context->desc->inputs[i],
-                 strl_reader_missing(readers[i], m));
-    }
-    if (told < context->result->missing_libraries)
-        warn(context, "%" PRIu64 " more material libraries cannot be read", context->result->missing_libraries - told);
 }
 
 void strl__ingest_warn(strl_build_context *context, strl_reader *const *readers, const strl_ingest *ingest)
 {
     warn_of_missing(context, readers);
+    warn_of_unread(context, readers);
     if (!ingest->is_coarse)
         return;
     char inputs[STRL_INPUTS_NAME_BYTES];
