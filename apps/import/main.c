@@ -55,6 +55,7 @@ static const struct aiScene *import(const char *path)
 static void tell_failure(const char *why, import_refusal *refusal)
 {
     const char *advice = "convert it to PLY, OBJ or glTF";
+    why = *why ? why : "it does not say why";
     if (strstr(why, "Unrecognized file schema")) {
         why = "it is STEP, of exact surfaces, and no IFC";
         advice = "let the program that made it export triangles, as glTF, OBJ or STL";
@@ -64,7 +65,9 @@ static void tell_failure(const char *why, import_refusal *refusal)
     } else if (strstr(why, "Binary files are not supported")) {
         advice = "save it as a DXF file of text";
     }
-    snprintf(refusal->sentence, sizeof refusal->sentence, "assimp cannot import it: %.190s: %s", *why ? why : "it does not say why",
+    size_t length = strlen(why);
+    length -= length > 0 && why[length - 1] == '.';
+    snprintf(refusal->sentence, sizeof refusal->sentence, "assimp cannot import it: %.*s: %s", (int)(length < 190 ? length : 190), why,
              advice);
 }
 

@@ -103,17 +103,6 @@ static void close_format(strl_reader *reader)
     reader->state = NULL;
 }
 
-static strl_status open_format(strl_reader *reader, strl_error *err);
-
-/* What the format's own reader has found to be of a version that it does not read. */
-static strl_status give_to_importer(strl_reader *reader, strl_error *err)
-{
-    close_format(reader);
-    reader->is_foreign = false;
-    reader->format = &strl__format_assimp;
-    return open_format(reader, err);
-}
-
 static strl_status open_format(strl_reader *reader, strl_error *err)
 {
     strl_status status = reader->format ? STRL_OK : recognise(reader, err);
@@ -125,8 +114,16 @@ static strl_status open_format(strl_reader *reader, strl_error *err)
     strl__input_seek(&reader->input, 0, 1);
     reader->default_up = reader->format->default_up;
     reader->default_unit = reader->format->default_unit;
-    status = reader->format->open(reader, err);
-    return status && reader->is_foreign ? give_to_importer(reader, err) : status;
+    return reader->format->open(reader, err);
+}
+
+/* What the format's own reader has found to be of a version that it does not read. */
+static strl_status give_to_importer(strl_reader *reader, strl_error *err)
+{
+    close_format(reader);
+    reader->is_foreign = false;
+    reader->format = &strl__format_assimp;
+    return open_format(reader, err);
 }
 
 strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__format *format,
@@ -150,6 +147,8 @@ strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__forma
     strl_status status = open_file(reader, desc, err);
     if (!status)
         status = open_format(reader, err);
+    if (status && reader->is_foreign && !format)
+        status = give_to_importer(reader, err);
     reader->child = (strl_reader_child){0};
     if (!status)
         *out = reader;
