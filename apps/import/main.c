@@ -67,8 +67,8 @@ static void tell_failure(const char *why, import_refusal *refusal)
     }
     size_t length = strlen(why);
     length -= length > 0 && why[length - 1] == '.';
-    snprintf(refusal->sentence, sizeof refusal->sentence, "assimp cannot import it: %.*s: %s", (int)(length < 190 ? length : 190), why,
-             advice);
+    snprintf(refusal->sentence, sizeof refusal->sentence, "assimp cannot import it: %.*s: %s",
+             (int)(length < 190 ? length : 190), why, advice);
 }
 
 static int run(const char *path, int descriptor)

@@ -65,7 +65,7 @@ const char *strl__assimp_extension(const char *path)
 
 bool strl__assimp_recognises(const strl__input *input)
 {
-    static const char *const words[] = {"OFF",  "COFF",        "NOFF",  "STOFF",
+    static const char *const words[] = {"OFF",  "COFF",        "NOFF",    "STOFF",
                                         "FORM", "Kaydara FBX", "BLENDER", "ISO-10303-21;"};
     for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
         size_t length = strlen(words[i]);
@@ -110,8 +110,7 @@ static strl_status fail_not_found(const strl_reader *reader, strl_error *err)
     const char *extension = strl__assimp_extension(reader->path);
     strl_status status = strl__fail(
         err, STRL_ERR_UNSUPPORTED,
-        "%s: %s%s files are read by the program " STRL_IMPORTER
-        ", which is neither in %.100s nor in " STRL_LIBEXEC_DIR
+        "%s: %s%s files are read by the program " STRL_IMPORTER ", which is neither in %.100s nor in " STRL_LIBEXEC_DIR
         ": build Stroll where libassimp-dev is installed, or name the program by "
         "STROLL_IMPORT",
         reader->path, extension ? "." : "such", extension ? extension : "", folder ? folder : "its folder");

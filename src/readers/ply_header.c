@@ -170,10 +170,8 @@ static strl_status check_counts(const strl__ply_header *header, const strl__inpu
         if (__builtin_mul_overflow(element->count, record, &needed) || needed > left)
             return strl__fail(err, STRL_ERR_FORMAT,
                               "%s: element '%s' announces %" PRIu64 " records of at least %" PRIu64
-                              " bytes, but at most %" PRIu64
-                              " bytes are left of the file's %" PRIu64,
-                              input->name, element->name, element->count, record,
-                              left - 1, input->file_bytes);
+                              " bytes, but at most %" PRIu64 " bytes are left of the file's %" PRIu64,
+                              input->name, element->name, element->count, record, left - 1, input->file_bytes);
         left -= needed;
     }
     return STRL_OK;

@@ -36,7 +36,7 @@ static const stranger signs[] = {
     {SIGN("PK\3\4"), "a ZIP archive" UNPACK},
     {SIGN("\x1f\x8b"), "a gzip archive" UNPACK},
     {SIGN("BZh"), "a bzip2 archive" UNPACK},
-    {SIGN("\xfd" "7zXZ"), "an xz archive" UNPACK},
+    {SIGN("\xfd\x37zXZ"), "an xz archive" UNPACK},
     {SIGN("7z\xbc\xaf"), "a 7z archive" UNPACK},
     {SIGN("\x28\xb5\x2f\xfd"), "a zstd archive" UNPACK},
     {SIGN("\x89PNG"), IMAGE},
@@ -58,7 +58,8 @@ const char *strl__stranger_describe(const strl__input *input, const char *path)
         if (strl__has_extension(path, endings[i].sign))
             return endings[i].what;
     for (size_t i = 0; i < sizeof signs / sizeof *signs; i++)
-        if ((size_t)(input->end - input->at) >= signs[i].length && memcmp(input->at, signs[i].sign, signs[i].length) == 0)
+        if ((size_t)(input->end - input->at) >= signs[i].length &&
+            memcmp(input->at, signs[i].sign, signs[i].length) == 0)
             return signs[i].what;
     return NULL;
 }

@@ -18,7 +18,8 @@ static strl_status encode_nothing(strl_arena *arena, strl_writer *payload, strl_
 
 static strl_status add_tree(strl_container_writer *writer, strl_error *err)
 {
-    const strl_tree tree = {.structure = STRL_STRUCTURE_CLUSTERS, .step = 1, .node_count = 1, .level_count = 1, .group_count = 1};
+    const strl_tree tree = {
+        .structure = STRL_STRUCTURE_CLUSTERS, .step = 1, .node_count = 1, .level_count = 1, .group_count = 1};
     const strl_node node = {.parent = STRL_NONE, .first_child = STRL_NONE, .decode_parent = STRL_NONE, .group_size = 1};
     strl_arena arena = {0};
     strl_writer payload = {0};

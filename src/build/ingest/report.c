@@ -99,8 +99,11 @@ static void warn_of_unread(const strl_build_context *context, strl_reader *const
         strl_reader_drops drops;
         strl_reader_drops_get(readers[i], &drops);
         if (drops.unread_bytes)
-            warn(context, "%s: %" PRIu64 " byte%s behind the last record that its header announces %s not read: a count in the header may "
-                 "be too small", context->desc->inputs[i], drops.unread_bytes, drops.unread_bytes == 1 ? "" : "s",
+            warn(context,
+                 "%s: %" PRIu64
+                 " byte%s behind the last record that its header announces %s not read: a count in the header may "
+                 "be too small",
+                 context->desc->inputs[i], drops.unread_bytes, drops.unread_bytes == 1 ? "" : "s",
                  drops.unread_bytes == 1 ? "is" : "are");
     }
 }
