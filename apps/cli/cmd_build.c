@@ -94,10 +94,12 @@ static void print_time(const strl_build_result *r)
 
 static void print_text(const strl_build_result *r, const char *output)
 {
-    printf("%s: %llu triangle%s in %llu node%s on %u level%s, %.1f MB (%.2f bytes a triangle)\n", output,
-           (unsigned long long)r->triangles_leaf, strl_cli_plural(r->triangles_leaf), (unsigned long long)r->nodes,
-           strl_cli_plural(r->nodes), r->levels, strl_cli_plural(r->levels), (double)r->bytes_out / 1e6,
-           (double)r->bytes_out / (double)r->triangles_leaf);
+    printf("%s: %llu triangle%s in %llu node%s on %u level%s, %.1f MB", output, (unsigned long long)r->triangles_leaf,
+           strl_cli_plural(r->triangles_leaf), (unsigned long long)r->nodes, strl_cli_plural(r->nodes), r->levels,
+           strl_cli_plural(r->levels), (double)r->bytes_out / 1e6);
+    if (r->triangles_leaf)
+        printf(" (%.2f bytes a triangle)", (double)r->bytes_out / (double)r->triangles_leaf);
+    putchar('\n');
     if (r->dropped_nonfinite + r->dropped_degenerate + r->dropped_lines + r->dropped_points)
         printf("left out: %llu triangle%s not finite, %llu without area on the lattice, %llu line%s, %llu point%s\n",
                (unsigned long long)r->dropped_nonfinite, strl_cli_plural(r->dropped_nonfinite),

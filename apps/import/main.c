@@ -51,6 +51,26 @@ static const struct aiScene *import(const char *path)
     return aiImportFileExWithProperties(path, 0, NULL, settings);
 }
 
+/* Its own words, and what can be done. */
+static void tell_failure(const char *why, import_refusal *refusal)
+{
+    const char *advice = "convert it to PLY, OBJ or glTF";
+    why = *why ? why : "it does not say why";
+    if (strstr(why, "Unrecognized file schema")) {
+        why = "it is STEP, of exact surfaces, and no IFC";
+        advice = "let the program that made it export triangles, as glTF, OBJ or STL";
+    } else if (strstr(why, "DXF: this file contains no 3d data")) {
+        why = "it finds no line, polyline or face in this DXF file, and reads nothing else of one";
+        advice = "let the program that made it export surfaces";
+    } else if (strstr(why, "Binary files are not supported")) {
+        advice = "save it as a DXF file of text";
+    }
+    size_t length = strlen(why);
+    length -= length > 0 && why[length - 1] == '.';
+    snprintf(refusal->sentence, sizeof refusal->sentence, "assimp cannot import it: %.*s: %s",
+             (int)(length < 190 ? length : 190), why, advice);
+}
+
 static int run(const char *path, int descriptor)
 {
     char extension[STRL_IMPORT_FORMAT_BYTES];
@@ -61,8 +81,7 @@ static int run(const char *path, int descriptor)
     import_output *output = scene ? import_output_create(descriptor) : NULL;
     if (!scene) {
         const char *why = aiGetErrorString();
-        snprintf(refusal.sentence, sizeof refusal.sentence, "assimp cannot import it: %s",
-                 why && *why ? why : "it does not say why");
+        tell_failure(why ? why : "", &refusal);
     } else if (!output) {
         refusal.reason = STRL_IMPORT_MEMORY;
         snprintf(refusal.sentence, sizeof refusal.sentence, "no memory left to write its triangles");

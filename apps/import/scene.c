@@ -313,7 +313,7 @@ static bool write_scene(scene_walk *walk, const char *extension)
     sums sum = {0};
     import_facts facts = {0};
     if (!walk->scene->mRootNode)
-        return refuse(walk, STRL_IMPORT_BROKEN, "expected a tree of nodes, found none");
+        return refuse(walk, STRL_IMPORT_BROKEN, "assimp finds nothing in it: convert it to PLY, OBJ or glTF");
     if (!allocate(walk) || !count_meshes(walk) || !walk_nodes(walk, count_node, &sum))
         return false;
     import_traits_directions(walk->scene, extension, &facts);

@@ -11,7 +11,7 @@
 /* Formats with z up whose importers leave it so; others turn y up, or have it up. */
 static const char *const z_up[] = {"3mf", "amf", "blend", "cob", "enff", "nff", "off", "raw", "smd", "vta"};
 /* Whose importers scale to metres. */
-static const char *const metric[] = {"dae", "ifc", "ifczip", "step", "stp", "zae"};
+static const char *const metric[] = {"dae", "glb", "gltf", "ifc", "ifczip", "step", "stp", "zae"};
 
 /* A number under a key of the scene's; false where there is none. */
 static bool find_number(const struct aiScene *scene, const char *key, double *value)

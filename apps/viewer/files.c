@@ -92,6 +92,9 @@ strl_status strl__viewer_open_model(strl__viewer *v, const char *path, strl_erro
     strl_journal_write(v->journal, "opened",
                        json_pack("{s:s,s:I,s:i}", "file", path, "triangles", (json_int_t)model->triangles, "parts",
                                  (int)info->part_count));
+    if (model->triangles == 0)
+        strl__viewer_say(v, "the model is empty: of its file %llu lines, %llu points and no triangle were found",
+                         (unsigned long long)info->dropped_lines, (unsigned long long)info->dropped_points);
     return STRL_OK;
 }
 

@@ -6,7 +6,9 @@
  *
  * Directions: most of assimp's importers turn what they read to y up. Where the format has z up and
  * the importer leaves it so, the child says z. */
+#include <ctype.h>
 #include <inttypes.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/fail.h"
@@ -25,6 +27,8 @@
 #define COPY_BYTES ((size_t)1 << 16)
 #define STEP_NS 100000000u /* how late a cancel may be seen */
 #define NS_PER_S 1000000000u
+/* More than assimp takes for any whole file, packed ones too. */
+#define MEMORY_OF_A_BYTE 1000u
 /* A child that has said all, or died, ends at once. */
 #define END_SECONDS 10u
 
@@ -59,6 +63,19 @@ const char *strl__assimp_extension(const char *path)
     return NULL;
 }
 
+bool strl__assimp_recognises(const strl__input *input)
+{
+    static const char *const words[] = {"OFF",  "COFF",        "NOFF",    "STOFF",
+                                        "FORM", "Kaydara FBX", "BLENDER", "ISO-10303-21;"};
+    for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
+        size_t length = strlen(words[i]);
+        if ((size_t)(input->end - input->at) > length && memcmp(input->at, words[i], length) == 0 &&
+            !isalpha((unsigned char)input->at[length]))
+            return true;
+    }
+    return false;
+}
+
 /* ---- the program ---- */
 
 /* The importer's path, owned by the caller, NULL without memory. Not found: *found is false, and
@@ -90,13 +107,13 @@ static char *find_importer(const char *named, bool *found)
 static strl_status fail_not_found(const strl_reader *reader, strl_error *err)
 {
     char *folder = strl_program_folder();
+    const char *extension = strl__assimp_extension(reader->path);
     strl_status status = strl__fail(
         err, STRL_ERR_UNSUPPORTED,
-        "%s: .%s files are read by the program " STRL_IMPORTER
-        ", which is neither in %.100s nor in " STRL_LIBEXEC_DIR
+        "%s: %s%s files are read by the program " STRL_IMPORTER ", which is neither in %.100s nor in " STRL_LIBEXEC_DIR
         ": build Stroll where libassimp-dev is installed, or name the program by "
         "STROLL_IMPORT",
-        reader->path, strl__assimp_extension(reader->path), folder ? folder : "its folder");
+        reader->path, extension ? "." : "such", extension ? extension : "", folder ? folder : "its folder");
     strl__free(folder);
     return status;
 }
@@ -154,11 +171,15 @@ static strl_status fail_time(const import_run *run, bool cpu, strl_error *err)
 /* why: in the importer's words, may be empty. */
 static strl_status fail_memory(const import_run *run, const char *why, strl_error *err)
 {
+    const uint64_t bytes = run->reader->opened.bytes;
+    char doubt[80] = "";
+    if (bytes < run->memory_bytes / MEMORY_OF_A_BYTE)
+        snprintf(doubt, sizeof doubt, "; a file of %" PRIu64 " bytes that asks for so much may be broken", bytes);
     return strl__fail(err, STRL_ERR_MEMORY,
                       "%s: importing it by assimp takes more than %" PRIu64
-                      "M of memory, which is what is left for it%s%s: give more by --memory, or "
+                      "M of memory, which is what is left for it%s%s%s: give more by --memory, or "
                       "convert it to PLY, OBJ or glTF",
-                      run->reader->path, run->memory_bytes >> 20, *why ? "; " : "", why);
+                      run->reader->path, run->memory_bytes >> 20, *why ? "; " : "", why, doubt);
 }
 
 static strl_status check_cancel(const import_run *run, strl_error *err)

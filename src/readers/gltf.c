@@ -102,7 +102,8 @@ static strl_status read_container(strl__gltf *gltf, chunk *json, strl_error *err
                           reader->path);
     if (version != 2)
         return strl__fail(err, STRL_ERR_UNSUPPORTED,
-                          "%s: expected a GLB of version 2, found %" PRIu64, reader->path, version);
+                          "%s: expected a GLB of version 2, found %" PRIu64 ": convert it to glTF 2.0", reader->path,
+                          version);
     if (end > reader->opened.bytes || end < sizeof header)
         return strl__fail(err, STRL_ERR_FORMAT,
                           "%s: announces %" PRIu64 " bytes, found a file of %" PRIu64, reader->path,

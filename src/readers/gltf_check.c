@@ -143,6 +143,18 @@ static strl_status check_primitive(strl__gltf *gltf, strl__gltf_mesh *mesh,
     return STRL_OK;
 }
 
+/* "PATH, accessors[3]: .." becomes "PATH, meshes[0], accessors[3]: ..". */
+static strl_status name_mesh(const strl__gltf *gltf, uint32_t index, strl_status status,
+                             strl_error *err)
+{
+    const char *path = gltf->reader->path;
+    const size_t length = strlen(path);
+    if (!err || strncmp(err->message, path, length) != 0)
+        return strl__fail_context(err, status, "%s, meshes[%u]", path, index);
+    strl_error inner = *err;
+    return strl__fail(err, status, "%s, meshes[%u]%s", path, index, inner.message + length);
+}
+
 static strl_status check_mesh(strl__gltf *gltf, uint32_t index, strl_error *err)
 {
     strl__gltf_mesh *mesh = &gltf->meshes[index];
@@ -153,7 +165,7 @@ static strl_status check_mesh(strl__gltf *gltf, uint32_t index, strl_error *err)
         status = check_primitive(gltf, mesh, &gltf->primitives[mesh->first_primitive + i], err);
     mesh->is_checked = true;
     gltf->vertices += mesh->vertices;
-    return status ? strl__fail_context(err, status, "meshes[%u]", index) : STRL_OK;
+    return status ? name_mesh(gltf, index, status, err) : STRL_OK;
 }
 
 static strl_status check_instances(strl__gltf *gltf, strl__gltf_instances *instances,

@@ -18,13 +18,32 @@ void strl__fields_fail(strl__fields *fields, const char *key, const char *expect
                    fields->member, index, *key ? "." : "", key, expected);
 }
 
+/* What was found in place of what was expected. */
+static void fail_kind(strl__fields *fields, const char *key, const char *expected,
+                      const json_t *found)
+{
+    char sentence[120];
+    const char *kind = json_is_object(found)    ? "an object"
+                       : json_is_array(found)   ? "a list"
+                       : json_is_string(found)  ? "a text"
+                       : json_is_real(found)    ? "a number"
+                       : json_is_boolean(found) ? "true or false"
+                                                : "null";
+    if (json_is_integer(found))
+        snprintf(sentence, sizeof sentence, "%s, found %" JSON_INTEGER_FORMAT, expected,
+                 json_integer_value(found));
+    else
+        snprintf(sentence, sizeof sentence, "%s, found %s", expected, kind);
+    strl__fields_fail(fields, key, sentence);
+}
+
 /* The member; fails where the object is none. */
 static const json_t *member_of(strl__fields *fields, const json_t *object, const char *key)
 {
     if (fields->status || !object)
         return NULL;
     if (!json_is_object(object)) {
-        strl__fields_fail(fields, "", "an object");
+        fail_kind(fields, "", "an object", object);
         return NULL;
     }
     return json_object_get(object, key);
@@ -61,7 +80,7 @@ uint64_t strl__fields_count(strl__fields *fields, const json_t *object, const ch
         return absent;
     if (is_count(value, &count))
         return count;
-    strl__fields_fail(fields, key, "a whole number that is not negative");
+    fail_kind(fields, key, "a whole number that is not negative", value);
     return absent;
 }
 
@@ -70,7 +89,7 @@ static uint32_t to_index(strl__fields *fields, const json_t *value, const char *
     uint64_t count;
     if (is_count(value, &count) && count < STRL__NO_ITEM)
         return (uint32_t)count;
-    strl__fields_fail(fields, key, "an index");
+    fail_kind(fields, key, "an index", value);
     return STRL__NO_ITEM;
 }
 
@@ -91,7 +110,7 @@ double strl__fields_number(strl__fields *fields, const json_t *object, const cha
 {
     const json_t *value = member_of(fields, object, key);
     if (value && !json_is_number(value))
-        strl__fields_fail(fields, key, "a number");
+        fail_kind(fields, key, "a number", value);
     return json_is_number(value) ? json_number_value(value) : absent;
 }
 
@@ -99,7 +118,7 @@ bool strl__fields_bool(strl__fields *fields, const json_t *object, const char *k
 {
     const json_t *value = member_of(fields, object, key);
     if (value && !json_is_boolean(value))
-        strl__fields_fail(fields, key, "true or false");
+        fail_kind(fields, key, "true or false", value);
     return json_is_true(value);
 }
 
@@ -123,7 +142,7 @@ const char *strl__fields_text(strl__fields *fields, const json_t *object, const 
 {
     const json_t *value = member_of(fields, object, key);
     if (value && !json_is_string(value))
-        strl__fields_fail(fields, key, "a text");
+        fail_kind(fields, key, "a text", value);
     return json_string_value(value);
 }
 
@@ -131,7 +150,7 @@ const json_t *strl__fields_object(strl__fields *fields, const json_t *object, co
 {
     const json_t *value = member_of(fields, object, key);
     if (value && !json_is_object(value))
-        strl__fields_fail(fields, key, "an object");
+        fail_kind(fields, key, "an object", value);
     return json_is_object(value) ? value : NULL;
 }
 
@@ -139,7 +158,7 @@ const json_t *strl__fields_list(strl__fields *fields, const json_t *object, cons
 {
     const json_t *value = member_of(fields, object, key);
     if (value && !json_is_array(value))
-        strl__fields_fail(fields, key, "a list");
+        fail_kind(fields, key, "a list", value);
     return json_is_array(value) ? value : NULL;
 }
 

@@ -389,6 +389,7 @@ static strl_status parse_asset(strl__gltf *gltf, strl__fields *fields, const jso
     gltf->has_asset = true;
     if (version && strncmp(version, "2.", 2) == 0 && (!least || strcmp(least, "2.0") == 0))
         return STRL_OK;
+    gltf->reader->is_foreign = !gltf->has_binary && version && strncmp(version, "1.", 2) == 0;
     return strl__fail(fields->err, STRL_ERR_UNSUPPORTED,
                       "%s: expected glTF 2.0, found version %.20s", fields->path,
                       least     ? least
@@ -478,6 +479,9 @@ static strl_status take(void *context, const char *member, uint64_t index, const
     const char *path = gltf->reader->path;
     const size_t which = member_index(member);
     strl__fields fields = {.path = path, .member = member, .index = index, .err = err};
+    if (members[which].is_list && index == STRL__JSON_WHOLE && json_is_object(value) &&
+        !gltf->has_asset && !gltf->has_binary)
+        gltf->reader->is_foreign = true; /* as glTF 1 has it */
     if (members[which].is_list != (index != STRL__JSON_WHOLE))
         return members[which].is_list
                    ? strl__fail(err, STRL_ERR_UNSUPPORTED,

@@ -446,6 +446,8 @@ void strl__import_note_facts(strl_reader *reader)
     reader->default_up = state->facts.up;
     reader->default_unit = unit_name(state->facts.unit_metres);
     reader->triangles_hint = state->facts.triangles;
+    reader->hint_is_exact = true;
+    reader->is_certain = true;
 }
 
 uint64_t strl__import_bytes_done(const strl_reader *reader)

@@ -8,7 +8,8 @@
 
 strl_status strl__input_init(strl__input *input, strl_file *file, size_t capacity, strl_error *err)
 {
-    *input = (strl__input){.file = file, .capacity = capacity, .file_bytes = strl_file_bytes(file)};
+    *input = (strl__input){
+        .file = file, .name = strl_file_path(file), .capacity = capacity, .file_bytes = strl_file_bytes(file)};
     return strl__input_wake(input, err);
 }
 
@@ -24,8 +25,8 @@ strl_status strl__input_wake(strl__input *input, strl_error *err)
         return STRL_OK;
     input->buffer = strl__alloc(input->capacity + 1, 1);
     if (!input->buffer)
-        return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a read buffer of %zu bytes",
-                          strl_file_path(input->file), input->capacity);
+        return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a read buffer of %zu bytes", input->name,
+                          input->capacity);
     strl__input_seek(input, 0, 1);
     return STRL_OK;
 }
@@ -75,9 +76,8 @@ void strl__input_refill(strl__input *input, size_t bytes)
             stop_here(input);
         } else if (got == 0) {
             strl__fail(&input->failure, STRL_ERR_FORMAT,
-                       "%s ends at byte %" PRIu64 ", but it had %" PRIu64
-                       " bytes when it was opened",
-                       strl_file_path(input->file), input->end_offset, input->file_bytes);
+                       "%s ends at byte %" PRIu64 ", but it had %" PRIu64 " bytes when it was opened", input->name,
+                       input->end_offset, input->file_bytes);
             stop_here(input);
         }
         kept += got;

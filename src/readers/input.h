@@ -15,7 +15,8 @@
 #define STRL__TOKEN_BYTES 4096u
 
 typedef struct strl__input {
-    strl_file *file; /* borrowed */
+    strl_file *file;  /* borrowed */
+    const char *name; /* for sentences: the file's path, or the one of the file that it was made from; borrowed */
     char *buffer;    /* owned; capacity + 1 bytes */
     size_t capacity;
     const char *at;      /* next byte */

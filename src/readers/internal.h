@@ -44,6 +44,8 @@ extern const strl__format strl__format_assimp;
 bool strl__has_extension(const char *path, const char *extension);
 /* The ending of a name that tells of a format which assimp reads and Stroll does not; NULL = none. */
 const char *strl__assimp_extension(const char *path);
+/* Whether a file begins as one of those formats; asked where the name says nothing. */
+bool strl__assimp_recognises(const strl__input *input);
 
 struct strl_reader {
     const strl__format *format;
@@ -55,10 +57,13 @@ struct strl_reader {
     strl_axis default_up;
     const char *default_unit; /* static; NULL = unknown */
     strl_file *file;       /* owned */
+    strl_file *decoded;    /* its text in UTF-8, where it was in UTF-16: then the input's; owned, may be NULL */
     strl_file_info opened; /* as it was at opening */
     uint64_t all_bytes; /* with the files that this one names, where they count; else 0 */
     uint64_t triangles_hint;
     bool hint_is_exact;
+    bool is_foreign; /* set by an open that fails: it is an older version of the format, which the importer reads */
+    bool is_certain; /* not its name alone says what the file is */
     uint64_t listed_vertices; /* where the table of vertices does not hold them all, or was given back; else 0 */
     strl__input input;
     strl__table vertices, normals;

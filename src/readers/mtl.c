@@ -73,7 +73,7 @@ static strl_status read_materials(strl__input *input, strl__names *materials, st
                                                  strl__text_rest_of_line(input), &current, err);
             if (status)
                 return strl__fail_context(err, status, "%s, line %" PRIu64,
-                                          strl_file_path(input->file), input->line);
+                                          input->name, input->line);
             materials->items[current].rgba = 0xffffffffu;
         } else if (current != UINT32_MAX) {
             read_statement(input, &materials->items[current]);

@@ -22,6 +22,7 @@ typedef struct obj_state {
     bool has_colour;        /* some vertex has one */
     uint64_t vertices_seen; /* of this pass, so far: what negative indices count from */
     uint64_t normals_seen;
+    uint64_t others;        /* lines that no statement read here begins */
     obj_name object, group, material;
     uint32_t part_index, material_index;
     bool part_known, material_known; /* the indices fit the names */
@@ -100,12 +101,7 @@ static bool obj_recognises(const strl__input *input, uint64_t file_bytes)
 
 static strl_status obj_open(strl_reader *reader, strl_error *err)
 {
-    strl__input *input = &reader->input;
-    strl__input_want(input, 2);
-    if (input->end - input->at >= 2 &&
-        (memcmp(input->at, "\xff\xfe", 2) == 0 || memcmp(input->at, "\xfe\xff", 2) == 0))
-        return strl__fail(err, STRL_ERR_UNSUPPORTED,
-                          "%s, byte 0: expected text in UTF-8, found UTF-16", reader->path);
+    (void)err;
     reader->triangles_hint = reader->opened.bytes / 60 + 1;
     return STRL_OK;
 }
@@ -189,13 +185,26 @@ static strl_status note_missing(strl_reader *reader, const strl_error *why, strl
                   : STRL_OK;
 }
 
+/* Bytes of a name before a comment that the line ends in; the whole where there is none. */
+static size_t before_comment(const char *name, size_t length)
+{
+    for (size_t i = 1; i < length; i++)
+        if (name[i] == '#' && strl__is_blank(name[i - 1])) {
+            while (i > 0 && strl__is_blank(name[i - 1]))
+                i--;
+            return i;
+        }
+    return length;
+}
+
 /* Each word of the line as a name, but one of whole_length bytes, which was tried. */
 static strl_status read_words(strl_reader *reader, size_t whole_length, bool note, bool *found,
                               strl_error *err)
 {
     strl__input *input = &reader->input;
     strl_status status = STRL_OK;
-    for (; !status && !strl__text_at_line_end(input); strl__text_skip_blanks(input)) {
+    for (; !status && !strl__text_at_line_end(input) && *input->at != '#';
+         strl__text_skip_blanks(input)) {
         size_t length = strl__text_token(input);
         strl_error why = {0};
         if (length != whole_length) {
@@ -217,11 +226,16 @@ static strl_status read_libraries(strl_reader *reader, strl_error *err)
     strl__input *input = &reader->input;
     strl__text_skip_blanks(input);
     const uint64_t offset = strl__input_offset(input), line = input->line;
-    const size_t length = strl__text_rest_of_line(input);
+    const size_t whole = strl__text_rest_of_line(input);
+    const size_t length = before_comment(input->at, whole);
     strl_error why = {0};
     if (length == 0)
         return STRL_OK;
-    strl_status status = read_library(reader, input->at, length, &why, err);
+    strl_status status = read_library(reader, input->at, whole, &why, err);
+    if (!status && why.status && length < whole) {
+        why = (strl_error){0};
+        status = read_library(reader, input->at, length, &why, err);
+    }
     if (status || !why.status)
         return status;
     bool found = false;
@@ -235,6 +249,7 @@ static strl_status read_libraries(strl_reader *reader, strl_error *err)
 
 static strl_status gather(strl_reader *reader, strl_error *err)
 {
+    obj_state *obj = reader->state;
     strl__input *input = &reader->input;
     strl_status status = STRL_OK;
     for (; !status; strl__text_skip_line(input)) {
@@ -250,6 +265,9 @@ static strl_status gather(strl_reader *reader, strl_error *err)
             break;
         case OBJ_LIBRARY:
             status = read_libraries(reader, err);
+            break;
+        case OBJ_OTHER:
+            obj->others += *input->at != '#' && !strl__text_at_line_end(input);
             break;
         default:
             break;
@@ -288,6 +306,7 @@ static strl_status obj_prepare(strl_reader *reader, strl_error *err)
     strl__names_init(&obj->library, (size_t)(reader->memory_bytes / 32));
     obj->has_library = true;
     obj->has_colour = false;
+    obj->others = 0;
     build_tables(reader);
     strl__input_seek(&reader->input, 0, 1);
     strl__text_skip_byte_order_mark(&reader->input);
@@ -297,6 +316,7 @@ static strl_status obj_prepare(strl_reader *reader, strl_error *err)
     if (!status)
         status = strl__table_finish(&reader->normals, err);
     reader->vertices.layout.has_colour = obj->has_colour;
+    reader->is_certain = reader->is_certain || obj->others == 0;
     return status ? status : strl__reader_init_batch(reader, true, err);
 }
 

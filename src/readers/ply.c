@@ -302,26 +302,17 @@ static strl_status pass_element(strl_reader *reader, const strl__ply_element *el
     return status;
 }
 
-/* Padding may follow the last record. Anything else means that a count was too small: faces would
- * be lost unseen. */
-static strl_status check_end(strl_reader *reader, strl_error *err)
+/* Padding may follow the last record. What else follows is not read, as other programs do it, but told: a count of the header
+ * may be too small. */
+static strl_status pass_rest(strl_reader *reader, strl_error *err)
 {
-    strl__ply_state *ply = reader->state;
     strl__input *input = &reader->input;
     strl__ply_begin_record(reader);
     do
         strl__text_skip_space(input);
     while (input->at < input->end && *input->at == 0 && strl__input_skip(input, 1));
-    strl_status failed = strl__input_status(input, err);
-    if (failed || input->at == input->end)
-        return failed;
-    if (ply->header.ascii)
-        return strl__text_expected(
-            input, "the end of the file after the last record that the header announces", err);
-    return strl__fail(err, STRL_ERR_FORMAT,
-                      "%s, byte %" PRIu64 ": expected the end of the file after the last record "
-                      "that the header announces, found %" PRIu64 " more bytes",
-                      reader->path, strl__input_offset(input), strl__input_left(input));
+    reader->drops.unread_bytes = strl__input_left(input);
+    return strl__input_status(input, err);
 }
 
 static strl_status ply_fill(strl_reader *reader, strl_error *err)
@@ -352,7 +343,7 @@ static strl_status ply_fill(strl_reader *reader, strl_error *err)
     if (ply->element < ply->header.element_count)
         return STRL_OK;
     reader->ended = true;
-    return check_end(reader, err);
+    return pass_rest(reader, err);
 }
 
 const strl__format strl__format_ply = {

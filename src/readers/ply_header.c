@@ -170,10 +170,8 @@ static strl_status check_counts(const strl__ply_header *header, const strl__inpu
         if (__builtin_mul_overflow(element->count, record, &needed) || needed > left)
             return strl__fail(err, STRL_ERR_FORMAT,
                               "%s: element '%s' announces %" PRIu64 " records of at least %" PRIu64
-                              " bytes, but at most %" PRIu64
-                              " bytes are left of the file's %" PRIu64,
-                              strl_file_path(input->file), element->name, element->count, record,
-                              left - 1, input->file_bytes);
+                              " bytes, but at most %" PRIu64 " bytes are left of the file's %" PRIu64,
+                              input->name, element->name, element->count, record, left - 1, input->file_bytes);
         left -= needed;
     }
     return STRL_OK;
@@ -210,6 +208,9 @@ static strl_status read_statement(strl__ply_header *header, strl__input *input, 
         pass_token(input);
         return read_property(header, input, err);
     }
+    /* Some programs sign their files without the word: before the first element no property can be lost by it. */
+    if (header->element_count == 0 && *has_format)
+        return STRL_OK;
     return strl__text_expected(input, "'element', 'property', 'comment' or 'end_header'", err);
 }
 

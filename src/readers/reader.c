@@ -9,7 +9,9 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "readers/internal.h"
+#include "readers/stranger.h"
 #include "readers/text.h"
+#include "readers/utf16.h"
 
 #define MEMORY_DEFAULT ((uint64_t)256 << 20)
 #define INPUT_BYTES_MAX ((uint64_t)1 << 20)
@@ -54,13 +56,18 @@ static strl_status recognise(strl_reader *reader, strl_error *err)
         if (!(foreign && formats[i]->weak) &&
             formats[i]->recognises(&reader->input, reader->opened.bytes))
             reader->format = formats[i];
+    reader->is_certain = reader->format != NULL;
     for (size_t i = 0; i < sizeof formats / sizeof *formats && !reader->format; i++)
         if (strl__has_extension(reader->path, formats[i]->name))
             reader->format = formats[i];
-    if (!reader->format && foreign)
+    if (!reader->format && (foreign || strl__assimp_recognises(&reader->input)))
         reader->format = &strl__format_assimp;
     if (reader->format)
         return STRL_OK;
+    const char *stranger = strl__stranger_describe(&reader->input, reader->path);
+    if (stranger)
+        return strl__fail(err, STRL_ERR_UNSUPPORTED, "%s: expected a mesh, found %s", reader->path,
+                          stranger);
     char found[32];
     show_start(&reader->input, found, sizeof found);
     return strl__fail(err, STRL_ERR_UNSUPPORTED,
@@ -83,7 +90,17 @@ static strl_status open_file(strl_reader *reader, const strl_reader_desc *desc, 
         status = strl__input_init(
             &reader->input, reader->file,
             (size_t)(input_bytes < INPUT_BYTES_MAX ? input_bytes : INPUT_BYTES_MAX), err);
+    if (!status)
+        status = strl__utf16_decode(reader, &reader->decoded, err);
     return status;
+}
+
+static void close_format(strl_reader *reader)
+{
+    if (reader->format && reader->format->close && reader->state)
+        reader->format->close(reader);
+    strl__free(reader->state);
+    reader->state = NULL;
 }
 
 static strl_status open_format(strl_reader *reader, strl_error *err)
@@ -98,6 +115,15 @@ static strl_status open_format(strl_reader *reader, strl_error *err)
     reader->default_up = reader->format->default_up;
     reader->default_unit = reader->format->default_unit;
     return reader->format->open(reader, err);
+}
+
+/* What the format's own reader has found to be of a version that it does not read. */
+static strl_status give_to_importer(strl_reader *reader, strl_error *err)
+{
+    close_format(reader);
+    reader->is_foreign = false;
+    reader->format = &strl__format_assimp;
+    return open_format(reader, err);
 }
 
 strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__format *format,
@@ -121,6 +147,8 @@ strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__forma
     strl_status status = open_file(reader, desc, err);
     if (!status)
         status = open_format(reader, err);
+    if (status && reader->is_foreign && !format)
+        status = give_to_importer(reader, err);
     reader->child = (strl_reader_child){0};
     if (!status)
         *out = reader;
@@ -138,8 +166,7 @@ void strl_reader_close(strl_reader *reader)
 {
     if (!reader)
         return;
-    if (reader->format && reader->format->close && reader->state)
-        reader->format->close(reader);
+    close_format(reader);
     strl__table_deinit(&reader->vertices);
     strl__table_deinit(&reader->normals);
     strl__batch_deinit(&reader->batch);
@@ -147,8 +174,8 @@ void strl_reader_close(strl_reader *reader)
     strl__names_deinit(&reader->parts);
     strl__names_deinit(&reader->materials);
     strl__names_deinit(&reader->missing);
-    strl_file_close(reader->file, NULL); /* only read from */
-    strl__free(reader->state);
+    strl_file_close(reader->decoded, NULL); /* without a name: nothing of it is left */
+    strl_file_close(reader->file, NULL);    /* only read from */
     strl__free(reader->scratch_dir);
     strl__free(reader->path);
     strl__free(reader);
@@ -162,6 +189,7 @@ void strl_reader_info_get(const strl_reader *reader, strl_reader_info *info)
         .default_unit = reader->default_unit,
         .triangles_hint = reader->triangles_hint,
         .hint_is_exact = reader->hint_is_exact,
+        .is_certain = reader->is_certain,
         .file_bytes = reader->all_bytes ? reader->all_bytes : reader->opened.bytes,
     };
 }

@@ -19,6 +19,7 @@ typedef struct strl_reader_drops {
     uint64_t degenerate_faces; /* faces with fewer than three corners */
     uint64_t lines;     /* line elements */
     uint64_t points;    /* point elements; not unused vertices */
+    uint64_t unread_bytes; /* behind what the file announces */
 } strl_reader_drops;
 
 #define STRL_TRIANGLE_HAS_NORMAL 1u
@@ -61,6 +62,7 @@ typedef struct strl_reader_info {
     uint64_t triangles_hint;  /* a guess for progress bars (faces announced, or from the file's size); 0 = unknown */
     bool hint_is_exact;       /* no more triangles than that will be read (glTF: all placements, checked); it may be
                                  far more than the file has bytes */
+    bool is_certain;          /* more than its name says that the file is of this format; after the first call of next */
     uint64_t file_bytes;      /* with the files that hold what this one names (glTF's buffers) */
 } strl_reader_info;
 

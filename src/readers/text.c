@@ -139,5 +139,5 @@ strl_status strl__text_expected(const strl__input *input, const char *what, strl
         snprintf(found, sizeof found, "the end of the line");
     }
     return strl__fail(err, STRL_ERR_FORMAT, "%s, line %" PRIu64 ": expected %s, found %s",
-                      strl_file_path(input->file), input->line, what, found);
+                      input->name, input->line, what, found);
 }

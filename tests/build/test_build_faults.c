@@ -130,7 +130,7 @@ static void what_cannot_be_built_is_refused(void **state)
         {"absent.ply", "new.stroll", STRL_ERR_IO, "absent.ply"},
         {"empty.ply", "new.stroll", STRL_ERR_FORMAT, "empty.ply"},
         {"text.ply", "new.stroll", STRL_ERR_FORMAT, "text.ply"},
-        {"points.obj", "new.stroll", STRL_ERR_FORMAT, "points.obj"},
+        {"words.obj", "new.stroll", STRL_ERR_FORMAT, "words.obj"},
         {"line.obj", "new.stroll", STRL_ERR_FORMAT, "line.obj"},
         {"in.ply", "in.ply", STRL_ERR_ARGUMENT, "in.ply"},
         {"in.ply", "", STRL_ERR_ARGUMENT, "folder"},
@@ -140,7 +140,7 @@ static void what_cannot_be_built_is_refused(void **state)
     make_input();
     built_write_text("empty.ply", "");
     built_write_text("text.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nend_header\n1 2 x\n");
-    built_write_text("points.obj", "v 0 0 0\nv 1 1 1\np 1 2\n");
+    built_write_text("words.obj", "Once upon a time\n");
     built_write_text("line.obj", "v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 1 1\nf 2 2 3\n");
     unsigned files = built_files_left();
     for (size_t i = 0; i < sizeof refusals / sizeof *refusals; i++) {

@@ -43,22 +43,51 @@ def refused(folder, source, *parts, more=()):
     assert sorted(os.listdir(folder)) == before
 
 
-def refusals_name_what_was_found_by_kind(folder):
+def empty(folder, sources, *parts):
+    """Built, with one warning; the container is whole and can be drawn."""
+    out = os.path.join(folder, "empty.stroll")
+    done = must("build", *sources, "-o", out, "--json")
+    result = json.loads(done.output)
+    assert result["triangles_leaf"] == result["root_triangles"] == result["vertices"] == 0, result
+    assert done.error.count("\n") == 1 and "no triangle: the model is empty" in done.error, done
+    for part in (os.path.basename(sources[0]), *parts):
+        assert part in done.error, (part, done)
+    must("verify", out)
+    info = json.loads(must("info", out, "--json").output)
+    assert info["dropped"]["lines"] == result["dropped"]["lines"], (info, result)
+    frames = os.path.join(folder, "frames.jsonl")
+    must("render", out, "--backend", "null", "--path", "orbit", "--frames", "2", "--stats", frames)
+    assert all(json.loads(line)["triangles"] == 0 for line in open(frames)), open(frames).read()
+    os.remove(out)
+    return result
+
+
+def a_model_without_a_triangle_is_empty_and_told(folder):
     three = ["1 2 3", "2 2 3", "1 3 3"]
-    refused(folder, write_ply(folder, "points.ply", three, []), "found 3 vertices and no face")
-    refused(folder, write_ply(folder, "none.ply", [], []), "found no face")
-    refused(folder, write_ply(folder, "two.ply", three, ["2 0 1", "1 0"]), "found 2 faces of fewer than three corners")
+    points = write_ply(folder, "points.ply", three, [])
+    empty(folder, [points], "found 3 vertices and")
+    empty(folder, [write_ply(folder, "none.ply", [], [])], "found no triangle")
+    empty(folder, [write_ply(folder, "two.ply", three, ["2 0 1", "1 0"])], "found 2 faces of fewer than three corners and")
+    result = empty(folder, [write(folder, "kinds.obj", "v 0 0 0\nv 1 0 0\nl 1 2\nl 2 3\np 1\nf 1 2\n")],
+                   "found 1 face of fewer than three corners, 2 lines, 1 point and")
+    assert result["dropped"]["lines"] == 2 and result["dropped"]["points"] == 1, result
+    empty(folder, [write(folder, "empty.stl", "solid a\nendsolid a\n")])
+    empty(folder, [write(folder, "comment.obj", "# of a program\n")])
+    empty(folder, [write(folder, "lines.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n"), os.path.join(folder, "kinds.obj")], "lines.obj and 1 more: ")
+    done = must("build", points, "-o", os.path.join(folder, "quiet.stroll"), "--quiet")
+    assert done.error == "", done
+
+
+def what_lost_all_its_triangles_or_is_a_model_by_name_alone_is_refused(folder):
+    three = ["1 2 3", "2 2 3", "1 3 3"]
     refused(folder, write_ply(folder, "nan.ply", ["nan 0 0", *three], ["3 0 1 2"]),
             "found 1 triangle with a corner that is not finite")
     kinds = write(folder, "kinds.obj", "v 0 0 0\nv 1 0 0\nv 0 1 inf\nl 1 2\nl 2 3\np 1\nf 1 2 3\nf 1 2\n")
     refused(folder, kinds, "1 face of fewer than three corners, 1 triangle with a corner that is not finite, "
                            "2 lines, 1 point")
-    refused(folder, write(folder, "empty.stl", "solid a\nendsolid a\n"), "found no face")
+    refused(folder, write(folder, "page.obj", "<html>\n<body>\n"), "found no vertex and no face")
     thin = write(folder, "thin.obj", "v 0 0 0\nv 1 0 0\nf 1 2 1\nf 1 2 2\nl 1 2\nf 1 2\n")
     refused(folder, thin, "2 lose their area on the lattice", "also found 1 face of fewer than three corners, 1 line")
-    names = os.path.join(folder, "points.ply"), os.path.join(folder, "none.ply")
-    assert_refused(run("build", *names, "-o", os.path.join(folder, "new.stroll")), "points.ply and 1 more: ",
-                   "found 3 vertices and no face")
 
 
 def extents_that_no_lattice_holds_are_refused_with_a_reason(folder):
@@ -141,7 +170,7 @@ def many_missing_libraries_do_not_flood_the_screen(folder):
 
 
 def of_a_refused_model_only_the_refusal_is_told(folder):
-    refused(folder, write(folder, "points.obj", "mtllib nothere.mtl\nv 0 0 0\np 1\n"), "found 1 point")
+    refused(folder, write(folder, "nan.obj", "mtllib nothere.mtl\nv nan 0 0\nf 1 1 1\n"), "found 1 triangle")
 
 
 def formats_have_their_own_up(folder):
@@ -155,7 +184,8 @@ def formats_have_their_own_up(folder):
         assert json.loads(must("info", out, "--json").output)["up"] == "x"
 
 
-run_tests(refusals_name_what_was_found_by_kind, extents_that_no_lattice_holds_are_refused_with_a_reason,
+run_tests(a_model_without_a_triangle_is_empty_and_told,
+          what_lost_all_its_triangles_or_is_a_model_by_name_alone_is_refused, extents_that_no_lattice_holds_are_refused_with_a_reason,
           a_step_that_was_asked_for_is_kept_or_refused, a_step_coarser_than_short_edges_allow_is_told_and_counted,
           edges_too_short_for_a_float_still_choose_the_step,
           missing_material_libraries_are_told_once_each_and_counted, many_missing_libraries_do_not_flood_the_screen,

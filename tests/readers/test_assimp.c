@@ -425,6 +425,92 @@ static void other_formats_arrive(void **state)
     assert_nothing_left();
 }
 
+/* One triangle from 1 2 3, which the formats take for a point of a model with z up or y up, in some unit; the last is glTF 1. */
+static void directions_are_those_of_what_arrives(void **state)
+{
+    (void)state;
+    static const struct {
+        const char *name, *text;
+        strl_axis up;
+        const char *unit;
+        double first[3];
+    } files[] = {
+        {"up.off",
+         "OFF\n3 1 0\n1 2 3\n2 2 3\n1 4 8\n3 0 1 2\n",
+         STRL_AXIS_Z, NULL, {1, 2, 3}},
+        {"up.raw",
+         "1 2 3 2 2 3 1 4 8\n",
+         STRL_AXIS_Z, NULL, {1, 2, 3}},
+        {"up.nff",
+         "p 3\n1 2 3\n2 2 3\n1 4 8\n",
+         STRL_AXIS_Z, NULL, {1, 4, 8}} /* from behind */,
+        {"up.smd",
+         "version 1\nnodes\n0 \"a\" -1\nend\nskeleton\ntime 0\n0 0 0 0 0 0 0\nend\ntriangles\nm\n0 1 2 3 0 0 1"
+         " 0 0\n0 2 2 3 0 0 1 0 0\n0 1 4 8 0 0 1 0 0\nend\n",
+         STRL_AXIS_Z, NULL, {1, 2, 3}},
+        {"up.amf",
+         "<?xml version=\"1.0\"?><amf unit=\"inch\"><object id=\"1\"><mesh><vertices><vertex><coordinates><x>1"
+         "</x><y>2</y><z>3</z></coordinates></vertex><vertex><coordinates><x>2</x><y>2</y><z>3</z></coordinate"
+         "s></vertex><vertex><coordinates><x>1</x><y>4</y><z>8</z></coordinates></vertex></vertices><volume><t"
+         "riangle><v1>0</v1><v2>1</v2><v3>2</v3></triangle></volume></mesh></object></amf>",
+         STRL_AXIS_Z, NULL, {1, 2, 3}},
+        {"up.ac",
+         "AC3Db\nMATERIAL \"m\" rgb 1 1 1 amb 0 0 0 emis 0 0 0 spec 0 0 0 shi 0 trans 0\nOBJECT world\nkids 1"
+         "\nOBJECT poly\nname \"a\"\nnumvert 3\n1 2 3\n2 2 3\n1 4 8\nnumsurf 1\nSURF 0x20\nmat 0\nrefs 3\n0 0 "
+         "0\n1 0 0\n2 0 0\nkids 0\n",
+         STRL_AXIS_Y, NULL, {1, 2, 3}},
+        {"up.dxf",
+         "0\nSECTION\n2\nENTITIES\n0\n3DFACE\n8\n0\n 10\n1\n 20\n2\n 30\n3\n 11\n2\n 21\n2\n 31\n3\n 12\n1\n 2"
+         "2\n4\n 32\n8\n 13\n1\n 23\n4\n 33\n8\n0\nENDSEC\n0\nEOF\n",
+         STRL_AXIS_Y, NULL, {1, 3, -2}},
+        {"up.dae",
+         "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4"
+         ".1\"><asset><unit name=\"inch\" meter=\"0.0254\"/><up_axis>Z_UP</up_axis></asset><library_geometries"
+         "><geometry id=\"g\"><mesh><source id=\"p\"><float_array id=\"pa\" count=\"9\">1 2 3 2 2 3 1 4 8</flo"
+         "at_array><technique_common><accessor source=\"#pa\" count=\"3\" stride=\"3\"><param name=\"X\" type="
+         "\"float\"/><param name=\"Y\" type=\"float\"/><param name=\"Z\" type=\"float\"/></accessor></techniqu"
+         "e_common></source><vertices id=\"v\"><input semantic=\"POSITION\" source=\"#p\"/></vertices><triangl"
+         "es count=\"1\"><input semantic=\"VERTEX\" source=\"#v\" offset=\"0\"/><p>0 1 2</p></triangles></mesh"
+         "></geometry></library_geometries><library_visual_scenes><visual_scene id=\"s\"><node id=\"a\"><insta"
+         "nce_geometry url=\"#g\"/></node></visual_scene></library_visual_scenes><scene><instance_visual_scene"
+         " url=\"#s\"/></scene></COLLADA>",
+         STRL_AXIS_Y, "m", {0.0254, 3 * 0.0254, -2 * 0.0254}},
+        {"up.gltf",
+         "{\"asset\":{\"version\":\"1.0\"},\"scene\":\"s\",\"scenes\":{\"s\":{\"nodes\":[\"n\"]}},\"nodes\":{"
+         "\"n\":{\"meshes\":[\"m\"]}},\"meshes\":{\"m\":{\"primitives\":[{\"attributes\":{\"POSITION\":\"a\"},"
+         "\"indices\":\"i\",\"mode\":4}]}},\"accessors\":{\"a\":{\"bufferView\":\"v\",\"byteOffset\":0,\"byteS"
+         "tride\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},\"i\":{\"bufferView\":\"w\",\"byteOf"
+         "fset\":0,\"byteStride\":0,\"componentType\":5123,\"count\":3,\"type\":\"SCALAR\"}},\"bufferViews\":{"
+         "\"v\":{\"buffer\":\"b\",\"byteOffset\":0,\"byteLength\":36,\"target\":34962},\"w\":{\"buffer\":\"b\""
+         ",\"byteOffset\":36,\"byteLength\":6,\"target\":34963}},\"buffers\":{\"b\":{\"byteLength\":42,\"type"
+         "\":\"arraybuffer\",\"uri\":\"data:application/octet-stream;base64,AACAPwAAAEAAAEBAAAAAQAAAAEAAAEBAAA"
+         "CAPwAAgEAAAABBAAABAAIA\"}}}",
+         STRL_AXIS_Y, "m", {1, 2, 3}},
+    };
+    if (!find_real_importer())
+        skip();
+    for (size_t i = 0; i < sizeof files / sizeof *files; i++) {
+        strl_reader *reader;
+        strl_reader_info info;
+        read_result result;
+        write_test_text(files[i].name, files[i].text);
+        read_foreign(files[i].name, &result, &reader);
+        strl_reader_info_get(reader, &info);
+        bool same = info.default_unit && files[i].unit ? strcmp(info.default_unit, files[i].unit) == 0
+                                                       : info.default_unit == files[i].unit;
+        if (!same || info.default_up != files[i].up || result.count == 0)
+            fail_msg("%s: unit %s, up %d", files[i].name, info.default_unit, (int)info.default_up);
+        assert_string_equal(info.format, "assimp");
+        assert_true(info.hint_is_exact && info.triangles_hint == result.count);
+        for (int k = 0; k < 3; k++)
+            if (fabs(result.triangles[0].position[0][k] - files[i].first[k]) > 1e-7)
+                fail_msg("%s: %g on axis %d", files[i].name, result.triangles[0].position[0][k], k);
+        strl_reader_close(reader);
+        free_result(&result);
+    }
+    assert_nothing_left();
+}
+
 static void broken_files_are_refused_in_assimps_words(void **state)
 {
     (void)state;
@@ -496,6 +582,7 @@ int main(void)
         cmocka_unit_test(collada_arrives),
         cmocka_unit_test(fbx_arrives_with_its_axis_and_unit),
         cmocka_unit_test(other_formats_arrive),
+        cmocka_unit_test(directions_are_those_of_what_arrives),
         cmocka_unit_test(broken_files_are_refused_in_assimps_words),
         cmocka_unit_test(too_little_memory_is_told),
     };

@@ -194,7 +194,7 @@ def extensions_that_must_be_understood_are_refused_by_name(folder):
     w.save(f"{folder}/old.gltf", b'{"asset": {}, "accessors": {"a": {}}}')
     refuse(f"{folder}/old.gltf", "version unknown")
     w.save(f"{folder}/older.gltf", b'{"accessors": {"a": {}}, "asset": {"version": "1.0"}}')
-    refuse(f"{folder}/older.gltf", "as in glTF 1")
+    refuse(f"{folder}/older.gltf", "assimp")
 
 
 def bad_json_is_refused_with_its_place(folder):

@@ -263,7 +263,65 @@ static void bad_files_are_refused_with_a_line(void **state)
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
         assert_text_refused("bad.obj", cases[i][0], cases[i][1]);
     write_test_file("wide.obj", "\xff\xfev\0 \0", 6);
-    assert_refused("wide.obj", "found UTF-16");
+    assert_refused("wide.obj", "line 1: expected a number, found the end of the file");
+}
+
+/* The text in UTF-16; letters beyond ASCII as \1 (two bytes of UTF-8), \2 (three), \3 (four), \4 (half a pair). */
+static void write_wide(const char *name, const char *text, bool big_endian)
+{
+    static const unsigned letters[5][2] = {{0}, {0xe9}, {0x20ac}, {0xd83d, 0xde00}, {0xde00}};
+    FILE *file = fopen(test_path(name), "wb");
+    assert_non_null(file);
+    fputs(big_endian ? "\xfe\xff" : "\xff\xfe", file);
+    for (; *text; text++)
+        for (unsigned k = 0; k < (*text == 3 ? 2 : 1); k++) {
+            unsigned unit = *text < 5 ? letters[(int)*text][k] : (unsigned)*text;
+            fputc((int)(big_endian ? unit >> 8 : unit & 255), file);
+            fputc((int)(big_endian ? unit & 255 : unit >> 8), file);
+        }
+    assert_int_equal(fclose(file), 0);
+}
+
+static void text_in_utf_16_is_read(void **state)
+{
+    (void)state;
+    for (unsigned i = 0; i < 2; i++) {
+        strl_reader *reader;
+        strl_error err = {0};
+        read_result result;
+        write_wide("wide.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\no \1\2\3\4!\nf 1 2 3\n", i == 1);
+        assert_int_equal(open_test_file("wide.obj", 0, &reader, &err), STRL_OK);
+        for (unsigned pass = 0; pass < 2; pass++) {
+            read_pass(reader, &result);
+            assert_int_equal(result.status, STRL_OK);
+            assert_int_equal(result.count, 1);
+            assert_float_equal(result.triangles[0].position[1][0], 1, 0);
+            free_result(&result);
+            assert_int_equal(strl_reader_rewind(reader, &err), STRL_OK);
+        }
+        assert_string_equal(strl_reader_part_name(reader, 0), "\xc3\xa9\xe2\x82\xac\xf0\x9f\x98\x80\xef\xbf\xbd!");
+        strl_reader_close(reader);
+        write_wide("wide.obj", "v 0 0 0\nv 1 0 zero\n", i == 1);
+        assert_refused("wide.obj", "wide.obj, line 2: expected a number, found 'zero'");
+    }
+}
+
+static void a_comment_is_no_library(void **state)
+{
+    (void)state;
+    strl_reader *reader;
+    strl_error err = {0};
+    read_result result;
+    uint32_t rgba;
+    write_test_text("a b.mtl", "newmtl red\nKd 1 0 0\n");
+    write_test_text("noted.obj", "mtllib a b.mtl # of the model\nusemtl red\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    assert_int_equal(open_test_file("noted.obj", 0, &reader, &err), STRL_OK);
+    read_pass(reader, &result);
+    free_result(&result);
+    assert_int_equal(strl_reader_missing_count(reader), 0);
+    assert_string_equal(strl_reader_material(reader, 0, &rgba), "red");
+    assert_int_equal(rgba, 0xff0000ffu);
+    strl_reader_close(reader);
 }
 
 /* Tokens and lines across the borders of the read buffer, and a polygon near the limit. */
@@ -383,6 +441,8 @@ int main(void)
         cmocka_unit_test(colours_of_vertices_are_read_and_weights_are_not),
         cmocka_unit_test(what_cannot_be_a_triangle_is_counted),
         cmocka_unit_test(bad_files_are_refused_with_a_line),
+        cmocka_unit_test(text_in_utf_16_is_read),
+        cmocka_unit_test(a_comment_is_no_library),
         cmocka_unit_test(long_lines_are_read_and_longer_polygons_refused),
         cmocka_unit_test(a_tiny_budget_gives_the_same_triangles),
         cmocka_unit_test(every_beginning_of_a_file_is_refused_or_read),

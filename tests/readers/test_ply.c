@@ -230,6 +230,27 @@ static void real_colours_and_colours_of_faces_are_read(void **state)
     free_result(&result);
 }
 
+static void a_signature_in_the_header_and_bytes_behind_the_last_record_are_passed_over(void **state)
+{
+    (void)state;
+    read_result result;
+    write_test_text("signed.ply", "ply\nformat ascii 1.0\nCreated by a program\nelement vertex 3\n" TRIANGLE
+                                  "element face 1\n" FACE "0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 2\n");
+    read_test_file("signed.ply", 0, &result);
+    assert_int_equal(result.status, STRL_OK);
+    assert_int_equal(result.count, 1);
+    assert_int_equal(result.drops.unread_bytes, strlen("3 0 1 2\n"));
+    free_result(&result);
+    ply_writer ply = {.encoding = LITTLE};
+    write_odd_square(&ply, true);
+    put_text(&ply, "more");
+    save(&ply, "more.ply");
+    read_test_file("more.ply", 0, &result);
+    assert_int_equal(result.status, STRL_OK);
+    assert_int_equal(result.drops.unread_bytes, 4);
+    free_result(&result);
+}
+
 static void what_cannot_be_a_triangle_is_counted(void **state)
 {
     (void)state;
@@ -346,7 +367,8 @@ static void bad_files_are_refused_with_a_place(void **state)
          "expected an integer type"},
         {"ply\nformat ascii 1.0\nelement vertex 0\nelement vertex 0\n",
          "one element 'vertex' only"},
-        {"ply\nformat ascii 1.0\nsurprise\n", "line 3: expected 'element'"},
+        {"ply\nsurprise\nformat ascii 1.0\n", "line 2: expected 'element'"},
+        {"ply\nformat ascii 1.0\nelement vertex 0\nsurprise\n", "line 4: expected 'element'"},
         {"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n",
          "expected properties x, y and z"},
         {"ply\nformat ascii 1.0\nelement face 1\nproperty int a\nend_header\n1\n",
@@ -371,9 +393,6 @@ static void bad_files_are_refused_with_a_place(void **state)
         {"ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE "element face 1\n" FACE
          "0 0 0\n0 0 0\n0 0 0\n200 0 1 2\n",
          "expected the length of a list below"},
-        {"ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE "element face 1\n" FACE
-         "0 0 0\n0 0 0\n0 0 0\n3 0 1 2\n3 0 1 2\n",
-         "line 14: expected the end of the file"},
         {"ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE "element face 2\n" FACE
          "0 0 0\n0 0 0\n0 0 0\n3 0 1 2\n\n\n\n\n",
          "line 18: expected the length of a list, found the end of the file"},
@@ -562,7 +581,9 @@ static void facts_are_known_at_opening(void **state)
     assert_refused("what.txt", "expected a PLY, STL, OBJ or glTF file by its first bytes or its name's ending, "
                                "or a name's ending that assimp knows, found one that begins with 'once upon a time?'");
     write_test_file("what.bin", "RIFF\2\0\0\0", 8);
-    assert_refused("what.bin", "found one that begins with 'RIFF");
+    assert_refused("what.bin", "expected a mesh, found raw data: name the model that it belongs to");
+    write_test_file("what.obj.gz", "\x1f\x8b\x08", 3);
+    assert_refused("what.obj.gz", "found a gzip archive: unpack it and name the model in it");
     write_test_text("empty.ply", "");
     assert_refused("empty.ply", "found an empty file");
 }
@@ -574,6 +595,7 @@ int main(void)
         cmocka_unit_test(every_beginning_of_a_file_is_refused_or_read),
         cmocka_unit_test(strips_become_triangles_of_one_orientation),
         cmocka_unit_test(real_colours_and_colours_of_faces_are_read),
+        cmocka_unit_test(a_signature_in_the_header_and_bytes_behind_the_last_record_are_passed_over),
         cmocka_unit_test(what_cannot_be_a_triangle_is_counted),
         cmocka_unit_test(other_line_ends_and_words_too_many_are_accepted),
         cmocka_unit_test(comments_between_records_are_passed_over),

@@ -105,14 +105,11 @@ static bool shows_colour(const strl_ingest *ingest)
     return coloured;
 }
 
-static strl_status write_container(const strl_hierarchy *hierarchy, strl_error *err)
+static strl_container_writer_desc describe_container(const strl_build_context *context, const strl_ingest *ingest)
 {
-    const strl_build_context *context = hierarchy->context;
-    const strl_ingest *ingest = hierarchy->ingest;
-    strl_build_result *result = context->result;
+    const strl_build_result *result = context->result;
     strl_container_writer_desc desc = {.path = context->desc->output, .scratch_dir = context->scratch_dir,
                                        .part_dir = context->part_dir};
-    strl_container_writer *writer = NULL;
     memcpy(desc.info.unit, ingest->unit, sizeof desc.info.unit);
     desc.info.up_axis = (uint32_t)ingest->up;
     desc.info.has_colour = shows_colour(ingest);
@@ -121,6 +118,16 @@ static strl_status write_container(const strl_hierarchy *hierarchy, strl_error *
     desc.info.dropped_degenerate = result->dropped_degenerate;
     desc.info.dropped_lines = result->dropped_lines;
     desc.info.dropped_points = result->dropped_points;
+    return desc;
+}
+
+static strl_status write_container(const strl_hierarchy *hierarchy, strl_error *err)
+{
+    const strl_build_context *context = hierarchy->context;
+    const strl_ingest *ingest = hierarchy->ingest;
+    strl_build_result *result = context->result;
+    const strl_container_writer_desc desc = describe_container(context, ingest);
+    strl_container_writer *writer = NULL;
     strl_tree tree = {.structure = STRL_STRUCTURE_CLUSTERS, .step = ingest->step, .node_count = (uint32_t)((2ull << hierarchy->partition->depth) - 1),
                       .level_count = hierarchy->partition->depth + 1, .leaf_geometric = ingest->leaf_error};
     memcpy(tree.origin, ingest->origin, sizeof tree.origin);
@@ -211,6 +218,8 @@ static strl_status run_stages(strl_hierarchy *hierarchy, strl_partition *partiti
     strl_status status = context->resumed.size
                              ? strl_clusters_restore(hierarchy, hierarchy->ingest, partition, &position, &graph, err)
                              : run_ingest(hierarchy, &position, &graph, err);
+    if (!status && hierarchy->ingest->triangle_count == 0)
+        return STRL_OK; /* nothing to arrange; of such a model nothing was kept */
     if (!status && position.finished == STRL_STAGE_INGEST)
         status = run_partition(hierarchy, partition, &position, &graph, err);
     strl_spill_close(graph);
@@ -224,12 +233,17 @@ strl_status strl__clusters_run(strl_build_context *context, strl_error *err)
     strl_hierarchy hierarchy = {.context = context, .ingest = &ingest, .partition = &partition, .growth = FIRST_GROWTH,
                                 .soft_triangles = STRL_SOFT_TRIANGLES};
     strl_status status = run_stages(&hierarchy, &partition, err);
-    if (!status) {
+    const bool empty = ingest.triangle_count == 0;
+    if (!status && !empty)
         fill_result(&hierarchy, context->result);
-        status = check_counts(context->result, err);
-    }
     if (!status)
+        status = check_counts(context->result, err);
+    if (!status && empty) {
+        const strl_container_writer_desc desc = describe_container(context, &ingest);
+        status = strl_write_empty(&desc, context->result, err);
+    } else if (!status) {
         status = write_container(&hierarchy, err);
+    }
     hierarchy_deinit(&hierarchy);
     strl_partition_deinit(&partition);
     strl_ingest_deinit(&ingest);

@@ -178,8 +178,12 @@ strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, st
     note_drops(context, readers);
     strl__build_expect(context, survey.triangles);
     context->keep &= survey.triangles >= (context->desc->keep_triangles ? context->desc->keep_triangles : KEEP_TRIANGLES);
-    status = survey.triangles ? check_disk(context, survey.triangles, err)
-                              : strl__ingest_refuse_empty(context, readers, err);
+    if (survey.triangles == 0) {
+        status = strl__ingest_check_empty(context, readers, err);
+        context->keep = false;
+        goto done;
+    }
+    status = check_disk(context, survey.triangles, err);
     if (!status)
         status = strl__ingest_check_memory(context, survey.triangles, err);
     if (status)

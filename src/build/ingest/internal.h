@@ -29,8 +29,9 @@ strl_status strl__survey_choose_lattice(const strl_build_context *context, const
 void strl__ingest_name_inputs(const strl_build_desc *desc, char *text, size_t size);
 /* Refuses more triangles than the budget has room for nodes and cells of: their leaves would outgrow what a worker may hold. */
 strl_status strl__ingest_check_memory(const strl_build_context *context, uint64_t triangles, strl_error *err);
-/* No triangle was read: what was, by kind. The result has the drops. */
-strl_status strl__ingest_refuse_empty(const strl_build_context *context, strl_reader *const *readers, strl_error *err);
+/* No triangle is left of what was read: a warning with what was found, by kind; a refusal where triangles were lost,
+ * or nothing but the names of the inputs says that they are models at all. The result has the drops. */
+strl_status strl__ingest_check_empty(strl_build_context *context, strl_reader *const *readers, strl_error *err);
 /* All `collapsed` triangles that were read have two corners in one lattice cell. */
 strl_status strl__ingest_refuse_collapsed(const strl_build_context *context, const strl_ingest *ingest,
                                           uint64_t collapsed, strl_error *err);

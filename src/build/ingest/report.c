@@ -50,22 +50,6 @@ void strl__ingest_name_inputs(const strl_build_desc *desc, char *text, size_t si
         snprintf(text, size, "%s and %u more", desc->inputs[0], desc->input_count - 1);
 }
 
-strl_status strl__ingest_refuse_empty(const strl_build_context *context, strl_reader *const *readers, strl_error *err)
-{
-    char inputs[STRL_INPUTS_NAME_BYTES];
-    sentence found = {.length = 0};
-    uint64_t vertices = 0;
-    for (uint32_t i = 0; i < context->desc->input_count; i++)
-        vertices += strl_reader_vertex_count(readers[i]);
-    add_drops(&found, context->result, 0);
-    if (!found.length) {
-        add_count(&found, vertices, "vertex", "vertices");
-        add(&found, "%sno face", found.length ? " and " : "");
-    }
-    strl__ingest_name_inputs(context->desc, inputs, sizeof inputs);
-    return strl__fail(err, STRL_ERR_FORMAT, "%s: expected a triangle, found %s", inputs, found.text);
-}
-
 strl_status strl__ingest_refuse_collapsed(const strl_build_context *context, const strl_ingest *ingest,
                                           uint64_t collapsed, strl_error *err)
 {
@@ -109,9 +93,52 @@ static void warn_of_missing(strl_build_context *context, strl_reader *const *rea
         warn(context, "%" PRIu64 " more material libraries cannot be read", context->result->missing_libraries - told);
 }
 
+static void warn_of_unread(const strl_build_context *context, strl_reader *const *readers)
+{
+    for (uint32_t i = 0; i < context->desc->input_count; i++) {
+        strl_reader_drops drops;
+        strl_reader_drops_get(readers[i], &drops);
+        if (drops.unread_bytes)
+            warn(context,
+                 "%s: %" PRIu64
+                 " byte%s behind the last record that its header announces %s not read: a count in the header may "
+                 "be too small",
+                 context->desc->inputs[i], drops.unread_bytes, drops.unread_bytes == 1 ? "" : "s",
+                 drops.unread_bytes == 1 ? "is" : "are");
+    }
+}
+
+/* A model of lines alone is a model, and a script that builds a hundred files should not end at it. But where triangles were read
+ * none of which could be kept something is broken, and of a text whose name ends in .obj an empty model would be no answer. */
+strl_status strl__ingest_check_empty(strl_build_context *context, strl_reader *const *readers, strl_error *err)
+{
+    char inputs[STRL_INPUTS_NAME_BYTES];
+    sentence found = {.length = 0};
+    uint64_t vertices = 0;
+    bool certain = true;
+    for (uint32_t i = 0; i < context->desc->input_count; i++) {
+        strl_reader_info info;
+        strl_reader_info_get(readers[i], &info);
+        certain = certain && info.is_certain;
+        vertices += strl_reader_vertex_count(readers[i]);
+    }
+    add_drops(&found, context->result, 0);
+    if (!found.length)
+        add_count(&found, vertices, "vertex", "vertices");
+    strl__ingest_name_inputs(context->desc, inputs, sizeof inputs);
+    if (context->result->dropped_nonfinite || (!found.length && !certain))
+        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected a triangle, found %s", inputs,
+                          found.length ? found.text : "no vertex and no face");
+    warn_of_missing(context, readers);
+    warn_of_unread(context, readers);
+    warn(context, "%s: found %s%sno triangle: the model is empty", inputs, found.text, found.length ? " and " : "");
+    return STRL_OK;
+}
+
 void strl__ingest_warn(strl_build_context *context, strl_reader *const *readers, const strl_ingest *ingest)
 {
     warn_of_missing(context, readers);
+    warn_of_unread(context, readers);
     if (!ingest->is_coarse)
         return;
     char inputs[STRL_INPUTS_NAME_BYTES];

@@ -1,0 +1,50 @@
+/* The container of a model without a triangle: one node that holds nothing, at the origin. What readers have skipped is counted in its
+ * header, which is all that such a model has to tell. */
+#include "base/fail.h"
+#include "build/clusters/hierarchy.h"
+#include "geometry/payload.h"
+
+/* A mesh without a vertex still has one palette entry, of the unnamed part and material. */
+static strl_status encode_nothing(strl_arena *arena, strl_writer *payload, strl_error *err)
+{
+    strl_pm pm = {.palette_count = 1};
+    if (!strl_pm_create(&pm, false, false, arena))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
+    pm.vertex_end[0] = pm.triangle_end[0] = 0;
+    pm.geometric_error[0] = pm.appearance_error[0] = 0;
+    pm.palette[0] = (strl_palette_entry){.rgba = 0xffffffffu};
+    return strl_payload_encode(&pm, NULL, arena, payload, NULL, err);
+}
+
+static strl_status add_tree(strl_container_writer *writer, strl_error *err)
+{
+    const strl_tree tree = {
+        .structure = STRL_STRUCTURE_CLUSTERS, .step = 1, .node_count = 1, .level_count = 1, .group_count = 1};
+    const strl_node node = {.parent = STRL_NONE, .first_child = STRL_NONE, .decode_parent = STRL_NONE, .group_size = 1};
+    strl_arena arena = {0};
+    strl_writer payload = {0};
+    strl_status status = encode_nothing(&arena, &payload, err);
+    if (!status)
+        status = strl_container_writer_begin_tree(writer, &tree, err);
+    if (!status)
+        status = strl_container_writer_add_node(writer, &node, payload.data, (uint32_t)payload.size, err);
+    if (!status)
+        status = strl_container_writer_end_tree(writer, err);
+    strl__free(payload.data);
+    strl_arena_deinit(&arena);
+    return status;
+}
+
+strl_status strl_write_empty(const strl_container_writer_desc *desc, strl_build_result *result, strl_error *err)
+{
+    strl_container_writer *writer = NULL;
+    strl_status status = strl_container_writer_create(desc, &writer, err);
+    if (!status)
+        status = add_tree(writer, err);
+    if (!status)
+        status = strl_container_writer_finish(writer, &result->bytes_out, err);
+    strl_container_writer_destroy(writer);
+    result->nodes = result->groups = result->levels = result->parts = result->materials = result->placements = 1;
+    result->step = 1;
+    return status;
+}
