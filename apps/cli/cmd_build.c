@@ -89,14 +89,14 @@ static void print_time(const strl_build_result *r)
         printf("%.1f s after it was resumed", r->seconds);
     else
         printf("%.1f s, %s triangles a second (%s a second of processor)", r->seconds, rate, processor_rate);
-    printf(", peak memory %.0f MB, scratch %.0f MB\n", (double)r->peak_rss_bytes / 1e6, (double)r->scratch_bytes / 1e6);
+    printf(", peak memory %.0f MiB, scratch %.0f MiB\n", (double)r->peak_rss_bytes / 0x1p20, (double)r->scratch_bytes / 0x1p20);
 }
 
 static void print_text(const strl_build_result *r, const char *output)
 {
-    printf("%s: %llu triangle%s in %llu node%s on %u level%s, %.1f MB", output, (unsigned long long)r->triangles_leaf,
+    printf("%s: %llu triangle%s in %llu node%s on %u level%s, %.1f MiB", output, (unsigned long long)r->triangles_leaf,
            strl_cli_plural(r->triangles_leaf), (unsigned long long)r->nodes, strl_cli_plural(r->nodes), r->levels,
-           strl_cli_plural(r->levels), (double)r->bytes_out / 1e6);
+           strl_cli_plural(r->levels), (double)r->bytes_out / 0x1p20);
     if (r->triangles_leaf)
         printf(" (%.2f bytes a triangle)", (double)r->bytes_out / (double)r->triangles_leaf);
     putchar('\n');

@@ -28,6 +28,7 @@ void strl_cli_catch_interrupts(void)
         if (sigaction(signals[i].number, NULL, &before) == 0 && before.sa_handler != SIG_IGN)
             sigaction(signals[i].number, &action, NULL);
     }
+    signal(SIGXFSZ, SIG_IGN); /* a limit on the size of files is an error of writing, which says what and where */
 }
 
 bool strl_cli_interrupted(void)

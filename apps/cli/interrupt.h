@@ -9,7 +9,7 @@
 #include "stroll/error.h"
 
 /* From now on SIGINT, SIGTERM, SIGHUP and SIGQUIT only set what the others tell, those that were ignored excepted. A
- * second SIGINT or SIGQUIT ends the process at once, with what it has not finished left behind. */
+ * second SIGINT or SIGQUIT ends the process at once, with what it has not finished left behind. SIGXFSZ is ignored. */
 void strl_cli_catch_interrupts(void);
 bool strl_cli_interrupted(void);
 /* STRL_ERR_CANCELLED once there was a signal. */

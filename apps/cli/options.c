@@ -82,7 +82,7 @@ static void print_help(const strl_cli_args *args, const strl_cli_usage *usage)
         const strl_cli_option *option = &usage->options[i];
         print_option(option->letter, option->name, argument_of(option), option->value_optional, option->help);
     }
-    print_option('q', "quiet", "", false, "show no progress and no warnings");
+    print_option('q', "quiet", "", false, "say nothing but errors: no progress, no warnings, no results but --json");
     print_option('h', "help", "", false, "print this and stop");
     if (usage->notes)
         printf("\n%s\n", usage->notes);

@@ -163,7 +163,7 @@ static strl_status resume(strl_build_context *context, strl_scratch *scratch, st
         strl__build_expect(context, context->progress.triangles_in);
     if (!status && !context->has_checkpoint && context->desc->warn) {
         char text[1200];
-        snprintf(text, sizeof text, "%.1000s holds no finished stage of an earlier build: building from the beginning",
+        snprintf(text, sizeof text, "%.1000s holds no finished stage of an earlier build (one with another --scratch lies there): building from the beginning",
                  context->scratch_dir);
         context->desc->warn(context->desc->context, text);
     }

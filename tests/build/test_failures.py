@@ -113,6 +113,21 @@ def an_older_output_stays_when_the_build_fails(folder):
     assert "99999999" in done.error, done
 
 
+def a_limit_on_the_size_of_files_is_one_sentence(folder):
+    """The system ends a program that passes it by a signal, unless the signal is ignored."""
+    source = os.path.join(folder, "in.obj")
+    write_grid_obj(source, 250)
+    out = os.path.join(folder, "out.stroll")
+    refused(folder, source, "-o", out, holds=["out.stroll"], prefix=["sh", "-c", 'ulimit -f 512; exec "$@"', "sh"])
+    assert not os.path.exists(out + ".tmp")
+
+
+def standard_output_is_no_output(folder):
+    source = os.path.join(folder, "in.stl")
+    write_box_stl(source)
+    refused(folder, source, "-o", "-", holds=["standard output"])
+
+
 def a_full_disk_is_one_sentence(folder):
     if os.geteuid() != 0:
         print("not root: no small disk to fill")
@@ -242,7 +257,8 @@ def mistakes_on_the_command_line_exit_with_2(folder):
 
 run_tests(an_output_equal_to_an_input_is_refused, what_is_no_input_is_refused, a_pipe_as_input_does_not_hang,
           a_place_that_cannot_be_written_is_refused, without_rights_it_is_refused,
-          an_older_output_stays_when_the_build_fails, a_full_disk_is_one_sentence,
+          an_older_output_stays_when_the_build_fails, a_limit_on_the_size_of_files_is_one_sentence, standard_output_is_no_output,
+          a_full_disk_is_one_sentence,
           files_of_others_in_the_scratch_folder_stay, signals_stop_a_build_cleanly,
           a_second_build_of_the_same_output_is_refused, what_a_killed_build_left_does_no_harm,
           mistakes_on_the_command_line_exit_with_2)

@@ -170,7 +170,7 @@ class Test:
         for command in ("build", "render", "view"):
             told = self.run(command, "--help").stdout
             self.check("the help of %s says what --quiet silences" % command,
-                       "show no progress and no warnings" in told)
+                       "say nothing but errors" in told)
         told = self.run("render", "--help").stdout
         self.check("the help says when max_error_px is null", "null where the eye is inside a node's box" in told)
 

@@ -109,6 +109,10 @@ static strl_status find_target(const char *path, char **target, struct stat *fac
     *target = NULL;
     if (!*path)
         return strl__fail(err, STRL_ERR_ARGUMENT, "the output's name is empty, expected the name of a file to write");
+    if (!strcmp(path, "-"))
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "the output's name is -, but nothing is written to standard output, expected the name of a file to write "
+                          "(./- names one of that name)");
     char *at = strl__strdup(path);
     if (!at)
         return fail_memory(path, err);
