@@ -15,7 +15,7 @@
 static size_t batch_corner_bytes(const strl__batch_desc *desc)
 {
     return sizeof(strl__corner) + sizeof(strl__face) / 3 + 1 + (desc->indexed ? 8u : 0) +
-           (desc->indexed_normals ? 8u : 0) + (desc->sorted ? 16u : 0);
+           (desc->indexed_normals ? 8u : 0) + (desc->indexed_texcoords ? 8u : 0) + (desc->sorted ? 16u : 0);
 }
 
 strl_status strl__batch_init(strl__batch *batch, const strl__batch_desc *desc, strl_error *err)
@@ -35,10 +35,13 @@ strl_status strl__batch_init(strl__batch *batch, const strl__batch_desc *desc, s
         batch->vertex = strl__alloc(capacity, sizeof *batch->vertex);
     if (desc->indexed_normals)
         batch->normal = strl__alloc(capacity, sizeof *batch->normal);
+    if (desc->indexed_texcoords)
+        batch->texcoord = strl__alloc(capacity, sizeof *batch->texcoord);
     for (unsigned i = 0; i < 2 && desc->sorted; i++)
         batch->keys[i] = strl__alloc(capacity, sizeof *batch->keys[i]);
     bool whole = batch->faces && batch->corners && (batch->vertex || !desc->indexed) &&
                  (batch->normal || !desc->indexed_normals) &&
+                 (batch->texcoord || !desc->indexed_texcoords) &&
                  ((batch->keys[0] && batch->keys[1]) || !desc->sorted);
     if (whole)
         return STRL_OK;
@@ -52,6 +55,7 @@ void strl__batch_deinit(strl__batch *batch)
     strl__free(batch->corners);
     strl__free(batch->vertex);
     strl__free(batch->normal);
+    strl__free(batch->texcoord);
     strl__free(batch->keys[0]);
     strl__free(batch->keys[1]);
     strl__polygon_deinit(&batch->polygon);
@@ -169,6 +173,12 @@ strl_status strl__batch_resolve(strl__batch *batch, strl__table *vertices, strl_
     if (!status && normals && batch->normal)
         status = resolve(batch, normals, batch->normal, err);
     return status;
+}
+
+strl_status strl__batch_resolve_texcoords(strl__batch *batch, strl__table *texcoords,
+                                          strl_error *err)
+{
+    return resolve(batch, texcoords, batch->texcoord, err);
 }
 
 static bool is_finite_corner(const strl__corner *corner)

@@ -90,6 +90,11 @@ uint64_t strl_reader_vertex_count(const strl_reader *reader);
  * next: what they would bring is as if absent. index < count; why, a sentence that names the file; borrowed until close. */
 uint32_t strl_reader_missing_count(const strl_reader *reader);
 const char *strl_reader_missing(const strl_reader *reader, uint32_t index);
+/* Images that materials name and triangles show, and that could not be used (missing, of a kind that is not read, damaged,
+ * too large), each once, after a whole pass: their materials have their colours alone. Of the first a sentence that names it
+ * and says why; borrowed until close. */
+uint32_t strl_reader_missing_image_count(const strl_reader *reader);
+const char *strl_reader_missing_image(const strl_reader *reader);
 /* Bytes of the file consumed so far in this pass, for progress. */
 uint64_t strl_reader_bytes_done(const strl_reader *reader);
 
