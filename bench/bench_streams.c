@@ -28,7 +28,8 @@ static const struct {
     {"normals", STRL__STREAM_NORMAL, STRL__STREAM_PALETTE_INDEX},
     {"materials", STRL__STREAM_PALETTE_INDEX, STRL__STREAM_SELECT},
     {"copied_triangles", STRL__STREAM_SELECT, STRL__STREAM_COPY_NORMAL},
-    {"copied_normals", STRL__STREAM_COPY_NORMAL, STRL__STREAM_COUNT},
+    {"copied_normals", STRL__STREAM_COPY_NORMAL, STRL__STREAM_TEXCOORD},
+    {"texture_coordinates", STRL__STREAM_TEXCOORD, STRL__STREAM_COUNT},
 };
 
 struct node {

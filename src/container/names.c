@@ -2,8 +2,10 @@
 #include "container/names.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <string.h>
 
+#include "base/cursor.h"
 #include "base/fail.h"
 #include "container/opened.h"
 
@@ -89,6 +91,56 @@ static strl_status get_name(strl_container *container, strl__table *table, uint3
         memcpy(head, item, head_bytes);
     copy_cut(item + head_bytes, bytes - head_bytes, name, size);
     return STRL_OK;
+}
+
+/* In the order of the format; ranges were checked. */
+static void decode_image(const uint8_t head[STRL__IMAGE_HEAD_BYTES], strl_material_image *image)
+{
+    strl_cursor in = strl_cursor_make(head, STRL__IMAGE_HEAD_BYTES);
+    for (int k = 0; k < 2; k++)
+        image->wrap[k] = (strl_wrap)strl_cursor_u8(&in);
+    strl_cursor_u16(&in);
+    for (int k = 0; k < 2; k++)
+        image->texcoord_min[k] = strl_cursor_f32(&in);
+    for (int k = 0; k < 2; k++)
+        image->texcoord_extent[k] = strl_cursor_f32(&in);
+}
+
+static bool image_is_good(const strl_material_image *image)
+{
+    bool good = true;
+    for (int k = 0; k < 2; k++)
+        good = good && image->wrap[k] <= STRL_WRAP_MIRROR && isfinite(image->texcoord_min[k]) &&
+               isfinite(image->texcoord_extent[k]) && image->texcoord_extent[k] >= 0;
+    return good;
+}
+
+strl_status strl_container_material_image(strl_container *container, uint32_t material, char *reference, size_t size,
+                                          strl_material_image *image, strl_error *err)
+{
+    const uint8_t *item = NULL;
+    uint32_t bytes = 0;
+    uint8_t head[STRL__IMAGE_HEAD_BYTES] = {0};
+    *image = (strl_material_image){0};
+    if (size)
+        reference[0] = 0;
+    if (material >= container->header.info.material_count)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "there is no material %" PRIu32 ", expected less than %" PRIu32, material,
+                          container->header.info.material_count);
+    if (!container->header.info.has_images)
+        return STRL_OK;
+    strl_status status = strl__page_table_get(&container->images, container->source, material, &item, &bytes, err);
+    if (status != STRL_OK)
+        return strl_source_fail(container->source, status, err);
+    if (bytes == 0)
+        return STRL_OK;
+    status = get_name(container, &container->images, material, sizeof head, head, reference, size, err);
+    decode_image(head, image);
+    if (status == STRL_OK && !image_is_good(image))
+        status = strl__fail(err, STRL_ERR_FORMAT, "table of images: item %" PRIu32 " has a bad range or way to repeat",
+                            material);
+    image->reference = status == STRL_OK ? reference : NULL;
+    return status;
 }
 
 strl_status strl_container_part(strl_container *container, uint32_t part, char *name, size_t size, strl_error *err)

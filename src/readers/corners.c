@@ -192,6 +192,12 @@ static bool has_normal(const strl__corner *corner)
     return corner->normal[0] != 0 || corner->normal[1] != 0 || corner->normal[2] != 0;
 }
 
+/* Finite, and not so far from the image that nothing of it could be told. */
+static bool is_texcoord(const float texcoord[2])
+{
+    return texcoord[0] > -1e6f && texcoord[0] < 1e6f && texcoord[1] > -1e6f && texcoord[1] < 1e6f;
+}
+
 static void make_triangle(const strl__batch *batch, const strl__face *face,
                           const strl__corner *const corners[3], strl_triangle *triangle)
 {
@@ -200,10 +206,19 @@ static void make_triangle(const strl__batch *batch, const strl__face *face,
         memcpy(triangle->normal[i], corners[i]->normal, sizeof triangle->normal[i]);
         triangle->colour[i] = batch->has_corner_colour ? corners[i]->colour : face->colour;
     }
+    bool has_texcoord = batch->has_texcoord;
+    for (unsigned i = 0; i < 3 && has_texcoord; i++)
+        has_texcoord = is_texcoord(corners[i]->texcoord);
+    for (unsigned i = 0; i < 3; i++) {
+        triangle->texcoord[i][0] = has_texcoord ? corners[i]->texcoord[0] : 0;
+        triangle->texcoord[i][1] = has_texcoord ? corners[i]->texcoord[1] : 0;
+    }
     triangle->part = face->part;
     triangle->material = face->material;
     triangle->flags =
         batch->has_corner_colour || batch->has_face_colour ? STRL_TRIANGLE_HAS_COLOUR : 0;
+    if (has_texcoord)
+        triangle->flags |= STRL_TRIANGLE_HAS_TEXCOORD;
     if (has_normal(corners[0]) && has_normal(corners[1]) && has_normal(corners[2]))
         triangle->flags |= STRL_TRIANGLE_HAS_NORMAL;
     else

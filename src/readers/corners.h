@@ -40,6 +40,7 @@ typedef struct strl__batch {
     size_t corner_count, corner_capacity;
     size_t corner_goal; /* a format stops filling here; a whole polygon still fits then */
     bool has_corner_colour, has_face_colour;
+    bool has_texcoord; /* of a corner without one, the first number is none */
     size_t next_face, next_corner; /* what emit takes next */
     uint32_t next_triangle;        /* of the polygon begun, if > 0 */
     strl__polygon polygon;

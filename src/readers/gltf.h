@@ -187,8 +187,9 @@ typedef struct strl__gltf_pass {
 
 /* The image of the primitive that is read. */
 typedef struct strl__gltf_paint {
-    const strl__image *image; /* borrowed for the placement; NULL: none */
-    uint32_t texture, texcoord, draco_id;
+    const strl__image *image;   /* borrowed for the placement; NULL: none that can be used */
+    uint32_t texture, draco_id;
+    uint32_t texcoord;          /* an accessor, or STRL__NO_ITEM: there is no image */
     uint32_t measured;             /* the primitive to which what follows belongs, or STRL__NO_ITEM */
     strl__footprint *footprints;   /* owned; of its vertices; NULL: all have the same */
     double footprint;
@@ -374,7 +375,8 @@ uint32_t strl__gltf_texcoord(const strl__gltf *gltf, const strl__gltf_primitive 
 strl_status strl__gltf_begin_paint(strl__gltf *gltf, const strl__gltf_primitive *primitive,
                                    strl_error *err);
 void strl__gltf_end_paint(strl__gltf *gltf); /* gives back what it holds */
-/* The image times gltf->tints, for vertices first.. into corners. */
+/* Texture coordinates and, where there is an image, it times gltf->tints, for vertices first.. into
+ * corners. */
 strl_status strl__gltf_paint_corners(strl__gltf *gltf, const strl__gltf_primitive *primitive,
                                      uint64_t first, size_t count, strl__corner *corners,
                                      strl_error *err);

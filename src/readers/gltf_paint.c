@@ -179,7 +179,10 @@ strl_status strl__gltf_paint_corners(strl__gltf *gltf, const strl__gltf_primitiv
     strl__image_spot spot;
     strl_status status = read_places(gltf, first, count, places, err);
     memcpy(spot.wrap, textures->items[paint->texture].wrap, sizeof spot.wrap);
-    for (size_t i = 0; i < count && !status; i++) {
+    for (size_t i = 0; i < count && !status; i++)
+        for (unsigned k = 0; k < 2; k++)
+            corners[i].texcoord[k] = (float)places[i][k];
+    for (size_t i = 0; i < count && !status && paint->image; i++) {
         const double *tint = gltf->tints + 4 * i;
         double texel[4];
         spot.u = places[i][0];

@@ -190,6 +190,7 @@ static strl_status read_corners(strl__gltf *gltf, const strl__gltf_primitive *pr
         return status;
     for (size_t i = 0; i < count; i++) {
         memset(corners[i].normal, 0, sizeof corners[i].normal);
+        memset(corners[i].texcoord, 0, sizeof corners[i].texcoord);
         corners[i].colour = 0xffffffffu;
     }
     place_positions(gltf, corners, count);
@@ -198,11 +199,13 @@ static strl_status read_corners(strl__gltf *gltf, const strl__gltf_primitive *pr
         if (!status)
             place_normals(gltf, corners, count);
     }
-    if (!status && gltf->paint.image) {
+    if (!status && gltf->paint.image)
         status = read_tints(gltf, primitive, draco->colour, first, count, err);
-        if (!status)
-            status = strl__gltf_paint_corners(gltf, primitive, first, count, corners, err);
-    } else if (!status && primitive->colour != STRL__NO_ITEM) {
+    if (!status && gltf->paint.texcoord != STRL__NO_ITEM)
+        status = strl__gltf_paint_corners(gltf, primitive, first, count, corners, err);
+    if (status || gltf->paint.image)
+        return status;
+    if (!status && primitive->colour != STRL__NO_ITEM) {
         status = strl__gltf_read_attribute(gltf, primitive->colour, draco->colour, first, count, err);
         if (!status)
             place_colours(gltf, primitive->material,
@@ -218,7 +221,8 @@ static strl__layout corner_layout(void)
                            .has_position = true,
                            .has_normal = true,
                            .has_colour = true,
-                           .has_alpha = true};
+                           .has_alpha = true,
+                           .has_texcoord = true};
     for (uint32_t i = 0; i < 4; i++) {
         uint32_t byte = layout.big_endian ? 3 - i : i;
         layout.colour[i] = (strl__field){(uint32_t)offsetof(strl__corner, colour) + byte, STRL__U8};
@@ -226,6 +230,9 @@ static strl__layout corner_layout(void)
     for (uint32_t i = 0; i < 3; i++) {
         layout.position[i] =
             (strl__field){(uint32_t)offsetof(strl__corner, position) + 8 * i, STRL__F64};
+        if (i < 2)
+            layout.texcoord[i] =
+                (strl__field){(uint32_t)offsetof(strl__corner, texcoord) + 4 * i, STRL__F32};
         layout.normal[i] =
             (strl__field){(uint32_t)offsetof(strl__corner, normal) + 4 * i, STRL__F32};
     }
@@ -328,6 +335,7 @@ strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primit
         return status;
     gltf->reader->batch.has_corner_colour =
         primitive->colour != STRL__NO_ITEM || gltf->paint.image != NULL;
+    gltf->reader->batch.has_texcoord = gltf->paint.texcoord != STRL__NO_ITEM;
     if (primitive->indices != STRL__NO_ITEM)
         status = load_vertices(gltf, primitive, err);
     if (!status && primitive->mode == 6 && !gltf->draco)

@@ -357,6 +357,7 @@ strl_status strl__obj_start(strl_reader *reader, strl_error *err)
     obj->object.length = obj->group.length = obj->material.length = 0;
     obj->part_known = obj->material_known = false;
     reader->batch.has_corner_colour = obj->has_colour || obj->has_images;
+    reader->batch.has_texcoord = obj->has_images;
     rewind_input(reader);
     return STRL_OK;
 }

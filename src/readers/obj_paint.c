@@ -2,6 +2,7 @@
  * that use it, not on the face, so that faces agree about the corners they share. */
 #include "readers/obj.h"
 
+#include <math.h>
 #include <string.h>
 
 #include "base/fail.h"
@@ -159,6 +160,10 @@ static void paint_corner(const strl_reader *reader, const brush *with, double fo
     uint8_t code[4];
     memcpy(spot.wrap, with->texture->wrap, sizeof spot.wrap);
     place_corner(with, corner, place);
+    corner->texcoord[0] = (float)place[0];
+    corner->texcoord[1] = (float)place[1];
+    if (!with->image)
+        return;
     spot.u = place[0];
     spot.v = place[1];
     strl__image_sample(with->image, srgb, &spot, texel);
@@ -171,9 +176,17 @@ static void paint_corner(const strl_reader *reader, const brush *with, double fo
                           strl__colour_channel(STRL__F64, texel[3] * code[3] / 255));
 }
 
-strl_status strl__obj_paint(strl_reader *reader, strl_error *err)
+static double footprint_of(const strl_reader *reader, const brush *with, uint64_t texcoord)
 {
     const strl__obj *obj = reader->state;
+    if (obj->footprints)
+        return strl__footprint_side(obj->footprints[texcoord]);
+    return with->image ? strl__footprint_guess(with->image, reader->texcoords.count) : 1;
+}
+
+/* Also where each corner is in its image, from now on as glTF has it. */
+strl_status strl__obj_paint(strl_reader *reader, strl_error *err)
+{
     strl__batch *batch = &reader->batch;
     brush with = {.material = UINT32_MAX};
     size_t corner = 0;
@@ -181,13 +194,12 @@ strl_status strl__obj_paint(strl_reader *reader, strl_error *err)
     for (size_t i = 0; i < batch->face_count && !status; i++) {
         const size_t end = corner + batch->faces[i].corner_count;
         status = take_brush(reader, batch->faces[i].material, &with, err);
-        for (; corner < end && !status && with.image; corner++) {
+        for (; corner < end && !status; corner++) {
             const uint64_t texcoord = batch->texcoord[corner];
-            if (texcoord != STRL__NO_INDEX)
-                paint_corner(reader, &with,
-                             obj->footprints
-                                 ? strl__footprint_side(obj->footprints[texcoord])
-                                 : strl__footprint_guess(with.image, reader->texcoords.count),
+            if (texcoord == STRL__NO_INDEX || !with.texture)
+                batch->corners[corner].texcoord[0] = NAN;
+            else
+                paint_corner(reader, &with, footprint_of(reader, &with, texcoord),
                              &batch->corners[corner]);
         }
         corner = end;

@@ -219,6 +219,24 @@ static strl_status read_batch(strl_reader *reader, strl_error *err)
     return status;
 }
 
+/* What texture coordinates each material has, by which they are told in fewer bits. */
+static void note_texcoords(strl_reader *reader, const strl_triangle *triangles, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        const strl_triangle *triangle = &triangles[i];
+        if (!(triangle->flags & STRL_TRIANGLE_HAS_TEXCOORD))
+            continue;
+        strl__name *material = &reader->materials.items[triangle->material];
+        for (unsigned k = 0; k < 6; k++) {
+            const float value = triangle->texcoord[k / 2][k % 2];
+            if (value < material->least[k % 2])
+                material->least[k % 2] = value;
+            if (value > material->most[k % 2])
+                material->most[k % 2] = value;
+        }
+    }
+}
+
 static strl_status next_triangles(strl_reader *reader, strl_triangle *triangles, size_t capacity,
                                   size_t *count, strl_error *err)
 {
@@ -227,6 +245,8 @@ static strl_status next_triangles(strl_reader *reader, strl_triangle *triangles,
         size_t added = 0;
         status = strl__batch_emit(&reader->batch, triangles + *count, capacity - *count, &added,
                                   &reader->drops, err);
+        if (reader->batch.has_texcoord)
+            note_texcoords(reader, triangles + *count, added);
         *count += added;
         if (status || added > 0)
             continue;
@@ -316,6 +336,22 @@ uint32_t strl_reader_missing_count(const strl_reader *reader)
 const char *strl_reader_missing(const strl_reader *reader, uint32_t index)
 {
     return reader->missing.items[index].text;
+}
+
+bool strl_reader_material_image(const strl_reader *reader, uint32_t material,
+                                strl_reader_image *image)
+{
+    if (material >= reader->materials.count ||
+        reader->materials.items[material].texture == STRL__NO_TEXTURE)
+        return false;
+    const strl__name *name = &reader->materials.items[material];
+    const strl__texture *texture = &reader->textures.items[name->texture];
+    *image = (strl_reader_image){
+        .reference = reader->textures.pictures[texture->picture].reference,
+        .wrap = {(strl_image_wrap)texture->wrap[0], (strl_image_wrap)texture->wrap[1]},
+        .texcoord_min = {name->least[0], name->least[1]},
+        .texcoord_max = {name->most[0], name->most[1]}};
+    return true;
 }
 
 uint32_t strl_reader_missing_image_count(const strl_reader *reader)

@@ -23,6 +23,7 @@ typedef struct strl_reader_drops {
 
 #define STRL_TRIANGLE_HAS_NORMAL 1u
 #define STRL_TRIANGLE_HAS_COLOUR 2u
+#define STRL_TRIANGLE_HAS_TEXCOORD 4u /* only where the material names an image */
 
 /* One triangle as read. 3 corners. */
 typedef struct strl_triangle {
@@ -32,6 +33,7 @@ typedef struct strl_triangle {
     uint32_t part;          /* index into the reader's parts */
     uint32_t material;      /* index into the reader's materials */
     uint32_t flags;         /* STRL_TRIANGLE_HAS_... : for all three corners */
+    float texcoord[3][2];   /* in the image of the material, u to the right, v down, 1 = all of it; finite; 0 where absent */
 } strl_triangle;
 
 /* What a child process may take that reads what Stroll does not read itself. Zero = defaults. */
@@ -108,6 +110,18 @@ const char *strl_reader_part_name(const strl_reader *reader, uint32_t part);
 uint32_t strl_reader_material_count(const strl_reader *reader);
 /* rgba: sRGB-encoded RGBA8, R in the lowest byte. */
 const char *strl_reader_material(const strl_reader *reader, uint32_t material, uint32_t *rgba);
+
+typedef enum strl_image_wrap { STRL_IMAGE_REPEAT, STRL_IMAGE_CLAMP, STRL_IMAGE_MIRROR } strl_image_wrap;
+
+/* The image of a material, usable or not. */
+typedef struct strl_reader_image {
+    const char *reference; /* as the model names it: a file beside it, or "images[3] (name)" of its own; borrowed until close */
+    strl_image_wrap wrap[2]; /* of u, of v */
+    float texcoord_min[2], texcoord_max[2]; /* of its triangles so far; min > max: there were none */
+} strl_reader_image;
+
+/* False where the material names none. */
+bool strl_reader_material_image(const strl_reader *reader, uint32_t material, strl_reader_image *image);
 
 void strl_reader_close(strl_reader *reader); /* NULL is legal; removes its spill files */
 

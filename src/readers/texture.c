@@ -1,10 +1,13 @@
 #include "readers/texture.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
+
+#define REFERENCE_BYTES_MAX 1000u /* longer ones are cut */
 
 void strl__textures_init(strl__textures *textures, uint64_t limit_bytes)
 {
@@ -34,8 +37,9 @@ strl_status strl__textures_add_picture(strl__textures *textures, const char *key
     if (!strl__grow(&textures->pictures, &textures->picture_capacity, before + 1,
                     sizeof *textures->pictures))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu images", before + 1);
-    strl__picture added = {
-        .key = strl__strdup(key), .reference = strl__strdup(reference), .item = item};
+    char cut[REFERENCE_BYTES_MAX + 1];
+    snprintf(cut, sizeof cut, "%s", reference);
+    strl__picture added = {.key = strl__strdup(key), .reference = strl__strdup(cut), .item = item};
     strl_status status =
         added.key && added.reference
             ? strl__names_add(&textures->keys, key, strlen(key), picture, err)

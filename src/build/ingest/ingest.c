@@ -186,6 +186,7 @@ strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, st
         goto done;
     ingest->has_normals = survey.any_normal;
     ingest->has_colours = survey.any_colour;
+    ingest->has_texcoords = survey.any_texcoord;
     status = strl__survey_choose_lattice(context, &survey, ingest, err);
     if (status)
         goto done;
@@ -223,9 +224,13 @@ strl_status strl_ingest_drop(strl_spill **stream, strl_error *err)
 
 static void names_deinit(strl_names *names)
 {
-    for (size_t i = 0; i < names->count; i++)
+    for (size_t i = 0; i < names->count; i++) {
         strl__free(names->items[i]);
+        if (names->images)
+            strl__free((char *)names->images[i].reference);
+    }
     strl__free(names->items);
+    strl__free(names->images);
     strl__free(names->rgba);
     *names = (strl_names){0};
 }
