@@ -186,6 +186,56 @@ static void the_bytes_do_not_depend_on_threads(void **state)
     free(bytes[1]);
 }
 
+typedef struct stop {
+    warnings told;
+    unsigned calls, after;
+} stop;
+
+static bool say_no(void *context, const strl_build_progress *progress)
+{
+    (void)progress;
+    return ++((stop *)context)->calls != ((stop *)context)->after;
+}
+
+static strl_status build_in_two(bool resume, unsigned after, unsigned *calls, strl_build_result *result)
+{
+    const char *input = built_path("sheet.obj");
+    stop s = {.after = after};
+    const strl_build_desc desc = {.inputs = &input, .input_count = 1, .output = built_path("two.stroll"), .memory_bytes = 256u << 20,
+                                  .jobs = 2, .keep = true, .keep_triangles = 1, .resume = resume, .progress = say_no,
+                                  .context = &s};
+    strl_error err = {0};
+    strl_status status = strl_build_clusters(&desc, result, &err);
+    *calls = s.calls;
+    return status;
+}
+
+/* Stopped at every few reports; what was finished is gone on with. */
+static void a_resumed_build_has_the_same_bytes(void **state)
+{
+    (void)state;
+    warnings told = {0};
+    strl_build_result result;
+    unsigned calls, most, resumed = 0;
+    size_t size[2];
+    write_sheet();
+    build_sheet(built_path("one.stroll"), 2, &told);
+    uint8_t *whole = built_read_file(built_path("one.stroll"), &size[0]);
+    assert_int_equal(build_in_two(false, 0, &most, &result), STRL_OK);
+    for (unsigned after = 1; after < most; after += 1 + most / 8) {
+        assert_int_equal(build_in_two(false, after, &calls, &result), STRL_ERR_CANCELLED);
+        assert_int_equal(build_in_two(true, 0, &calls, &result), STRL_OK);
+        resumed += result.resumed;
+        assert_int_equal(result.missing_images, 2);
+        uint8_t *bytes = built_read_file(built_path("two.stroll"), &size[1]);
+        assert_int_equal(size[0], size[1]);
+        assert_memory_equal(bytes, whole, size[0]);
+        free(bytes);
+    }
+    assert_true(resumed >= 2);
+    free(whole);
+}
+
 static void the_container_is_good(void **state)
 {
     (void)state;
@@ -250,6 +300,7 @@ int main(void)
         cmocka_unit_test(each_vertex_has_the_coordinate_of_its_place),
         cmocka_unit_test(unusable_images_make_one_warning),
         cmocka_unit_test(the_bytes_do_not_depend_on_threads),
+        cmocka_unit_test(a_resumed_build_has_the_same_bytes),
         cmocka_unit_test(the_container_is_good),
         cmocka_unit_test(a_walk_gives_them_with_the_labels),
     };
