@@ -1,6 +1,7 @@
 /* PNG and JPEG from memory: refused with a sentence, or decoded within the limit to texels whose colours are in range
  * wherever one looks. */
 #include <math.h>
+#include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
