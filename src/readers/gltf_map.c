@@ -127,7 +127,7 @@ static strl_status add_picture(strl__gltf *gltf, uint32_t map, uint32_t *picture
     const uint32_t index = map < gltf->map_count ? gltf->maps[map].image : STRL__NO_ITEM;
     char name[NAME_BYTES];
     if (index >= gltf->image_count)
-        return strl__textures_add_picture(textures, "", "a texture", STRL__NO_ITEM, picture, err);
+        return strl__textures_add_picture(textures, "", "", STRL__NO_ITEM, picture, err);
     const char *uri = gltf->images[index].uri;
     if (uri && strncmp(uri, "data:", 5) != 0)
         return strl__textures_add_picture(textures, uri, uri, index, picture, err);

@@ -37,10 +37,15 @@ static strl_status check_decoded(const strl__gltf *gltf, const strl__gltf_primit
                                  strl_error *err)
 {
     const strl__gltf_draco_use *use = primitive->draco;
-    const uint32_t ids[3] = {use->position, use->normal, use->colour};
-    const uint32_t accessors[3] = {primitive->position, primitive->normal, primitive->colour};
+    const uint32_t texcoord = strl__gltf_texcoord(gltf, primitive);
+    const uint32_t ids[4] = {use->position, use->normal, use->colour,
+                             texcoord == STRL__NO_ITEM
+                                 ? STRL__NO_ITEM
+                                 : use->texcoord[gltf->materials[primitive->material].set]};
+    const uint32_t accessors[4] = {primitive->position, primitive->normal, primitive->colour,
+                                   texcoord};
     const uint64_t points = strl__draco_point_count(gltf->draco);
-    for (unsigned i = 0; i < 3; i++)
+    for (unsigned i = 0; i < 4; i++)
         if (accessors[i] != STRL__NO_ITEM &&
             (points > gltf->accessors[accessors[i]].count ||
              (ids[i] != STRL__NO_ITEM && strl__draco_components(gltf->draco, ids[i]) !=

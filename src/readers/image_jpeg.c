@@ -13,6 +13,7 @@
 
 #define SCANS_MAX 200 /* each passes over the whole image */
 #define BUFFER_BYTES ((size_t)16 << 10)
+#define WORKING_BYTES 128u /* a column: lines before and after their colours are turned */
 
 typedef struct jpeg_job {
     struct jpeg_decompress_struct jpeg;
@@ -128,7 +129,7 @@ static void begin(jpeg_job *job)
     const bool has_four = jpeg->num_components == 4;
     const uint64_t held = jpeg_has_multiple_scans(jpeg) ? coefficient_bytes(job) : 0;
     jpeg->out_color_space = is_grey ? JCS_GRAYSCALE : has_four ? JCS_CMYK : JCS_RGB;
-    if (strl__image_begin(job->making, width, height, held + 32 * width, &job->failure))
+    if (strl__image_begin(job->making, width, height, held + WORKING_BYTES * width, &job->failure))
         fail(job);
     job->line = strl__alloc((size_t)width, 4);
     job->row = strl__alloc((size_t)width, 4);

@@ -10,6 +10,7 @@
 
 #define CHUNK_BYTES_MAX ((size_t)1 << 20)
 #define CHUNKS_MAX 64u
+#define WORKING_BYTES 24u /* a column: two rows of up to 8 bytes a texel */
 #define LEAST_RATIO 1040u /* deflate makes no more of a byte */
 
 typedef struct png_job {
@@ -83,7 +84,7 @@ static void begin(png_job *job)
                    job->making->source->bytes);
     set_transforms(job);
     if (!job->failure.status)
-        strl__image_begin(job->making, width, height, 4 * width * (job->interlaced ? height : 1),
+        strl__image_begin(job->making, width, height, 4 * width * (job->interlaced ? height : 1) + WORKING_BYTES * width,
                           &job->failure);
     if (!job->failure.status) {
         job->rows = strl__alloc((size_t)(4 * width), job->interlaced ? (size_t)height : 1);

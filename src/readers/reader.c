@@ -348,7 +348,7 @@ bool strl_reader_material_image(const strl_reader *reader, uint32_t material,
     const strl__texture *texture = &reader->textures.items[name->texture];
     *image = (strl_reader_image){
         .reference = reader->textures.pictures[texture->picture].reference,
-        .wrap = {(strl_image_wrap)texture->wrap[0], (strl_image_wrap)texture->wrap[1]},
+        .wrap = {texture->wrap[0], texture->wrap[1]},
         .texcoord_min = {name->least[0], name->least[1]},
         .texcoord_max = {name->most[0], name->most[1]}};
     return true;

@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "readers/image.h"
 #include "stroll/error.h"
 
 typedef struct strl_reader strl_reader;
@@ -111,12 +112,10 @@ uint32_t strl_reader_material_count(const strl_reader *reader);
 /* rgba: sRGB-encoded RGBA8, R in the lowest byte. */
 const char *strl_reader_material(const strl_reader *reader, uint32_t material, uint32_t *rgba);
 
-typedef enum strl_image_wrap { STRL_IMAGE_REPEAT, STRL_IMAGE_CLAMP, STRL_IMAGE_MIRROR } strl_image_wrap;
-
 /* The image of a material, usable or not. */
 typedef struct strl_reader_image {
     const char *reference; /* as the model names it: a file beside it, or "images[3] (name)" of its own; borrowed until close */
-    strl_image_wrap wrap[2]; /* of u, of v */
+    strl__wrap wrap[2];    /* of u, of v */
     float texcoord_min[2], texcoord_max[2]; /* of its triangles so far; min > max: there were none */
 } strl_reader_image;
 

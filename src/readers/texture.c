@@ -156,8 +156,8 @@ static void note_unusable(strl__textures *textures, strl__picture *picture, cons
 {
     picture->is_unusable = true;
     if (textures->unusable_count++ == 0)
-        strl__fail(&textures->first_unusable, why->status, "%.400s %s", picture->reference,
-                   why->message);
+        strl__fail(&textures->first_unusable, why->status, "%.400s %s",
+                   *picture->reference ? picture->reference : "a texture", why->message);
 }
 
 strl_status strl__textures_get(strl__textures *textures, uint32_t texture,

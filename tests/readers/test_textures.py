@@ -343,6 +343,7 @@ def images_that_are_missing_or_nowhere_are_told(folder):
         spots_model([(0.5, 0.5)], image_item=item or {"name": "x"}).glb(f"{folder}/model.glb")
         result = expect_colours(f"{folder}/model.glb", [(255, 255, 255)], missing=1)
         assert words in result["missing_image"], (item, result["missing_image"])
+        assert "cannot be read" in result["missing_image"], result["missing_image"]
     for texture in ({"index": 99}, {"index": -1}, {"index": "x"}):
         spots_model([(0.5, 0.5)], texture=texture).glb(f"{folder}/model.glb")
         expect_colours(f"{folder}/model.glb", [(255, 255, 255)], missing=1)
