@@ -15,7 +15,8 @@
 static size_t batch_corner_bytes(const strl__batch_desc *desc)
 {
     return sizeof(strl__corner) + sizeof(strl__face) / 3 + 1 + (desc->indexed ? 8u : 0) +
-           (desc->indexed_normals ? 8u : 0) + (desc->indexed_texcoords ? 8u : 0) + (desc->sorted ? 16u : 0);
+           (desc->indexed_normals ? 8u : 0) + (desc->indexed_texcoords ? 8u : 0) +
+           (desc->sorted ? 16u : 0);
 }
 
 strl_status strl__batch_init(strl__batch *batch, const strl__batch_desc *desc, strl_error *err)

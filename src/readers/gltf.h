@@ -7,9 +7,9 @@
  * to placement; of the buffers only windows are in memory. Poses of skins and morph targets are not
  * applied.
  *
- * Of the reader's budget at most a quarter is for tables, half less those for what is
- * decompressed and for images, which take a quarter at most, an eighth for buffers that stand in the JSON as text, an eighth for the vertices
- * of a primitive. */
+ * Of the reader's budget at most a quarter is for tables, half less those for what is decompressed
+ * and for images, which take a quarter at most, an eighth for buffers that stand in the JSON as
+ * text, an eighth for the vertices of a primitive; a 16th for measuring these under an image. */
 #ifndef STRL_READERS_GLTF_H
 #define STRL_READERS_GLTF_H
 
@@ -187,11 +187,11 @@ typedef struct strl__gltf_pass {
 
 /* The image of the primitive that is read. */
 typedef struct strl__gltf_paint {
-    const strl__image *image;   /* borrowed for the placement; NULL: none that can be used */
+    const strl__image *image; /* borrowed for the placement; NULL: none that can be used */
     uint32_t texture, draco_id;
-    uint32_t texcoord;          /* an accessor, or STRL__NO_ITEM: there is no image */
-    uint32_t measured;             /* the primitive to which what follows belongs, or STRL__NO_ITEM */
-    strl__footprint *footprints;   /* owned; of its vertices; NULL: all have the same */
+    uint32_t texcoord; /* an accessor, or STRL__NO_ITEM: there is no image */
+    uint32_t measured; /* the primitive to which what follows belongs, or STRL__NO_ITEM */
+    strl__footprint *footprints; /* owned; of its vertices; NULL: all have the same */
     double footprint;
 } strl__gltf_paint;
 
@@ -236,7 +236,7 @@ typedef struct strl__gltf {
     strl__gltf_paint paint;
     uint8_t *window;        /* owned */
     double values[STRL__GLTF_CHUNK * 4];
-    double tints[STRL__GLTF_CHUNK * 4]; /* linear light R, G, B, and A, of vertices under an image */
+    double tints[STRL__GLTF_CHUNK * 4]; /* linear R, G, B, and A, of vertices under an image */
     strl__corner corners[STRL__GLTF_CHUNK];
     uint32_t elements[STRL__GLTF_CHUNK];
     strl__corner first_corner; /* of a fan */
@@ -364,7 +364,8 @@ void strl__gltf_parse_map_use(const char *path, strl__gltf_material *material, c
 strl_status strl__gltf_link_maps(strl__gltf *gltf, strl_error *err);
 /* For the reader's textures; context: the strl__gltf. */
 strl_status strl__gltf_open_picture(void *context, const strl__picture *picture,
-                                    const char *ending, strl__picture_place *found, strl_error *err);
+                                    const char *ending, strl__picture_place *found,
+                                    strl_error *err);
 /* The accessor of the coordinates at which a primitive shows its material's image; STRL__NO_ITEM:
  * none. */
 uint32_t strl__gltf_texcoord(const strl__gltf *gltf, const strl__gltf_primitive *primitive);

@@ -10,7 +10,8 @@
 
 #define NAME_BYTES 256u
 
-/* Fields whose failures make an item empty and do not refuse the file: nothing else depends on it. */
+/* Fields whose failures make an item empty and do not refuse the file: nothing else depends on
+ * it. */
 static strl__fields quiet_fields(const char *path, strl_error *ignored)
 {
     return (strl__fields){.path = path, .member = "textures", .err = ignored};
@@ -79,7 +80,8 @@ strl_status strl__gltf_parse_image(strl__gltf *gltf, strl__fields *fields, const
     return status;
 }
 
-/* KHR_texture_transform: scaled, turned, moved. */
+/* KHR_texture_transform: scaled, turned, moved. Counter-clockwise as one sees the image, whose v
+ * goes down. */
 static void parse_transform(strl__fields *fields, const json_t *info, double transform[6],
                             uint32_t *set)
 {

@@ -1,4 +1,5 @@
-/* Materials come down to one colour, the base colour's factor, linear in the file, and its image. Of alpha modes,
+/* Materials come down to one colour, the base colour's factor, linear in the file, and its image,
+ * which the vertices' colours take in. Of alpha modes,
  * OPAQUE makes alpha 1, BLEND keeps it, MASK makes it 0 or 1 by the cutoff, vertex by vertex. */
 #include <math.h>
 #include <string.h>
@@ -30,8 +31,7 @@ static const json_t *parse_base(strl__fields *fields, const json_t *value, doubl
     const json_t *glossy =
         strl__fields_extension(fields, value, "KHR_materials_pbrSpecularGlossiness");
     const json_t *image = strl__fields_object(fields, rough, "baseColorTexture");
-    const bool has_base = strl__fields_numbers(fields, rough, "baseColorFactor", factor, 4) || image;
-    if (has_base)
+    if (strl__fields_numbers(fields, rough, "baseColorFactor", factor, 4) || image)
         return image;
     strl__fields_numbers(fields, glossy, "diffuseFactor", factor, 4);
     return strl__fields_object(fields, glossy, "diffuseTexture");
@@ -40,7 +40,8 @@ static const json_t *parse_base(strl__fields *fields, const json_t *value, doubl
 strl_status strl__gltf_parse_material(strl__gltf *gltf, strl__fields *fields, const json_t *value)
 {
     double factor[4] = {1, 1, 1, 1};
-    strl__gltf_material material = {.cutoff = -1, .listed = STRL__NO_ITEM, .texture = STRL__NO_TEXTURE};
+    strl__gltf_material material = {
+        .cutoff = -1, .listed = STRL__NO_ITEM, .texture = STRL__NO_TEXTURE};
     const char *name = strl__fields_text(fields, value, "name");
     const char *mode = strl__fields_text(fields, value, "alphaMode");
     const double cutoff = strl__fields_number(fields, value, "alphaCutoff", 0.5);

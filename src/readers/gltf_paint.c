@@ -1,5 +1,5 @@
-/* Vertices under an image: what each stands for of it, which depends on the triangles round it and on
- * nothing else, so that triangles that share a vertex agree about its colour; and its colour. */
+/* Vertices under an image: what each stands for of it, which depends on the triangles round it and
+ * on nothing else, so that triangles that share a vertex agree about its colour; and its colour. */
 #include <math.h>
 #include <string.h>
 

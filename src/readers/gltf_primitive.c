@@ -200,7 +200,8 @@ static strl_status read_corners(strl__gltf *gltf, const strl__gltf_primitive *pr
     }
     place_positions(gltf, corners, count);
     if (primitive->normal != STRL__NO_ITEM) {
-        status = strl__gltf_read_attribute(gltf, primitive->normal, draco->normal, first, count, err);
+        status =
+            strl__gltf_read_attribute(gltf, primitive->normal, draco->normal, first, count, err);
         if (!status)
             place_normals(gltf, corners, count);
     }
@@ -211,7 +212,8 @@ static strl_status read_corners(strl__gltf *gltf, const strl__gltf_primitive *pr
     if (status || gltf->paint.image)
         return status;
     if (!status && primitive->colour != STRL__NO_ITEM) {
-        status = strl__gltf_read_attribute(gltf, primitive->colour, draco->colour, first, count, err);
+        status =
+            strl__gltf_read_attribute(gltf, primitive->colour, draco->colour, first, count, err);
         if (!status)
             place_colours(gltf, primitive->material,
                           gltf->accessors[primitive->colour].values.components, corners, count);
@@ -385,7 +387,8 @@ static strl_status add_indexed(strl__gltf *gltf, const strl__gltf_primitive *pri
 {
     strl__batch *batch = &gltf->reader->batch;
     for (unsigned i = 0; i < 3; i++) {
-        uint32_t index = slots[i] == STRL__GLTF_FAN_CENTRE ? gltf->first_element : gltf->elements[slots[i]];
+        uint32_t index = slots[i] == STRL__GLTF_FAN_CENTRE ? gltf->first_element
+                                                           : gltf->elements[slots[i]];
         if (index >= gltf->pass.vertex_count)
             return index_fail(gltf, primitive, index, triangle, err);
         batch->vertex[batch->corner_count + i] = index;

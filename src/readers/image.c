@@ -39,7 +39,8 @@ static uint32_t halved(uint64_t side, unsigned times)
     return (uint32_t)((side + ((uint64_t)1 << times) - 1) >> times);
 }
 
-/* Fills in what is held when the file's sides are halved so many times. Returns the texels of all levels. */
+/* Fills in what is held when the file's sides are halved so many times. Returns the texels of all
+ * levels. */
 static uint64_t plan_levels(strl__image *image, unsigned halvings)
 {
     uint64_t texels = 0;
@@ -65,8 +66,8 @@ strl_status strl__image_begin(strl__image_making *making, uint64_t width, uint64
     if (width == 0 || height == 0 || width > STRL__IMAGE_SIDE_MAX ||
         height > STRL__IMAGE_SIDE_MAX || width * height > STRL__IMAGE_TEXELS_MAX)
         return strl__fail(err, STRL_ERR_LIMIT,
-                          "has %" PRIu64 " x %" PRIu64 " texels, expected 1 to %u a side and at most "
-                          "%" PRIu64 " in all",
+                          "has %" PRIu64 " x %" PRIu64 " texels, expected 1 to %u a side and at "
+                          "most %" PRIu64 " in all",
                           width, height, STRL__IMAGE_SIDE_MAX, STRL__IMAGE_TEXELS_MAX);
     *image = (strl__image){.width = (uint32_t)width, .height = (uint32_t)height};
     for (texels = plan_levels(image, 0); 4 * texels + sums_bytes + working_bytes > limit;) {

@@ -84,7 +84,8 @@ static void begin(png_job *job)
                    job->making->source->bytes);
     set_transforms(job);
     if (!job->failure.status)
-        strl__image_begin(job->making, width, height, 4 * width * (job->interlaced ? height : 1) + WORKING_BYTES * width,
+        strl__image_begin(job->making, width, height,
+                          4 * width * (job->interlaced ? height : 1) + WORKING_BYTES * width,
                           &job->failure);
     if (!job->failure.status) {
         job->rows = strl__alloc((size_t)(4 * width), job->interlaced ? (size_t)height : 1);

@@ -44,10 +44,10 @@ static obj_keyword take_keyword(strl__input *input)
         uint8_t length;
         obj_keyword keyword;
     } words[] = {
-        {"v", 1, OBJ_VERTEX},       {"f", 1, OBJ_FACE},  {"vn", 2, OBJ_NORMAL},
-        {"vt", 2, OBJ_TEXCOORD},    {"l", 1, OBJ_LINE},         {"p", 1, OBJ_POINT}, {"o", 1, OBJ_OBJECT},
-        {"g", 1, OBJ_GROUP},        {"fo", 2, OBJ_FACE}, {"usemtl", 6, OBJ_USE_MATERIAL},
-        {"mtllib", 6, OBJ_LIBRARY},
+        {"v", 1, OBJ_VERTEX},       {"f", 1, OBJ_FACE},           {"vn", 2, OBJ_NORMAL},
+        {"vt", 2, OBJ_TEXCOORD},    {"l", 1, OBJ_LINE},           {"p", 1, OBJ_POINT},
+        {"o", 1, OBJ_OBJECT},       {"g", 1, OBJ_GROUP},          {"fo", 2, OBJ_FACE},
+        {"mtllib", 6, OBJ_LIBRARY}, {"usemtl", 6, OBJ_USE_MATERIAL},
     };
     const char *at = input->at;
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
@@ -467,11 +467,10 @@ static strl_status read_corner(strl_reader *reader, size_t slot, strl_error *err
         return index_fail(reader, "normals", written[2], reader->normals.count, err);
     if (batch->normal)
         batch->normal[slot] = normal;
-    if (batch->texcoord) /* a wrong one shows no image */
-        batch->texcoord[slot] =
-            given[1] && to_index(written[1], obj->texcoords_seen, reader->texcoords.count, &texcoord)
-                ? texcoord
-                : STRL__NO_INDEX;
+    if (given[1] && !to_index(written[1], obj->texcoords_seen, reader->texcoords.count, &texcoord))
+        texcoord = STRL__NO_INDEX; /* shows no image */
+    if (batch->texcoord)
+        batch->texcoord[slot] = texcoord;
     input->at = at;
     return STRL_OK;
 }

@@ -13,7 +13,7 @@ typedef struct strl__obj {
     strl__names library;    /* materials that the mtllibs define */
     bool has_library;       /* the names were initialised */
     bool has_colour;        /* some vertex has one */
-    bool has_images;        /* some material of the library has one, and there are coordinates for it */
+    bool has_images;        /* of materials of the library; and there are coordinates for them */
     uint64_t vertices_seen; /* of this pass, so far: what negative indices count from */
     uint64_t normals_seen, texcoords_seen;
     strl__obj_name object, group, material;
