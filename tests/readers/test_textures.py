@@ -4,12 +4,10 @@ import base64
 import math
 import os
 import random
-import struct
-import sys
 
 import gltf_writer as w
 import image_writer as image
-from gltf_reading import LEAST, read, refuse, run_tests
+from gltf_reading import LEAST, read, run_tests
 
 MEBI = 1 << 20
 FILTERS = {"repeat": 10497, "clamp": 33071, "mirror": 33648}
