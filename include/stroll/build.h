@@ -82,6 +82,7 @@ typedef struct strl_build_result {
     uint64_t dropped_nonfinite, dropped_degenerate, dropped_lines, dropped_points;
     double dropped_longest; /* the longest edge of a triangle without area on the lattice, model units: claims leave these out */
     uint64_t missing_libraries; /* material libraries that could not be read: what they define is white */
+    uint64_t missing_images;    /* images of materials that could not be used: these have their colours alone */
     uint32_t coarse_lattices;   /* 1 where the step had to be more than a sixteenth of the 1st-percentile edge */
     uint64_t vertices, nodes, groups, bytes_out, scratch_bytes;
     uint32_t parts, materials, levels, root_triangles, inputs;

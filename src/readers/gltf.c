@@ -143,6 +143,8 @@ static strl_status open_json(strl_reader *reader, strl_error *err)
     if (!status)
         status = strl__gltf_link(gltf, err);
     if (!status)
+        status = strl__gltf_link_maps(gltf, err);
+    if (!status)
         status = strl__gltf_check_scene(gltf, err);
     if (!status)
         add_up(gltf);
@@ -157,7 +159,10 @@ static void init(strl_reader *reader)
     gltf->table_limit = reader->memory_bytes / 4;
     reader->parts.limit_bytes = (size_t)(reader->memory_bytes / 8); /* they are whole paths */
     strl_arena_init(&gltf->arena, (size_t)(reader->memory_bytes / 8));
-    strl__gltf_init_thresholds(gltf);
+    strl__textures_init(&reader->textures, reader->memory_bytes / 4);
+    reader->textures.open = strl__gltf_open_picture;
+    reader->textures.context = gltf;
+    gltf->paint.measured = STRL__NO_ITEM;
 }
 
 static strl_status gltf_open(strl_reader *reader, strl_error *err)
@@ -297,6 +302,7 @@ static void gltf_close(strl_reader *reader)
     strl__gltf *gltf = strl__gltf_of(reader);
     strl__gltf_close_buffers(gltf);
     strl__gltf_close_decoded(gltf);
+    strl__gltf_end_paint(gltf);
     strl_arena_deinit(&gltf->arena);
     strl__free(gltf->accessors);
     strl__free(gltf->views);
@@ -306,6 +312,9 @@ static void gltf_close(strl_reader *reader)
     strl__free(gltf->nodes);
     strl__free(gltf->materials);
     strl__free(gltf->scenes);
+    strl__free(gltf->maps);
+    strl__free(gltf->samplers);
+    strl__free(gltf->images);
     strl__free(gltf->children);
     strl__free(gltf->roots);
     strl__free(gltf->world);

@@ -11,7 +11,10 @@
 
 static uint64_t limit_of(const strl__gltf *gltf)
 {
-    return gltf->reader->memory_bytes / 2 - gltf->table_bytes - gltf->arena.total_bytes;
+    const uint64_t half = gltf->reader->memory_bytes / 2;
+    const uint64_t held =
+        gltf->table_bytes + gltf->arena.total_bytes + gltf->reader->textures.held_bytes;
+    return held < half ? half - held : 0;
 }
 
 static void drop(strl__gltf *gltf, strl__gltf_decoded *decoded)
@@ -43,8 +46,10 @@ static strl__gltf_decoded *find_oldest(strl__gltf *gltf)
 strl_status strl__gltf_make_room(strl__gltf *gltf, uint64_t bytes, const char *what,
                                  strl_error *err)
 {
-    const uint64_t limit = limit_of(gltf);
     strl__gltf_decoded *oldest;
+    if (bytes + gltf->decoded_bytes + gltf->draco_bytes > limit_of(gltf))
+        strl__textures_shed(&gltf->reader->textures);
+    const uint64_t limit = limit_of(gltf);
     while (bytes + gltf->decoded_bytes + gltf->draco_bytes > limit &&
            (oldest = find_oldest(gltf)) != NULL)
         drop(gltf, oldest);

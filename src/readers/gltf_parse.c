@@ -48,7 +48,8 @@ static void *keep(strl__gltf *gltf, strl__fields *fields, size_t bytes)
     return block;
 }
 
-static char *keep_text(strl__gltf *gltf, strl__fields *fields, const json_t *value, const char *key)
+char *strl__gltf_keep_text(strl__gltf *gltf, strl__fields *fields, const json_t *value,
+                           const char *key)
 {
     const char *text = strl__fields_text(fields, value, key);
     char *copy = text ? keep(gltf, fields, strlen(text) + 1) : NULL;
@@ -64,7 +65,7 @@ static char *keep_text(strl__gltf *gltf, strl__fields *fields, const json_t *val
 static strl_status parse_buffer(strl__gltf *gltf, strl__fields *fields, const json_t *value)
 {
     strl__gltf_buffer buffer = {.bytes = strl__fields_count(fields, value, "byteLength", 0),
-                                .uri = keep_text(gltf, fields, value, "uri")};
+                                .uri = strl__gltf_keep_text(gltf, fields, value, "uri")};
     strl_status status = fields->status;
     if (!status)
         status = ADD(gltf, buffers, buffer_count, buffer_capacity, fields->err);
@@ -230,6 +231,15 @@ static strl_status parse_accessor(strl__gltf *gltf, strl__fields *fields, const 
 
 /* ---- meshes */
 
+static void parse_texcoords(strl__fields *fields, const json_t *attributes,
+                            uint32_t texcoord[STRL__GLTF_SETS])
+{
+    static const char *const names[STRL__GLTF_SETS] = {"TEXCOORD_0", "TEXCOORD_1", "TEXCOORD_2",
+                                                       "TEXCOORD_3"};
+    for (unsigned set = 0; set < STRL__GLTF_SETS; set++)
+        texcoord[set] = strl__fields_index(fields, attributes, names[set]);
+}
+
 static strl__gltf_draco_use *parse_draco(strl__gltf *gltf, strl__fields *fields,
                                          const json_t *value)
 {
@@ -244,6 +254,7 @@ static strl__gltf_draco_use *parse_draco(strl__gltf *gltf, strl__fields *fields,
         .normal = strl__fields_index(fields, attributes, "NORMAL"),
         .colour = strl__fields_index(fields, attributes, "COLOR_0"),
     };
+    parse_texcoords(fields, attributes, draco->texcoord);
     return draco;
 }
 
@@ -260,6 +271,7 @@ static strl_status parse_primitive(strl__gltf *gltf, strl__fields *fields, const
         .normal = strl__fields_index(fields, attributes, "NORMAL"),
         .colour = strl__fields_index(fields, attributes, "COLOR_0"),
     };
+    parse_texcoords(fields, attributes, primitive.texcoord);
     if (mode > 6)
         strl__fields_fail(fields, "primitives.mode", "a mode of 0 to 6");
     if (draco)
@@ -275,7 +287,7 @@ static strl_status parse_primitive(strl__gltf *gltf, strl__fields *fields, const
 static strl_status parse_mesh(strl__gltf *gltf, strl__fields *fields, const json_t *value)
 {
     const json_t *list = strl__fields_list(fields, value, "primitives");
-    strl__gltf_mesh mesh = {.name = keep_text(gltf, fields, value, "name"),
+    strl__gltf_mesh mesh = {.name = strl__gltf_keep_text(gltf, fields, value, "name"),
                             .first_primitive = (uint32_t)gltf->primitive_count,
                             .primitive_count = (uint32_t)json_array_size(list)};
     strl_status status = fields->status;
@@ -342,7 +354,7 @@ static strl_status parse_node(strl__gltf *gltf, strl__fields *fields, const json
 {
     const json_t *instances = strl__fields_extension(fields, value, "EXT_mesh_gpu_instancing");
     const json_t *list = strl__fields_list(fields, value, "children");
-    strl__gltf_node node = {.name = keep_text(gltf, fields, value, "name"),
+    strl__gltf_node node = {.name = strl__gltf_keep_text(gltf, fields, value, "name"),
                             .mesh = strl__fields_index(fields, value, "mesh"),
                             .parent = STRL__NO_ITEM,
                             .part = STRL__NO_ITEM,
@@ -445,17 +457,21 @@ static const struct {
     const char *name;
     bool is_list;
     parse_element parse;
+    bool is_optional; /* what is no list is passed over */
 } members[] = {
-    {"asset", false, parse_asset},
-    {"scene", false, parse_default_scene},
-    {"extensionsRequired", true, parse_required},
-    {"scenes", true, parse_scene},
-    {"nodes", true, parse_node},
-    {"meshes", true, parse_mesh},
-    {"accessors", true, parse_accessor},
-    {"bufferViews", true, parse_view},
-    {"buffers", true, parse_buffer},
-    {"materials", true, strl__gltf_parse_material},
+    {"asset", false, parse_asset, false},
+    {"scene", false, parse_default_scene, false},
+    {"extensionsRequired", true, parse_required, false},
+    {"scenes", true, parse_scene, false},
+    {"nodes", true, parse_node, false},
+    {"meshes", true, parse_mesh, false},
+    {"accessors", true, parse_accessor, false},
+    {"bufferViews", true, parse_view, false},
+    {"buffers", true, parse_buffer, false},
+    {"materials", true, strl__gltf_parse_material, false},
+    {"textures", true, strl__gltf_parse_map, true},
+    {"samplers", true, strl__gltf_parse_sampler, true},
+    {"images", true, strl__gltf_parse_image, true},
 };
 
 static size_t member_index(const char *name)
@@ -482,7 +498,10 @@ static strl_status take(void *context, const char *member, uint64_t index, const
     if (members[which].is_list && index == STRL__JSON_WHOLE && json_is_object(value) &&
         !gltf->has_asset && !gltf->has_binary)
         gltf->reader->is_foreign = true; /* as glTF 1 has it */
-    if (members[which].is_list != (index != STRL__JSON_WHOLE))
+    const bool is_wrong = members[which].is_list != (index != STRL__JSON_WHOLE);
+    if (is_wrong && members[which].is_optional)
+        return STRL_OK;
+    if (is_wrong)
         return members[which].is_list
                    ? strl__fail(err, STRL_ERR_UNSUPPORTED,
                                 "%s: expected glTF 2.0, whose %s are a list, found %s", path,

@@ -75,7 +75,7 @@ static json_t *describe(const strl_reader *reader, const pass_result *pass)
         json_array_append_new(materials, json_pack("[s,I]", name, (json_int_t)rgba));
     }
     snprintf(hash, sizeof hash, "%016" PRIx64, pass->hash);
-    return json_pack("{s:s,s:s,s:i,s:I,s:b,s:I,s:I,s:I,s:I,s:s,s:I,s:I,s:I,s:I,s:o,s:o,s:O}",
+    return json_pack("{s:s,s:s,s:i,s:I,s:b,s:I,s:I,s:I,s:I,s:s,s:I,s:I,s:I,s:I,s:o,s:o,s:O,s:I,s:s}",
                      "format", info.format, "unit", info.default_unit ? info.default_unit : "",
                      "up", (int)info.default_up, "hint", (json_int_t)info.triangles_hint, "exact",
                      (int)info.hint_is_exact, "bytes", (json_int_t)info.file_bytes, "bytes_done",
@@ -84,7 +84,9 @@ static json_t *describe(const strl_reader *reader, const pass_result *pass)
                      "hash", hash, "nonfinite", (json_int_t)pass->drops.nonfinite, "degenerate",
                      (json_int_t)pass->drops.degenerate_faces, "lines",
                      (json_int_t)pass->drops.lines, "points", (json_int_t)pass->drops.points,
-                     "parts", parts, "materials", materials, "triangles", pass->triangles);
+                     "parts", parts, "materials", materials, "triangles", pass->triangles,
+                     "missing_images", (json_int_t)strl_reader_missing_image_count(reader),
+                     "missing_image", strl_reader_missing_image(reader));
 }
 
 int main(int argc, char **argv)
