@@ -20,7 +20,8 @@ import tables
 
 MODELS = ("isosurface_3k", "isosurface_6k")
 ONE_EACH = ("build", "images_orbit", "images_flythrough", "psnr_orbit", "psnr_flythrough", "verify", "backends",
-            "rate", "bytes", "sizes", "dependencies", "walk", "scale", "shapes", "cap", "walk_cold", "claims", "decode", "kills")
+            "rate", "bytes", "sizes", "dependencies", "walk", "scale", "shapes", "cap", "walk_cold", "claims", "decode", "kills",
+            "model", "assembly")
 
 
 class Test:
