@@ -6,7 +6,7 @@ import signal
 import subprocess
 from random import Random
 
-from building import assert_refused, must, run, run_tests, sanitizers
+from building import NotHere, assert_refused, must, run, run_tests, sanitizers
 from resuming import Build, Scene, read
 
 # Under a sanitizer, where a build takes ten times as long, fewer kills of a smaller model.
@@ -171,8 +171,7 @@ def on_a_full_disk_it_waits_for_room(folder):
     mounted = os.geteuid() == 0 and subprocess.run(["mount", "-t", "tmpfs", "-o", "size=24m", "tmpfs", disk],
                                                    stderr=subprocess.DEVNULL).returncode == 0
     if not mounted:
-        print("mount is not allowed: no small disk to fill")
-        return
+        raise NotHere("mount is not allowed: no small disk to fill")
     try:
         scene, filler = Scene(disk, SMALL), os.path.join(disk, "filler")
         stops = 0
