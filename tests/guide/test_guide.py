@@ -111,6 +111,15 @@ class Test:
         errors = [float(e) for e in re.findall(r"wrong by at most ([\d.]+) pixels, part", out)]
         self.check("a settled front keeps the pixel error", errors and max(errors) <= 1, out)
 
+    def an_empty_model_is_walked_too(self):
+        lines, empty = self.folder / "lines.obj", self.folder / "lines.stroll"
+        lines.write_text("v 0 0 0\nv 1 0 0\nl 1 2\n")
+        self.run("stroll", "build", lines, "-o", empty, "--quiet")
+        out = self.run("guide_first_walk", empty)
+        frames = re.findall(r"^frame \d: \d nodes, 0 triangles, 0 nodes still", out, re.M)
+        self.check("a model without a triangle has ten frames without one, and no corner", len(frames) == 10 and
+                   "of level" not in out, out)
+
     def own_source_keeps_its_budget(self):
         pack = self.folder / "pack.bin"
         pack.write_bytes(bytes(PACK_HEAD) + self.model.read_bytes())
@@ -169,6 +178,7 @@ class Test:
         self.blocks_are_the_code()
         self.makes_a_model()
         self.first_walk_walks()
+        self.an_empty_model_is_walked_too()
         self.own_source_keeps_its_budget()
         self.errors_are_sentences()
         self.builder_builds()
