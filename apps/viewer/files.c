@@ -149,6 +149,7 @@ void strl__viewer_remember(strl__viewer *v)
 {
     strl_error err = {0};
     strl_settings *settings = &v->settings;
+    strl_settings_renew(settings);
     if ((double)v->controls.error_px != v->begun.error_px)
         settings->error_px = v->controls.error_px;
     if (v->desc.memory_bytes != v->begun.memory_bytes)

@@ -77,6 +77,39 @@ static void settings_and_bookmarks_come_back(void **state)
     strl_path_remove(path, NULL);
 }
 
+/* Two windows, a model each: the one that is closed last forgets nothing of the other's. */
+static void what_another_window_wrote_is_kept(void **state)
+{
+    (void)state;
+    static strl_bookmarks bookmarks, found;
+    static const uint8_t ids[2][16] = {{1}, {2}};
+    const char *path = strl_test_path("viewer.json");
+    strl_navigator navigator;
+    strl_navigator_init(&navigator, bounds, 2, 1);
+    assert_true(strl_bookmarks_add(&bookmarks, "", &navigator));
+    strl_settings windows[2] = {load(path), load(path)};
+    windows[0].error_px = 0.25;
+    for (int w = 0; w < 2; w++) {
+        if (w == 1)
+            strl_settings_renew(&windows[w]);
+        strl_settings_set_bookmarks(&windows[w], ids[w], &bookmarks);
+        assert_int_equal(strl_settings_save(&windows[w], NULL), STRL_OK);
+    }
+    strl_settings settings = load(path);
+    assert_true(settings.error_px == 0.25);
+    for (int w = 0; w < 2; w++) {
+        strl_settings_get_bookmarks(&settings, ids[w], &found);
+        assert_int_equal(found.count, 1);
+        strl_settings_deinit(&windows[w]);
+    }
+    write_file(path, "oops"); /* what is known stays */
+    strl_settings_renew(&settings);
+    strl_settings_get_bookmarks(&settings, ids[1], &found);
+    assert_int_equal(found.count, 1);
+    strl_settings_deinit(&settings);
+    strl_path_remove(path, NULL);
+}
+
 static void what_is_not_understood_stays(void **state)
 {
     (void)state;
@@ -195,6 +228,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(settings_and_bookmarks_come_back),
+        cmocka_unit_test(what_another_window_wrote_is_kept),
         cmocka_unit_test(what_is_not_understood_stays),
         cmocka_unit_test(a_broken_file_is_told_and_not_overwritten),
         cmocka_unit_test(folders_are_made_and_nothing_is_written_without_a_name),
