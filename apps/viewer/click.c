@@ -69,7 +69,7 @@ void strl__viewer_click(strl__viewer *v, const strl_click *click)
 
 static void look_at(strl__viewer *v, const double bounds[6])
 {
-    strl_recorder_stop(&v->recorder);
+    strl__viewer_end_replay(v);
     if (v->controls.mode == STRL_NAVIGATOR_WALK)
         v->controls.mode = STRL_NAVIGATOR_ORBIT;
     strl_pose pose = strl_navigator_pose_on(&v->navigator, bounds);

@@ -78,7 +78,7 @@ void strl__viewer_walk(strl__viewer *v)
 
 /* ---- paths */
 
-static void end_recording(strl__viewer *v)
+static void save_path(strl__viewer *v)
 {
     char path[4096];
     strl_error err = {0};
@@ -89,6 +89,18 @@ static void end_recording(strl__viewer *v)
     }
     strl__viewer_say(v, "saved %.300s", path);
     strl_journal_write(v->journal, "path", json_pack("{s:s,s:i}", "file", path, "frames", (int)v->recorder.path.count));
+}
+
+void strl__viewer_end_recording(strl__viewer *v)
+{
+    if (v->recorder.state == STRL_RECORDER_RECORDS)
+        save_path(v);
+}
+
+void strl__viewer_end_replay(strl__viewer *v)
+{
+    if (v->recorder.state == STRL_RECORDER_REPLAYS)
+        strl_recorder_stop(&v->recorder);
 }
 
 void strl__viewer_toggle_record(strl__viewer *v)
@@ -105,8 +117,7 @@ void strl__viewer_toggle_record(strl__viewer *v)
 
 void strl__viewer_toggle_replay(strl__viewer *v)
 {
-    if (v->recorder.state == STRL_RECORDER_RECORDS)
-        end_recording(v);
+    strl__viewer_end_recording(v);
     if (v->recorder.state == STRL_RECORDER_REPLAYS) {
         strl_recorder_stop(&v->recorder);
     } else if (!strl_recorder_replay(&v->recorder)) {
@@ -136,10 +147,10 @@ static void record(strl__viewer *v, double seconds)
 {
     if (v->recorder.state == STRL_RECORDER_RECORDS && v->navigator.orthographic)
         v->path_ends = true;
-    else if (!strl_recorder_add(&v->recorder, &v->camera, seconds))
-        strl__viewer_say(v, "the path is as long as one can be: recording has stopped");
+    else if (!strl_recorder_add(&v->recorder, &v->camera, seconds)) /* as long as one can be */
+        save_path(v);
     if (v->path_ends)
-        end_recording(v);
+        strl__viewer_end_recording(v);
     v->path_ends = false;
 }
 
@@ -165,8 +176,8 @@ bool strl__viewer_move(strl__viewer *v, const strl_window_input *input, double s
 {
     double step = fmin(seconds, MOST_STEP_SECONDS);
     bool went = v->navigator.going > 0;
-    if (hand_moves(input) && v->recorder.state == STRL_RECORDER_REPLAYS)
-        strl_recorder_stop(&v->recorder);
+    if (hand_moves(input))
+        strl__viewer_end_replay(v);
     follow_controls(v);
     strl_navigator_drag_left(&v->navigator, input->left[0], input->left[1]);
     strl_navigator_drag_right(&v->navigator, input->right[0], input->right[1]);
