@@ -203,8 +203,8 @@ void show_section(const place &at, const strl_gui_facts *facts, strl_gui_control
     /* Beside the main panel, or below where the parts are there. */
     float left = (panel_width + 2 * margin) * at.scale;
     bool room = at.width >= left + (panel_width + margin) * at.scale + (controls->parts ? left : 0);
-    begin_panel(at, "Section", room ? left : margin * at.scale, room ? margin * at.scale : at.height - margin * at.scale,
-                0, room ? 0 : 1, 0);
+    begin_panel(at, "Section", room ? left : margin * at.scale,
+                room ? margin * at.scale : at.height - margin * at.scale, 0, room ? 0 : 1, 0);
     for (uint32_t axis = 0; axis < 3; axis++) {
         asks(controls, axes[axis], STRL_ACTION_SECTION_AXIS, axis);
         ImGui::SameLine();

@@ -94,9 +94,9 @@ static void tell_rest(strl__viewer *v)
     double cursor[2];
     strl_window_cursor(v->window, cursor);
     if (v->stirred)
-        strl_journal_write(v->journal, "rest",
-                           json_pack("{s:[f,f],s:I}", "cursor", cursor[0], cursor[1], "frames",
-                                     (json_int_t)v->frames_shown));
+        strl_journal_write(
+            v->journal, "rest",
+            json_pack("{s:[f,f],s:I}", "cursor", cursor[0], cursor[1], "frames", (json_int_t)v->frames_shown));
     v->stirred = false;
 }
 

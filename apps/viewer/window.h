@@ -27,7 +27,7 @@ typedef struct strl_window_input {
     unsigned click_count;
     unsigned dropped_count; /* files let fall on the window at once */
     char dropped[4096];     /* the first of them; empty where its path is too long */
-    bool touched;       /* something happened at all */
+    bool touched;           /* something happened at all */
 } strl_window_input;
 
 typedef struct strl_window strl_window;

@@ -435,6 +435,42 @@ def check_memory(stroll, display, container, folder):
         viewer.end()
 
 
+def newest_bookmark(display):
+    """The eye of it; of the model that was written last."""
+    text = (pathlib.Path(display.environment["XDG_CONFIG_HOME"]) / "stroll/viewer.json").read_text()
+    return list(json.loads(text)["bookmarks"].values())[-1][-1]["eye"]
+
+
+def check_roof(stroll, display, folder):
+    """Who walks off the floor under a roof stays below it."""
+    folder.mkdir()
+    mesh, container = folder / "porch.obj", folder / "porch.stroll"
+    write_obj(mesh, {"floor": ("wood", (0, -5, -0.2), (10, 5, 0)), "roof": ("tile", (-10, -5, 2.5), (-0.5, 5, 2.7))})
+    subprocess.run([stroll, "build", mesh, "-o", container, "--up", "z", "--unit", "m", "--quiet"], check=True,
+                   stdout=subprocess.DEVNULL)
+    viewer = Viewer(stroll, display, container, folder, size=SIZE)
+    try:
+        viewer.event("opened")
+        viewer.rest()
+        assert viewer.click(640, 440)["part"] == "floor"
+        viewer.key("g")
+        start = viewer.event("arrived")["eye"]
+        assert abs(start[2] - 1.7) < 1e-3 and start[0] < 8, start
+        eye = start
+        while eye[0] > -1:  # a slow machine makes small steps
+            viewer.tool("keydown", "w")
+            time.sleep(1)
+            viewer.tool("keyup", "w")
+            viewer.key("b")
+            viewer.event("said")
+            viewer.rest()  # it is written by then
+            eye = newest_bookmark(display)
+        assert eye[0] > -10 and abs(eye[2] - 1.7) < 0.01, f"{eye}: the walker was lifted onto the roof"
+        viewer.quit()
+    finally:
+        viewer.end()
+
+
 def check_scale(stroll, display, container, folder):
     """Where the desktop wants text twice as large, the panel is twice as wide."""
     def colour_beside_panel():
@@ -529,6 +565,7 @@ def main():
         with Display((SIZE[0] + 40, SIZE[1] + 40)) as display:
             run_session(stroll, display, container, boxes, folder / "auto", pictures)
             check_memory(stroll, display, container, folder / "again")
+            check_roof(stroll, display, folder / "roof")
             check_scale(stroll, display, container, folder / "scale")
         with Display((SIZE[0] + 40, SIZE[1] + 40)) as display:
             run_session(stroll, display, container, boxes, folder / "gl3", None, "--backend", "gl3")
