@@ -26,9 +26,9 @@ static void find_names(strl__viewer *v, strl_picked *picked)
 static void journal_pick(strl__viewer *v, const strl_picked *picked)
 {
     double difference[3], distance = strl_picks_distance(&v->picks, difference);
-    json_t *object = json_pack("{s:s,s:s,s:o,s:o,s:f}", "part", picked->part, "material", picked->material, "point",
-                               strl_journal_vector(picked->pick.point), "normal",
-                               strl_journal_vector(picked->pick.normal), "error", picked->pick.error);
+    json_t *object = json_pack("{s:o,s:o,s:o,s:o,s:f}", "part", strl_journal_text(picked->part), "material",
+                               strl_journal_text(picked->material), "point", strl_journal_vector(picked->pick.point),
+                               "normal", strl_journal_vector(picked->pick.normal), "error", picked->pick.error);
     if (object && distance >= 0) {
         json_object_set_new(object, "distance", json_real(distance));
         json_object_set_new(object, "difference", strl_journal_vector(difference));

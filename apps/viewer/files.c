@@ -90,8 +90,8 @@ strl_status strl__viewer_open_model(strl__viewer *v, const char *path, strl_erro
     strl_settings_get_bookmarks(&v->settings, info->model_id, &v->bookmarks);
     strl__viewer_reset(v);
     strl_journal_write(v->journal, "opened",
-                       json_pack("{s:s,s:I,s:i}", "file", path, "triangles", (json_int_t)model->triangles, "parts",
-                                 (int)info->part_count));
+                       json_pack("{s:o,s:I,s:i}", "file", strl_journal_text(path), "triangles",
+                                 (json_int_t)model->triangles, "parts", (int)info->part_count));
     if (model->triangles == 0)
         strl__viewer_say(v, "the model is empty: of its file %llu lines, %llu points and no triangle were found",
                          (unsigned long long)info->dropped_lines, (unsigned long long)info->dropped_points);
@@ -136,7 +136,7 @@ void strl__viewer_poll_opener(strl__viewer *v)
     if (v->news.state == STRL_OPENER_READY)
         open_built(v);
     if (v->news.state == STRL_OPENER_FAILED) {
-        strl_journal_write(v->journal, "build", json_pack("{s:s}", "failed", v->news.error.message));
+        strl_journal_write(v->journal, "build", json_pack("{s:o}", "failed", strl_journal_text(v->news.error.message)));
         strl__viewer_say(v, "%s", v->news.error.status == STRL_ERR_CANCELLED ? "cancelled" : v->news.error.message);
         v->frames_left = STRL__FRAMES_AFTER_INPUT;
     }

@@ -19,7 +19,7 @@ static void take_screenshot(strl__viewer *v)
         return;
     }
     strl__viewer_say(v, "saved %.300s", path);
-    strl_journal_write(v->journal, "screenshot", json_pack("{s:s}", "file", path));
+    strl_journal_write(v->journal, "screenshot", json_pack("{s:o}", "file", strl_journal_text(path)));
 }
 
 static strl_draw_options draw_options(const strl__viewer *v)

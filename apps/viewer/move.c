@@ -92,7 +92,8 @@ static void save_path(strl__viewer *v)
         return;
     }
     strl__viewer_say(v, "saved %.300s", path);
-    strl_journal_write(v->journal, "path", json_pack("{s:s,s:i}", "file", path, "frames", (int)v->recorder.path.count));
+    strl_journal_write(v->journal, "path",
+                       json_pack("{s:o,s:i}", "file", strl_journal_text(path), "frames", (int)v->recorder.path.count));
 }
 
 void strl__viewer_end_recording(strl__viewer *v)

@@ -52,7 +52,7 @@ void strl__viewer_say(strl__viewer *v, const char *format, ...)
     vsnprintf(v->message, sizeof v->message, format, arguments);
     va_end(arguments);
     v->message_end_ns = strl_clock_ns() + (uint64_t)(MESSAGE_SECONDS * 1e9);
-    strl_journal_write(v->journal, "said", json_pack("{s:s}", "text", v->message));
+    strl_journal_write(v->journal, "said", json_pack("{s:o}", "text", strl_journal_text(v->message)));
 }
 
 /* ---- the loop */

@@ -10,6 +10,7 @@
 
 #include "platform/file.h"
 #include "support/folder.h"
+#include "viewer/journal.h"
 #include "viewer/recorder.h"
 #include "viewer/settings.h"
 
@@ -171,6 +172,35 @@ static void folders_are_made_and_nothing_is_written_without_a_name(void **state)
     assert_int_equal(strl_path_remove_directory(above, NULL), STRL_OK);
 }
 
+/* ---- the log */
+
+static void the_log_tells_of_files_whose_names_are_not_utf8(void **state)
+{
+    (void)state;
+    FILE *journal;
+    char line[200] = "";
+    const char *path = strl_test_path("log.jsonl");
+    assert_int_equal(strl_journal_open(path, &journal, NULL), STRL_OK);
+    strl_journal_write(journal, "opened",
+                       json_pack("{s:o}", "file",
+                                 strl_journal_text("br\xfc"
+                                                   "cke.obj")));
+    strl_journal_write(journal, "opened",
+                       json_pack("{s:o}", "file",
+                                 strl_journal_text("br\xc3\xbc"
+                                                   "cke.obj")));
+    strl_journal_close(journal);
+    journal = fopen(path, "r");
+    assert_non_null(journal);
+    assert_non_null(fgets(line, sizeof line, journal));
+    assert_string_equal(line, "{\"file\":\"br?cke.obj\",\"event\":\"opened\"}\n");
+    assert_non_null(fgets(line, sizeof line, journal));
+    assert_string_equal(line, "{\"file\":\"br\xc3\xbc"
+                              "cke.obj\",\"event\":\"opened\"}\n");
+    fclose(journal);
+    strl_path_remove(path, NULL);
+}
+
 /* ---- paths */
 
 static strl_camera camera_at(double x)
@@ -232,6 +262,7 @@ int main(void)
         cmocka_unit_test(what_is_not_understood_stays),
         cmocka_unit_test(a_broken_file_is_told_and_not_overwritten),
         cmocka_unit_test(folders_are_made_and_nothing_is_written_without_a_name),
+        cmocka_unit_test(the_log_tells_of_files_whose_names_are_not_utf8),
         cmocka_unit_test(a_path_is_recorded_in_equal_times_and_replayed),
     };
     return cmocka_run_group_tests(tests, strl_test_folder_make, strl_test_folder_remove);
