@@ -16,7 +16,8 @@ import tempfile
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
-from view_window import Display, Viewer, differing_share, pixels, write_png
+from png import write_png
+from view_window import Display, Viewer, differing_share, pixels
 from x11_drop import X11
 
 SKIPPED = 77
