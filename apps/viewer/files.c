@@ -98,6 +98,12 @@ strl_status strl__viewer_open_model(strl__viewer *v, const char *path, strl_erro
     return STRL_OK;
 }
 
+static bool is_same_model(const strl_viewer_model *a, const strl_viewer_model *b)
+{
+    const uint8_t *id = strl_container_get_info(a->container)->model_id;
+    return memcmp(id, strl_container_get_info(b->container)->model_id, 16) == 0;
+}
+
 /* The walk and the renderer begin anew, the rest stays. */
 strl_status strl__viewer_set_budgets(strl__viewer *v, strl_error *err)
 {
@@ -106,6 +112,8 @@ strl_status strl__viewer_set_budgets(strl__viewer *v, strl_error *err)
     v->desc.memory_bytes = (uint64_t)((double)v->controls.memory_mib * (1 << 20));
     v->desc.gpu_memory_bytes = (uint64_t)((double)v->controls.gpu_memory_mib * (1 << 20));
     strl_status status = open_walk(v, v->path, &model, err);
+    if (status == STRL_OK && !is_same_model(v->model, model))
+        status = strl__fail(err, STRL_ERR_ARGUMENT, "%s holds another model now: drop it here to open that", v->path);
     if (status == STRL_OK)
         status = strl__viewer_make_renderer(v, err);
     if (status == STRL_OK) {

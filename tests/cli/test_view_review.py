@@ -472,6 +472,28 @@ def check_roof(stroll, display, folder):
         viewer.end()
 
 
+def check_replaced(stroll, display, container, folder):
+    """A new budget opens the file anew: another model that is there by now does not get the names of the first."""
+    folder.mkdir()
+    mesh, other, mine = folder / "other.obj", folder / "other.stroll", folder / "mine.stroll"
+    write_obj(mesh, {"cube": ("wood", (0, 0, 0), (1, 1, 1))})
+    subprocess.run([stroll, "build", mesh, "-o", other, "--quiet"], check=True, stdout=subprocess.DEVNULL)
+    shutil.copy(container, mine)
+    viewer = Viewer(stroll, display, mine, folder, size=SIZE)
+    try:
+        viewer.event("opened")
+        viewer.rest()
+        other.replace(mine)
+        viewer.press(100, 340)  # budgets
+        viewer.point(150, 363)
+        viewer.tool("mousedown", "1", "mousemove", "200", "363", "mouseup", "1")
+        assert "another model" in viewer.event("said")["text"]
+        assert viewer.click(640, 440)["part"] == "site/house/walls"
+        viewer.quit()
+    finally:
+        viewer.end()
+
+
 def check_scale(stroll, display, container, folder):
     """Where the desktop wants text twice as large, the panel is twice as wide."""
     def colour_beside_panel():
@@ -567,6 +589,7 @@ def main():
             run_session(stroll, display, container, boxes, folder / "auto", pictures)
             check_memory(stroll, display, container, folder / "again")
             check_roof(stroll, display, folder / "roof")
+            check_replaced(stroll, display, container, folder / "replaced")
             check_scale(stroll, display, container, folder / "scale")
         with Display((SIZE[0] + 40, SIZE[1] + 40)) as display:
             run_session(stroll, display, container, boxes, folder / "gl3", None, "--backend", "gl3")
