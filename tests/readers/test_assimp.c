@@ -133,7 +133,8 @@ static void hanging_is_one_sentence(void **state)
     assert_import_fails("exec sleep 1000", STRL_ERR_LIMIT, "takes more than 4 s and was stopped");
     assert_import_fails("head -c 30 stream; exec >&-; exec sleep 1000", STRL_ERR_LIMIT, "takes more than");
     assert_import_fails("sleep 1000 & kill -9 $$", STRL_ERR_LIMIT, "takes more than"); /* the pipe stays open */
-    assert_import_fails("while :; do :; done", STRL_ERR_LIMIT, "takes more than 1 s of processor time and was stopped");
+    /* Of processor time, unless others have so much of it that the clock comes first; test_process has that limit alone. */
+    assert_import_fails("while :; do :; done", STRL_ERR_LIMIT, "and was stopped");
     child = (strl_reader_child){0};
     assert_true(strl_clock_ns() - start < 60000000000u);
 }
