@@ -21,6 +21,8 @@ typedef struct strl_build_context {
     bool keep;             /* checkpoints are made (checkpoint.h); settled when the survey is done */
     bool has_checkpoint;   /* there is one in the scratch folder */
     strl_writer resumed;   /* the builder's words in the checkpoint to go on with; empty = from the beginning */
+    strl_writer beside;    /* files that inputs name and that were read, as in a checkpoint; empty = none */
+    uint32_t beside_count;
     strl_build_progress progress;
     strl_estimate estimate;
     uint64_t stage_ns, stage_cpu_ns; /* when the stage under way began, by the clock and by the processor */

@@ -211,6 +211,7 @@ static strl_status run_in_scratch(strl_build_context *context, strl_scratch *scr
     strl_spill_set_destroy(context->spills);
     strl_pool_destroy(context->pool);
     strl__free(context->resumed.data);
+    strl__free(context->beside.data);
     return status;
 }
 

@@ -228,6 +228,13 @@ static void count_drops(strl__gltf *gltf, const strl__gltf_primitive *primitive,
         drops->degenerate_faces += times; /* corners are left that make no face */
 }
 
+/* Those without any are passed over at once: they may have as many instances as a file cares to say. */
+static bool has_triangles(const strl__gltf *gltf, const strl__gltf_primitive *primitive)
+{
+    return primitive->position != STRL__NO_ITEM &&
+           strl__gltf_triangle_count(primitive->mode, strl__gltf_element_count(gltf, primitive)) > 0;
+}
+
 /* To the next primitive of triangles, node by node, and in each instance by instance. NULL: the
  * end. */
 static const strl__gltf_primitive *find_placement(strl__gltf *gltf)
@@ -242,8 +249,7 @@ static const strl__gltf_primitive *find_placement(strl__gltf *gltf)
                 &gltf->primitives[mesh->first_primitive + pass->primitive];
             if (pass->instance == 0)
                 count_drops(gltf, primitive, instance_count(node));
-            if (pass->instance < instance_count(node) && primitive->mode >= 4 &&
-                primitive->position != STRL__NO_ITEM)
+            if (pass->instance < instance_count(node) && has_triangles(gltf, primitive))
                 return primitive;
             pass->instance = 0;
         }

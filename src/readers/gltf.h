@@ -92,6 +92,8 @@ typedef struct strl__gltf_primitive {
     uint32_t indices, material;        /* or STRL__NO_ITEM, as all below */
     uint32_t position, normal, colour; /* accessors */
     strl__gltf_draco_use *draco;       /* in the arena; NULL: not compressed */
+    bool has_range;                    /* the next two are known */
+    uint32_t lowest, highest;          /* of its indices; beyond its vertices perhaps */
 } strl__gltf_primitive;
 
 typedef struct strl__gltf_mesh {
@@ -155,6 +157,8 @@ typedef struct strl__gltf_pass {
     uint64_t instance;
     uint64_t triangle, triangle_count;
     uint64_t vertex_count;
+    uint64_t first_loaded, loaded_count; /* vertices that are in the reader's table, where there are indices */
+    bool is_scattered;                   /* none are: each corner is looked up by itself */
     uint64_t done; /* triangles, of all placements so far */
     uint32_t part, material;
     strl__gltf_matrix placement;
@@ -289,7 +293,18 @@ strl_status strl__gltf_check_scene(strl__gltf *gltf, strl_error *err);
 uint64_t strl__gltf_element_count(const strl__gltf *gltf, const strl__gltf_primitive *primitive);
 uint64_t strl__gltf_triangle_count(unsigned mode, uint64_t elements);
 
+/* ---- gltf_range.c */
+/* Which of its vertices the placement that begins has to load: those from its lowest to its highest
+ * index, unless that is far more than it has corners. So the work is in proportion to triangles,
+ * whatever the accessor counts: many exporters give all primitives the vertices of the model. */
+strl_status strl__gltf_find_range(strl__gltf *gltf, strl__gltf_primitive *primitive,
+                                  uint64_t elements, strl_error *err);
+
 /* ---- gltf_primitive.c: triangles */
+/* Indices of the primitive's vertices, of a Draco mesh from `first`, a multiple of 3, as many. */
+strl_status strl__gltf_read_elements(strl__gltf *gltf, const strl__gltf_primitive *primitive,
+                                     uint64_t first, size_t count, uint32_t *elements,
+                                     strl_error *err);
 /* The reader's table of vertices, with its layout but no vertex. */
 void strl__gltf_empty_table(strl_reader *reader);
 /* Begins the placement that pass stands at. */

@@ -94,6 +94,9 @@ static strl_status open_file(strl__gltf *gltf, uint32_t index, strl_error *err)
                             "%s, buffers[%u]: expected %" PRIu64 " bytes, found %" PRIu64 " in %s",
                             gltf->reader->path, index, buffer->bytes, buffer->opened.bytes,
                             strl_file_path(buffer->file));
+    if (!status)
+        status = strl__reader_note_beside(gltf->reader, strl_file_path(buffer->file),
+                                          &buffer->opened, err);
     strl__free(path);
     strl__free(raw);
     return status;
@@ -121,6 +124,7 @@ static strl_status open_binary(strl__gltf *gltf, uint32_t index, strl_error *err
 typedef struct data_text {
     strl__gltf *gltf;
     uint32_t index;
+    strl_file *file;  /* the model's, or its text in UTF-8; borrowed */
     uint64_t at, end; /* in the file */
     uint64_t decoded; /* bytes so far */
     uint32_t bits, bit_count;
@@ -190,7 +194,7 @@ static strl_status pass_header(data_text *text, strl_error *err)
     char header[HEADER_BYTES_MAX + 1];
     size_t size =
         text->end - text->at < HEADER_BYTES_MAX ? (size_t)(text->end - text->at) : HEADER_BYTES_MAX;
-    strl_status status = strl_file_read(text->gltf->reader->file, text->at, header, size, err);
+    strl_status status = strl_file_read(text->file, text->at, header, size, err);
     if (status)
         return status;
     header[size] = 0;
@@ -212,7 +216,7 @@ static strl_status decode_text(data_text *text, strl_error *err)
     while (!status && text->at < text->end) {
         const uint64_t begin = text->at, left = text->end - begin;
         size_t size = left < sizeof chars ? (size_t)left : sizeof chars;
-        status = strl_file_read(text->gltf->reader->file, begin, chars, size, err);
+        status = strl_file_read(text->file, begin, chars, size, err);
         if (!status)
             status = decode_base64(text, chars, size, err);
         if (text->at != begin + size)
@@ -254,7 +258,7 @@ static strl_status make_place(strl__gltf *gltf, uint32_t index, strl_error *err)
 /* uri is "data:@OFFSET+BYTES", as the JSON's splitter writes it. */
 static strl_status open_text(strl__gltf *gltf, uint32_t index, strl_error *err)
 {
-    data_text text = {.gltf = gltf, .index = index};
+    data_text text = {.gltf = gltf, .index = index, .file = gltf->reader->input.file};
     uint64_t bytes;
     strl__gltf_buffer *buffer = &gltf->buffers[index];
     if (sscanf(buffer->uri, "data:@%" SCNu64 "+%" SCNu64, &text.at, &bytes) != 2)

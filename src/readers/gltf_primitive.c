@@ -218,18 +218,18 @@ void strl__gltf_empty_table(strl_reader *reader)
                       strl__gltf_table_bytes(reader));
 }
 
-/* All of them, into the reader's table. */
+/* Those that its indices use, into the reader's table. */
 static strl_status load_vertices(strl__gltf *gltf, const strl__gltf_primitive *primitive,
                                  strl_error *err)
 {
     strl_reader *reader = gltf->reader;
-    const uint64_t total = gltf->pass.vertex_count;
+    const uint64_t total = gltf->pass.loaded_count, begin = gltf->pass.first_loaded;
     strl_status status = STRL_OK;
     strl__gltf_empty_table(reader);
     for (uint64_t first = 0; first < total && !status; first += STRL__GLTF_CHUNK) {
         size_t count =
             total - first < STRL__GLTF_CHUNK ? (size_t)(total - first) : STRL__GLTF_CHUNK;
-        status = read_corners(gltf, primitive, first, count, gltf->corners, err);
+        status = read_corners(gltf, primitive, begin + first, count, gltf->corners, err);
         for (size_t i = 0; i < count && !status; i++)
             status = strl__table_append(&reader->vertices, &gltf->corners[i], err);
     }
@@ -257,8 +257,9 @@ static strl_status place_instance(strl__gltf *gltf, const strl__gltf_instances *
     return status;
 }
 
-static strl_status read_elements(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                 uint64_t first, size_t count, uint32_t *elements, strl_error *err)
+strl_status strl__gltf_read_elements(strl__gltf *gltf, const strl__gltf_primitive *primitive,
+                                     uint64_t first, size_t count, uint32_t *elements,
+                                     strl_error *err)
 {
     if (!gltf->draco)
         return strl__gltf_read_indices(gltf, primitive->indices, first, count, elements, err);
@@ -266,12 +267,29 @@ static strl_status read_elements(strl__gltf *gltf, const strl__gltf_primitive *p
     return STRL_OK;
 }
 
+static strl_status index_fail(const strl__gltf *gltf, const strl__gltf_primitive *primitive,
+                              uint32_t found, uint64_t triangle, strl_error *err)
+{
+    return strl__fail(
+        err, STRL_ERR_FORMAT,
+        "%s, accessors[%u]: expected indices below %" PRIu64 ", found %u in triangle %" PRIu64,
+        gltf->reader->path, primitive->indices, gltf->pass.vertex_count, found, triangle);
+}
+
 static strl_status read_first(strl__gltf *gltf, const strl__gltf_primitive *primitive,
                               strl_error *err)
 {
-    if (primitive->indices != STRL__NO_ITEM)
-        return read_elements(gltf, primitive, 0, 1, &gltf->first_element, err);
-    return read_corners(gltf, primitive, 0, 1, &gltf->first_corner, err);
+    uint64_t vertex = 0;
+    strl_status status = STRL_OK;
+    if (primitive->indices != STRL__NO_ITEM) {
+        status = strl__gltf_read_elements(gltf, primitive, 0, 1, &gltf->first_element, err);
+        vertex = gltf->first_element;
+        if (status || !gltf->pass.is_scattered)
+            return status;
+        if (vertex >= gltf->pass.vertex_count)
+            return index_fail(gltf, primitive, gltf->first_element, 0, err);
+    }
+    return read_corners(gltf, primitive, vertex, 1, &gltf->first_corner, err);
 }
 
 /* Draco keeps triangles as a list, whatever they were. */
@@ -297,11 +315,15 @@ strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primit
     pass->vertex_count = gltf->draco ? strl__draco_point_count(gltf->draco)
                                      : gltf->accessors[primitive->position].count;
     pass->triangle = 0;
+    pass->is_scattered = false;
     pass->triangle_count = strl__gltf_triangle_count(mode_of(primitive), elements);
     gltf->reader->batch.has_corner_colour = primitive->colour != STRL__NO_ITEM;
     if (pass->triangle_count == 0)
         return STRL_OK;
     if (primitive->indices != STRL__NO_ITEM)
+        status = strl__gltf_find_range(gltf, &gltf->primitives[primitive - gltf->primitives],
+                                       elements, err);
+    if (!status && primitive->indices != STRL__NO_ITEM)
         status = load_vertices(gltf, primitive, err);
     if (!status && primitive->mode == 6 && !gltf->draco)
         status = read_first(gltf, primitive, err);
@@ -335,24 +357,18 @@ static void corners_of(unsigned mode, uint64_t triangle, size_t in_chunk, uint32
     }
 }
 
-static strl_status index_fail(const strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                              uint32_t found, uint64_t triangle, strl_error *err)
-{
-    return strl__fail(
-        err, STRL_ERR_FORMAT,
-        "%s, accessors[%u]: expected indices below %" PRIu64 ", found %u in triangle %" PRIu64,
-        gltf->reader->path, primitive->indices, gltf->pass.vertex_count, found, triangle);
-}
-
 static strl_status add_indexed(strl__gltf *gltf, const strl__gltf_primitive *primitive,
                                const uint32_t slots[3], uint64_t triangle, strl_error *err)
 {
+    const strl__gltf_pass *pass = &gltf->pass;
     strl__batch *batch = &gltf->reader->batch;
     for (unsigned i = 0; i < 3; i++) {
         uint32_t index = slots[i] == FAN_CENTRE ? gltf->first_element : gltf->elements[slots[i]];
-        if (index >= gltf->pass.vertex_count)
+        /* Below first_loaded: the file has changed since the range was found. */
+        if (index >= pass->vertex_count || index < pass->first_loaded ||
+            index - pass->first_loaded >= pass->loaded_count)
             return index_fail(gltf, primitive, index, triangle, err);
-        batch->vertex[batch->corner_count + i] = index;
+        batch->vertex[batch->corner_count + i] = index - pass->first_loaded;
     }
     return STRL_OK;
 }
@@ -367,6 +383,22 @@ static void add_corners(strl__gltf *gltf, const uint32_t slots[3])
     }
 }
 
+/* One corner after the other, where the vertices lie far apart; of triangles from `first` on. */
+static strl_status look_up(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t first,
+                           size_t count, strl_error *err)
+{
+    const unsigned mode = mode_of(primitive), shared = mode == 4 ? 0 : mode == 5 ? 2 : 1;
+    strl_status status = STRL_OK;
+    for (size_t i = 0; i < count && !status; i++) {
+        uint32_t index = gltf->elements[i];
+        if (index >= gltf->pass.vertex_count)
+            return index_fail(gltf, primitive, index,
+                              first + (mode == 4 ? i / 3 : i > shared ? i - shared : 0), err);
+        status = read_corners(gltf, primitive, index, 1, &gltf->corners[i], err);
+    }
+    return status;
+}
+
 /* The elements of triangles first .. first + count - 1 into elements or corners. */
 static strl_status read_run(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t first,
                             size_t count, strl_error *err)
@@ -374,9 +406,13 @@ static strl_status read_run(strl__gltf *gltf, const strl__gltf_primitive *primit
     const unsigned mode = mode_of(primitive);
     const uint64_t begin = mode == 4 ? 3 * first : mode == 5 ? first : first + 1;
     const size_t elements = mode == 4 ? 3 * count : mode == 5 ? count + 2 : count + 1;
-    if (primitive->indices != STRL__NO_ITEM)
-        return read_elements(gltf, primitive, begin, elements, gltf->elements, err);
-    return read_corners(gltf, primitive, begin, elements, gltf->corners, err);
+    if (primitive->indices == STRL__NO_ITEM)
+        return read_corners(gltf, primitive, begin, elements, gltf->corners, err);
+    strl_status status =
+        strl__gltf_read_elements(gltf, primitive, begin, elements, gltf->elements, err);
+    if (!status && gltf->pass.is_scattered)
+        status = look_up(gltf, primitive, first, elements, err);
+    return status;
 }
 
 static size_t run_length(const strl__gltf *gltf, unsigned mode)
@@ -411,7 +447,7 @@ strl_status strl__gltf_add_triangles(strl__gltf *gltf, const strl__gltf_primitiv
             corners_of(mode, pass->triangle + i, i, slots);
             if (pass->flips)
                 turn(slots);
-            if (primitive->indices == STRL__NO_ITEM)
+            if (primitive->indices == STRL__NO_ITEM || pass->is_scattered)
                 add_corners(gltf, slots);
             else
                 status = add_indexed(gltf, primitive, slots, pass->triangle + i, err);

@@ -47,6 +47,13 @@ const char *strl__assimp_extension(const char *path);
 /* Whether a file begins as one of those formats; asked where the name says nothing. */
 bool strl__assimp_recognises(const strl__input *input);
 
+/* A file that was read for this one. */
+typedef struct strl__beside {
+    uint64_t key; /* hash of its path */
+    char *path;   /* owned */
+    strl_file_info info;
+} strl__beside;
+
 struct strl_reader {
     const strl__format *format;
     void *state;       /* of the format; owned */
@@ -70,6 +77,9 @@ struct strl_reader {
     strl__batch batch;
     strl__names parts, materials;
     strl__names missing; /* sentences: why files that this one names could not be read */
+    strl__beside *beside; /* owned */
+    size_t beside_count, beside_capacity;
+    uint64_t beside_bytes; /* of their paths */
     strl_reader_drops drops;
     strl_reader_costs costs;
     bool prepared; /* tables and batch are there */
@@ -86,6 +96,10 @@ strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__forma
 /* Fails where an open file is not as it was. */
 strl_status strl__reader_check_unchanged(strl_file *file, const strl_file_info *opened,
                                          strl_error *err);
+
+/* Lists a file beside this one, once, however often it is noted. info NULL: as it is now. */
+strl_status strl__reader_note_beside(strl_reader *reader, const char *path,
+                                     const strl_file_info *info, strl_error *err);
 
 /* Allocates the batch for the reader's tables, which must be complete. */
 strl_status strl__reader_init_batch(strl_reader *reader, bool indexed, strl_error *err);

@@ -7,6 +7,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/hash.h"
 #include "base/memory.h"
 #include "readers/internal.h"
 #include "readers/stranger.h"
@@ -174,6 +175,9 @@ void strl_reader_close(strl_reader *reader)
     strl__names_deinit(&reader->parts);
     strl__names_deinit(&reader->materials);
     strl__names_deinit(&reader->missing);
+    for (size_t i = 0; i < reader->beside_count; i++)
+        strl__free(reader->beside[i].path);
+    strl__free(reader->beside);
     strl_file_close(reader->decoded, NULL); /* without a name: nothing of it is left */
     strl_file_close(reader->file, NULL);    /* only read from */
     strl__free(reader->scratch_dir);
@@ -336,6 +340,46 @@ uint32_t strl_reader_missing_count(const strl_reader *reader)
 const char *strl_reader_missing(const strl_reader *reader, uint32_t index)
 {
     return reader->missing.items[index].text;
+}
+
+/* An entry of its own and no limit of their number: each of them was opened. */
+strl_status strl__reader_note_beside(strl_reader *reader, const char *path,
+                                     const strl_file_info *info, strl_error *err)
+{
+    strl__beside made = {.key = strl__checksum(path, strlen(path))};
+    for (size_t i = 0; i < reader->beside_count; i++)
+        if (reader->beside[i].key == made.key && strcmp(reader->beside[i].path, path) == 0)
+            return STRL_OK;
+    reader->beside_bytes += strlen(path) + sizeof made;
+    if (reader->beside_bytes > reader->memory_bytes / 64)
+        return strl__fail(err, STRL_ERR_LIMIT,
+                          "%s: the names of the files that it names take more than the %" PRIu64
+                          " bytes that the memory budget allows: more --memory may help",
+                          reader->path, reader->memory_bytes / 64);
+    strl_status status = info ? STRL_OK : strl_path_stat(path, &made.info, err);
+    if (status)
+        return status;
+    if (info)
+        made.info = *info;
+    made.path = strl__strdup(path);
+    if (!made.path || !strl__grow(&reader->beside, &reader->beside_capacity,
+                                  reader->beside_count + 1, sizeof made)) {
+        strl__free(made.path);
+        return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", reader->path);
+    }
+    reader->beside[reader->beside_count++] = made;
+    return STRL_OK;
+}
+
+uint32_t strl_reader_beside_count(const strl_reader *reader)
+{
+    return (uint32_t)reader->beside_count;
+}
+
+const char *strl_reader_beside(const strl_reader *reader, uint32_t index, strl_file_info *info)
+{
+    *info = reader->beside[index].info;
+    return reader->beside[index].path;
 }
 
 uint64_t strl_reader_bytes_done(const strl_reader *reader)

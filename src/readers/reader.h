@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "platform/file.h"
 #include "stroll/error.h"
 
 typedef struct strl_reader strl_reader;
@@ -92,6 +93,10 @@ uint64_t strl_reader_vertex_count(const strl_reader *reader);
  * next: what they would bring is as if absent. index < count; why, a sentence that names the file; borrowed until close. */
 uint32_t strl_reader_missing_count(const strl_reader *reader);
 const char *strl_reader_missing(const strl_reader *reader, uint32_t index);
+/* Files beside this one that were read for it (glTF's buffers, OBJ's material libraries; not what an importer opens on its
+ * own), each once, with their facts of then; all of them after a whole pass. index < count; borrowed until close. */
+uint32_t strl_reader_beside_count(const strl_reader *reader);
+const char *strl_reader_beside(const strl_reader *reader, uint32_t index, strl_file_info *info);
 /* Bytes of the file consumed so far in this pass, for progress. */
 uint64_t strl_reader_bytes_done(const strl_reader *reader);
 

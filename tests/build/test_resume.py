@@ -151,6 +151,37 @@ def another_request_is_refused(folder):
     scene.resume("--memory", "2G")
 
 
+def a_changed_file_beside_the_model_is_refused(folder):
+    """What a glTF or an OBJ names is as much of the input as it is itself."""
+    for ending, name in (("gltf", "in_000.bin"), ("obj", "in.mtl")):
+        own = os.path.join(folder, ending)
+        os.mkdir(own)
+        source, beside, out = (os.path.join(own, part) for part in (f"in.{ending}", name, "out.stroll"))
+        must("scene", "plant", "--triangles", SMALL, "-o", source, "--quiet")
+        said = None
+        for attempt in range(20):
+            build = Build(source, "-o", out)
+            build.wait_for(os.path.join(out + ".tmp", "nodes-01.spill"))
+            said = build.stop(signal.SIGKILL)
+            if said is not None:
+                break
+            os.remove(out)
+        assert said is not None, "no build could be stopped"
+        facts = os.stat(beside)
+        os.utime(beside, ns=(facts.st_atime_ns, facts.st_mtime_ns + 10**9))
+        assert_begins_anew(run("build", source, "-o", out, "--resume"), f"{name} was changed")
+        with open(beside, "ab") as file:
+            file.write(b"\n")
+        assert_begins_anew(run("build", source, "-o", out, "--resume"), f"{name} has")
+        os.rename(beside, beside + ".away")
+        assert_begins_anew(run("build", source, "-o", out, "--resume"), name, "No such file")
+        os.rename(beside + ".away", beside)
+        os.truncate(beside, facts.st_size)
+        os.utime(beside, ns=(facts.st_atime_ns, facts.st_mtime_ns))
+        done = must("build", source, "-o", out, "--resume", "--json")
+        assert json.loads(done.output)["resumed"], done
+
+
 def scratch_elsewhere_is_found_again_and_removed(folder):
     scene = Scene(folder, SMALL)
     elsewhere = os.path.join(folder, "elsewhere")
@@ -216,4 +247,5 @@ if sanitizers():  # what reads scratch; the rest is the program's order of work,
 run_tests(killed_at_random_moments_it_resumes, killed_while_it_writes_it_resumes,
           interrupted_it_keeps_what_is_finished, with_nothing_to_resume_it_begins, of_a_small_model_nothing_is_kept, without_resume_it_begins_anew,
           what_was_not_saved_is_cut_off_or_removed, damage_is_found, another_request_is_refused,
+          a_changed_file_beside_the_model_is_refused,
           scratch_elsewhere_is_found_again_and_removed, on_a_full_disk_it_waits_for_room)

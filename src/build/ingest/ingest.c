@@ -6,6 +6,7 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "build/checkpoint.h"
 #include "build/ingest/internal.h"
 #include "platform/file.h"
 #include "platform/thread.h"
@@ -198,12 +199,14 @@ strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, st
     if (status)
         goto done;
     strl__ingest_warn(context, readers, ingest); /* not before: of a refused model only the refusal is told */
-    for (uint32_t i = 0; i < context->desc->input_count; i++) {
+    for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
+        status = strl__request_note_beside(context, readers[i], err);
         strl_reader_close(readers[i]);
         readers[i] = NULL;
     }
     strl__build_stage(context, "sort");
-    status = strl__sort_buckets(context, ingest, &buckets, &pairs, err);
+    if (!status)
+        status = strl__sort_buckets(context, ingest, &buckets, &pairs, err);
     if (status)
         goto done;
     strl__build_stage(context, "connect");
