@@ -61,7 +61,7 @@ def primitives_that_share_their_vertices_load_their_own(folder):
     model = w.Model()
     position = model.accessor(points, w.FLOAT)
     wanted, nodes = [], []
-    for number in range(4000):
+    for number in range(8000):
         first = number * 24
         order = [first, first + 1, first + 100, first + 2, first + 3, first + 102]
         index = model.accessor(order, w.U32)
