@@ -154,9 +154,8 @@ static void init(strl_reader *reader)
     strl__gltf *gltf = strl__gltf_of(reader);
     gltf->reader = reader;
     gltf->scene = STRL__NO_ITEM;
-    gltf->table_limit = reader->memory_bytes / 4;
-    reader->parts.limit_bytes = (size_t)(reader->memory_bytes / 8); /* they are whole paths */
-    strl_arena_init(&gltf->arena, (size_t)(reader->memory_bytes / 8));
+    gltf->table_limit = reader->memory_bytes / 16 * 7;
+    strl_arena_init(&gltf->arena, (size_t)gltf->table_limit);
     strl__gltf_init_thresholds(gltf);
 }
 

@@ -7,7 +7,7 @@
  * to placement; of the buffers only windows are in memory. Poses of skins and morph targets are not
  * applied.
  *
- * Of the reader's budget at most a quarter is for tables, half less those for what is
+ * Of the reader's budget at most seven sixteenths are for tables, half less those for what is
  * decompressed, an eighth for buffers that stand in the JSON as text, an eighth for the vertices
  * of a primitive. */
 #ifndef STRL_READERS_GLTF_H
@@ -24,7 +24,7 @@
 typedef struct strl__gltf_column {
     uint64_t offset; /* bytes from the view's start */
     uint32_t view;   /* STRL__NO_ITEM: all zeros */
-    strl__scalar type;
+    uint8_t type;    /* strl__scalar; a file may have millions of these */
     uint8_t components;
     bool normalized; /* integers stand for 0..1 or -1..1 */
 } strl__gltf_column;
@@ -68,7 +68,8 @@ typedef struct strl__gltf_view {
     uint32_t buffer;
     uint32_t stride;             /* 0: elements follow each other closely */
     strl__gltf_meshopt *meshopt; /* in the arena; NULL: the bytes are as they are */
-    bool is_checked;
+    bool is_checked, is_stored;
+    uint64_t stored_at; /* where it is decompressed in the file of stored views */
 } strl__gltf_view;
 
 typedef struct strl__gltf_buffer {
@@ -88,11 +89,11 @@ typedef struct strl__gltf_draco_use {
 } strl__gltf_draco_use;
 
 typedef struct strl__gltf_primitive {
-    uint8_t mode; /* as in the file: 0 points, 1..3 lines, 4 triangles, 5 strip, 6 fan */
+    uint8_t mode;   /* as in the file: 0 points, 1..3 lines, 4 triangles, 5 strip, 6 fan */
+    bool has_range; /* lowest and highest are known */
     uint32_t indices, material;        /* or STRL__NO_ITEM, as all below */
     uint32_t position, normal, colour; /* accessors */
     strl__gltf_draco_use *draco;       /* in the arena; NULL: not compressed */
-    bool has_range;                    /* the next two are known */
     uint32_t lowest, highest;          /* of its indices; beyond its vertices perhaps */
 } strl__gltf_primitive;
 
@@ -172,6 +173,8 @@ typedef struct strl__gltf {
     strl_reader *reader;
     strl_arena arena; /* names and rare things */
     uint64_t table_bytes, table_limit;
+    bool is_counting; /* the tables are full: what follows is counted, for a sentence */
+    uint64_t counted_bytes;
     strl__gltf_accessor *accessors;
     strl__gltf_view *views;
     strl__gltf_buffer *buffers;
@@ -193,6 +196,8 @@ typedef struct strl__gltf {
     uint64_t text_bytes; /* of buffers that are in memory */
     strl__gltf_decoded decoded[STRL__GLTF_DECODED_MAX];
     uint64_t decoded_bytes, clock;
+    strl_file *stored; /* scratch; decompressed views that had to make room; owned, may be NULL */
+    uint64_t stored_bytes;
     strl__draco *draco; /* the primitive decompressed last; owned */
     uint32_t draco_primitive;
     uint64_t draco_bytes;
@@ -273,6 +278,8 @@ strl_status strl__gltf_decode_view(strl__gltf *gltf, uint32_t view, const uint8_
 /* Makes room for so many decompressed bytes, or fails. */
 strl_status strl__gltf_make_room(strl__gltf *gltf, uint64_t bytes, const char *what,
                                  strl_error *err);
+/* Gives up all decompressed views, and tells how many bytes a Draco mesh may take. */
+uint64_t strl__gltf_room(strl__gltf *gltf);
 void strl__gltf_close_decoded(strl__gltf *gltf);
 
 /* ---- gltf_accessor.c: elements */

@@ -328,6 +328,8 @@ strl_status strl__gltf_read_view(strl__gltf *gltf, uint32_t index, uint64_t offs
     const uint8_t *bytes;
     if (!view->meshopt)
         return strl__gltf_read_buffer(gltf, view->buffer, view->offset + offset, data, size, err);
+    if (view->is_stored)
+        return strl_file_read(gltf->stored, view->stored_at + offset, data, size, err);
     strl_status status = strl__gltf_decode_view(gltf, index, &bytes, err);
     if (!status)
         memcpy(data, bytes + offset, size);

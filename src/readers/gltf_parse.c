@@ -8,35 +8,69 @@
 #include "readers/gltf.h"
 #include "readers/gltf_json.h"
 
+/* Of the reader's budget the text of an element has such a part; as a tree it takes up to 18 times
+ * as much. */
+#define ELEMENT_SHARE 64u
+/* Near the limit tables grow by such a part. */
+#define TIGHT_STEP 16u
+
 typedef strl_status (*parse_element)(strl__gltf *gltf, strl__fields *fields, const json_t *value);
+
+/* The tables of an allocation that does not fit: from now on elements are counted alone. */
+static strl_status fill_up(strl__gltf *gltf, strl_error *err)
+{
+    gltf->is_counting = true;
+    return strl__fail(err, STRL_ERR_LIMIT,
+                      "%s: what its JSON describes takes more than the %" PRIu64
+                      " bytes that the memory budget allows",
+                      gltf->reader->path, gltf->table_limit);
+}
+
+static uint64_t held_bytes(const strl__gltf *gltf)
+{
+    return gltf->table_bytes + gltf->arena.total_bytes;
+}
+
+/* How many items more: half as many as there are, near the limit a 16th; 0: not even that. */
+static size_t choose_step(const strl__gltf *gltf, size_t capacity, size_t item_bytes)
+{
+    const size_t steps[] = {capacity < 16 ? 16 : capacity / 2, capacity / TIGHT_STEP + 1};
+    for (size_t i = 0; i < sizeof steps / sizeof *steps; i++)
+        if (held_bytes(gltf) + (uint64_t)steps[i] * item_bytes <= gltf->table_limit)
+            return steps[i];
+    return 0;
+}
 
 strl_status strl__gltf_add(strl__gltf *gltf, void *items_pointer, size_t *count, size_t *capacity,
                            size_t item_bytes, strl_error *err)
 {
-    const size_t before = *capacity;
-    uint64_t held = gltf->table_bytes + gltf->arena.total_bytes;
-    if (*count >= UINT32_MAX - 1 ||
-        (*count == before && held + before / 2 * item_bytes > gltf->table_limit))
-        return strl__fail(err, STRL_ERR_LIMIT,
-                          "%s: what its JSON describes takes more than the %" PRIu64 " bytes that "
-                          "the memory budget allows: more --memory may help",
-                          gltf->reader->path, gltf->table_limit);
-    if (!strl__grow(items_pointer, capacity, *count + 1, item_bytes))
-        return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for %zu items of its JSON",
-                          gltf->reader->path, *count);
-    gltf->table_bytes += (*capacity - before) * item_bytes;
+    void *items;
+    if (*count == *capacity) {
+        const size_t step = choose_step(gltf, *capacity, item_bytes);
+        if (step == 0 || *count >= UINT32_MAX - 1)
+            return fill_up(gltf, err);
+        memcpy(&items, items_pointer, sizeof items);
+        items = strl__realloc(items, *capacity + step, item_bytes);
+        if (!items)
+            return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for %zu items of its JSON",
+                              gltf->reader->path, *count);
+        memcpy(items_pointer, &items, sizeof items);
+        *capacity += step;
+        gltf->table_bytes += step * item_bytes;
+    }
     ++*count;
     return STRL_OK;
 }
 
 void *strl__gltf_keep(strl__gltf *gltf, size_t bytes, strl_error *err)
 {
-    void *block = strl_arena_alloc_zero(&gltf->arena, 1, bytes);
-    if (!block)
-        strl__fail(err, STRL_ERR_MEMORY,
-                   "%s: no memory for what its JSON describes, of which %" PRIu64
-                   " bytes may be held: more --memory may help",
-                   gltf->reader->path, gltf->table_limit);
+    const bool fits = bytes <= gltf->table_limit && held_bytes(gltf) <= gltf->table_limit - bytes;
+    void *block = fits ? strl_arena_alloc_zero(&gltf->arena, 1, bytes) : NULL;
+    if (!fits)
+        fill_up(gltf, err);
+    else if (!block)
+        strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for %zu bytes of what its JSON describes",
+                   gltf->reader->path, bytes);
     return block;
 }
 
@@ -445,18 +479,51 @@ static const struct {
     const char *name;
     bool is_list;
     parse_element parse;
+    size_t bytes;     /* of one in its table */
+    const char *list; /* of each what is in tables of its own; may be NULL */
+    size_t list_bytes;
 } members[] = {
-    {"asset", false, parse_asset},
-    {"scene", false, parse_default_scene},
-    {"extensionsRequired", true, parse_required},
-    {"scenes", true, parse_scene},
-    {"nodes", true, parse_node},
-    {"meshes", true, parse_mesh},
-    {"accessors", true, parse_accessor},
-    {"bufferViews", true, parse_view},
-    {"buffers", true, parse_buffer},
-    {"materials", true, strl__gltf_parse_material},
+    {"asset", false, parse_asset, 0, NULL, 0},
+    {"scene", false, parse_default_scene, 0, NULL, 0},
+    {"extensionsRequired", true, parse_required, 0, NULL, 0},
+    {"scenes", true, parse_scene, sizeof(strl__gltf_scene), "nodes", sizeof(uint32_t)},
+    {"nodes", true, parse_node, sizeof(strl__gltf_node), "children", sizeof(uint32_t)},
+    {"meshes", true, parse_mesh, sizeof(strl__gltf_mesh), "primitives",
+     sizeof(strl__gltf_primitive) + sizeof(strl__gltf_draco_use)},
+    {"accessors", true, parse_accessor, sizeof(strl__gltf_accessor), NULL, 0},
+    {"bufferViews", true, parse_view, sizeof(strl__gltf_view), NULL, 0},
+    {"buffers", true, parse_buffer, sizeof(strl__gltf_buffer), NULL, 0},
+    {"materials", true, strl__gltf_parse_material, sizeof(strl__gltf_material), NULL, 0},
 };
+
+/* About what an element takes in the tables and the arena. */
+static uint64_t element_bytes(size_t which, const json_t *value)
+{
+    static const char *const texts[] = {"name", "uri"};
+    uint64_t bytes = members[which].bytes;
+    if (!json_is_object(value))
+        return bytes;
+    if (members[which].list)
+        bytes += json_array_size(json_object_get(value, members[which].list)) *
+                 members[which].list_bytes;
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
+        bytes += json_string_length(json_object_get(value, texts[i])) + 16;
+    if (json_object_get(value, "extensions") || json_object_get(value, "sparse"))
+        bytes += sizeof(strl__gltf_sparse) + sizeof(strl__gltf_meshopt);
+    return bytes;
+}
+
+/* With what is room in tables that have grown near the limit. */
+static strl_status tell_count(const strl__gltf *gltf, strl_error *err)
+{
+    const uint64_t items = held_bytes(gltf) + gltf->counted_bytes, needed = items + items / TIGHT_STEP + (64 << 10);
+    char advice[STRL__ADVICE_BYTES];
+    strl__reader_advise(gltf->reader, needed, gltf->table_limit, advice);
+    return strl__fail(err, STRL_ERR_LIMIT,
+                      "%s: what its JSON describes takes up to %" PRIu64
+                      " bytes, the memory budget allows %" PRIu64 ": %s",
+                      gltf->reader->path, needed, gltf->table_limit, advice);
+}
 
 static size_t member_index(const char *name)
 {
@@ -494,17 +561,38 @@ static strl_status take(void *context, const char *member, uint64_t index, const
             return strl__fail(err, STRL_ERR_FORMAT, "%s: its %s stand in it twice", path, member);
         gltf->seen |= (uint64_t)1 << which;
     }
-    return members[which].parse(gltf, &fields, value);
+    strl_status status =
+        gltf->is_counting ? STRL_OK : members[which].parse(gltf, &fields, value);
+    if (!gltf->is_counting)
+        return status;
+    gltf->counted_bytes += element_bytes(which, value);
+    return STRL_OK;
 }
+
+static strl_status refuse(void *context, uint64_t at, size_t bytes, strl_error *err)
+{
+    const strl__gltf *gltf = context;
+    const uint64_t most = gltf->reader->memory_bytes / ELEMENT_SHARE;
+    char advice[STRL__ADVICE_BYTES];
+    strl__reader_advise(gltf->reader, bytes, most, advice);
+    return strl__fail(err, STRL_ERR_LIMIT,
+                      "%s, byte %" PRIu64 ": this part of its JSON is %zu bytes long, the memory "
+                      "budget allows %" PRIu64 ": %s",
+                      gltf->reader->path, at, bytes, most, advice);
+}
+
 
 strl_status strl__gltf_parse(strl__gltf *gltf, strl_error *err)
 {
     strl_reader *reader = gltf->reader;
     const strl__json_sink sink = {.context = gltf,
-                                  .most_bytes = (size_t)(reader->memory_bytes / 64),
+                                  .most_bytes = (size_t)(reader->memory_bytes / ELEMENT_SHARE),
                                   .wants = wants,
-                                  .take = take};
+                                  .take = take,
+                                  .refuse = refuse};
     strl_status status = strl__json_split(&reader->input, reader->path, &sink, err);
+    if (!status && gltf->is_counting)
+        return tell_count(gltf, err);
     if (!status && !gltf->has_asset)
         status = strl__fail(err, STRL_ERR_FORMAT,
                             "%s: expected an asset of version 2.0 in its JSON, found none",

@@ -9,28 +9,25 @@
 
 /* ---- Draco */
 
-#define DRACO_FACE_BYTES 160u /* about what decoding takes for one */
-
 static strl_status check_announced(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                   const uint8_t *packed, size_t size, strl_error *err)
+                                   const uint8_t *packed, size_t size, strl__draco_facts *facts,
+                                   strl_error *err)
 {
-    const uint64_t faces_most = gltf->accessors[primitive->indices].count / 3;
-    uint64_t faces, points;
-    if (strl__draco_announced(packed, size, &faces, &points))
+    /* Of a strip the accessor counts the corners of the strip. */
+    const uint64_t faces_most = strl__gltf_triangle_count(
+        primitive->mode, gltf->accessors[primitive->indices].count);
+    if (strl__draco_announced(packed, size, facts))
         return strl__fail(err, STRL_ERR_FORMAT,
                           "%s, bufferViews[%u]: expected a Draco mesh of version 2.2",
                           gltf->reader->path, primitive->draco->view);
-    if (faces > faces_most || points > gltf->accessors[primitive->position].count)
+    if (facts->faces > faces_most || facts->points > gltf->accessors[primitive->position].count)
         return strl__fail(err, STRL_ERR_FORMAT,
                           "%s, bufferViews[%u]: expected a Draco mesh of at most %" PRIu64
                           " faces and %" PRIu64 " points, found %" PRIu64 " and %" PRIu64,
                           gltf->reader->path, primitive->draco->view, faces_most,
-                          gltf->accessors[primitive->position].count, faces, points);
+                          gltf->accessors[primitive->position].count, facts->faces, facts->points);
     gltf->draco_bytes = 0;
-    strl_status status =
-        strl__gltf_make_room(gltf, faces * DRACO_FACE_BYTES + size, "a Draco mesh", err);
-    gltf->draco_bytes = status ? 0 : faces * DRACO_FACE_BYTES + size;
-    return status;
+    return strl__gltf_make_room(gltf, facts->connectivity_bytes, "a Draco mesh's faces alone", err);
 }
 
 static strl_status check_decoded(const strl__gltf *gltf, const strl__gltf_primitive *primitive,
@@ -52,11 +49,29 @@ static strl_status check_decoded(const strl__gltf *gltf, const strl__gltf_primit
     return STRL_OK;
 }
 
+static strl_status decode_announced(strl__gltf *gltf, const strl__gltf_primitive *primitive,
+                                    const uint8_t *packed, const strl__draco_facts *facts,
+                                    strl_error *err)
+{
+    const size_t size = (size_t)gltf->views[primitive->draco->view].bytes;
+    char why[120];
+    strl__draco_room room = {.bytes = strl__gltf_room(gltf) - facts->connectivity_bytes};
+    gltf->draco = strl__draco_decode(packed, size, facts, &room, why);
+    if (room.wanted > room.bytes)
+        return strl__gltf_make_room(gltf, facts->connectivity_bytes + room.wanted, "a Draco mesh",
+                                    err);
+    if (!gltf->draco)
+        return strl__fail(err, STRL_ERR_FORMAT, "%s, bufferViews[%u]: its Draco mesh is damaged: %s",
+                          gltf->reader->path, primitive->draco->view, why);
+    gltf->draco_bytes = facts->connectivity_bytes + room.wanted;
+    return STRL_OK;
+}
+
 static strl_status decode_draco(strl__gltf *gltf, const strl__gltf_primitive *primitive,
                                 strl_error *err)
 {
     const strl__gltf_view *view = &gltf->views[primitive->draco->view];
-    char why[120];
+    strl__draco_facts facts;
     strl_status status =
         strl__gltf_make_room(gltf, view->bytes, "a Draco mesh's compressed form", err);
     uint8_t *packed = status ? NULL : strl__alloc((size_t)view->bytes, 1);
@@ -67,14 +82,11 @@ static strl_status decode_draco(strl__gltf *gltf, const strl__gltf_primitive *pr
         status =
             strl__gltf_read_view(gltf, primitive->draco->view, 0, packed, (size_t)view->bytes, err);
     if (!status)
-        status = check_announced(gltf, primitive, packed, (size_t)view->bytes, err);
-    if (!status) {
-        gltf->draco = strl__draco_decode(packed, (size_t)view->bytes, why);
-        status = gltf->draco ? check_decoded(gltf, primitive, err)
-                             : strl__fail(err, STRL_ERR_FORMAT,
-                                          "%s, bufferViews[%u]: its Draco mesh is damaged: %s",
-                                          gltf->reader->path, primitive->draco->view, why);
-    }
+        status = check_announced(gltf, primitive, packed, (size_t)view->bytes, &facts, err);
+    if (!status)
+        status = decode_announced(gltf, primitive, packed, &facts, err);
+    if (!status)
+        status = check_decoded(gltf, primitive, err);
     strl__free(packed);
     return status;
 }

@@ -59,7 +59,7 @@ struct strl_reader {
     void *state;       /* of the format; owned */
     char *path;        /* owned */
     char *scratch_dir; /* owned; NULL where none was given */
-    uint64_t memory_bytes;
+    uint64_t memory_bytes, whole_bytes; /* whole: 0 = unknown */
     strl_reader_child child; /* borrowed, during open */
     strl_axis default_up;
     const char *default_unit; /* static; NULL = unknown */
@@ -92,6 +92,13 @@ struct strl_reader {
 /* Opens a file as a given format instead of guessing; for tests and fuzzers. NULL guesses. */
 strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__format *format,
                                  strl_reader **reader, strl_error *err);
+
+#define STRL__ADVICE_BYTES 80u
+
+/* How much memory would do where `needed` bytes do not fit a part of the budget of which there are
+ * `limit` bytes now: by --memory, where the reader knows of what it is a share. */
+void strl__reader_advise(const strl_reader *reader, uint64_t needed, uint64_t limit,
+                         char advice[STRL__ADVICE_BYTES]);
 
 /* Fails where an open file is not as it was. */
 strl_status strl__reader_check_unchanged(strl_file *file, const strl_file_info *opened,

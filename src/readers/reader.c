@@ -4,6 +4,8 @@
 #include "readers/reader.h"
 
 #include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/fail.h"
@@ -141,6 +143,7 @@ strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__forma
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a reader", desc->path);
     reader->format = format;
     reader->memory_bytes = memory_bytes;
+    reader->whole_bytes = desc->whole_bytes;
     uint64_t names_bytes = desc->names_bytes ? desc->names_bytes : memory_bytes / 8;
     strl__names_init(&reader->parts, (size_t)names_bytes);
     strl__names_init(&reader->materials, (size_t)(names_bytes / 2));
@@ -276,6 +279,15 @@ strl_status strl_reader_next(strl_reader *reader, strl_triangle *triangles, size
     if (err)
         *err = reader->failure;
     return reader->failure.status;
+}
+
+void strl__reader_advise(const strl_reader *reader, uint64_t needed, uint64_t limit,
+                         char advice[STRL__ADVICE_BYTES])
+{
+    const uint64_t whole = reader->whole_bytes ? reader->whole_bytes : reader->memory_bytes;
+    const double megabytes = (double)whole / (double)limit * (double)needed / (1 << 20);
+    snprintf(advice, STRL__ADVICE_BYTES, reader->whole_bytes ? "--memory %.0fM would do" : "reading it takes about %.0fM of memory",
+             ceil(megabytes));
 }
 
 strl_status strl__reader_check_unchanged(strl_file *file, const strl_file_info *opened,

@@ -49,6 +49,7 @@ typedef struct strl_reader_desc {
     const char *path;         /* UTF-8; borrowed during the call of open */
     const char *scratch_dir;  /* an existing folder for spill files, which close removes; borrowed during open */
     uint64_t memory_bytes;    /* budget of all the reader holds but names; 0 = 256 MiB; the least is 8 MiB */
+    uint64_t whole_bytes;     /* --memory, of which memory_bytes is a share: what sentences advise; 0 = unknown */
     uint64_t names_bytes;     /* budget of the names of parts; those of materials have half as much; 0 = an eighth of memory_bytes */
     strl_reader_child child;  /* borrowed during open: the child has ended before open returns */
 } strl_reader_desc;

@@ -99,6 +99,7 @@ static strl_status read_input(reading *self, const char *path, strl_error *err)
     const strl_reader_desc desc = {.path = path,
                                    .scratch_dir = model->desc->scratch_dir,
                                    .memory_bytes = model->memory_bytes / 4,
+                                   .whole_bytes = model->memory_bytes,
                                    .child = {.importer = model->desc->importer,
                                              .memory_bytes = child_bytes(model),
                                              .go_on = go_on,

@@ -420,6 +420,25 @@ def meshopt_views_are_decompressed(folder):
         assert w.position_hash(canonical(got)) == w.position_hash(canonical(wanted[:4096])) or len(wanted) > 4096
 
 
+def meshopt_views_that_do_not_fit_together_take_turns(folder):
+    """Positions and normals of many vertices, of which the least budget holds one at a time."""
+    count = 200000
+    points = [(i % 500, i // 500, i % 7) for i in range(count)]
+    normals = [((1, 0, 0), (0, 1, 0), (0, 0, 1))[i // 1000 % 3] for i in range(count)]
+    faces = [corner for i in range(0, count - 501, 4000) for corner in (i, i + 1, i + 500)]
+    model = w.Model()
+    views = [compressed(model, "attributes", count, 12, w.pack(rows, w.FLOAT)) for rows in (points, normals)]
+    at = [model.add("accessors", {"bufferView": view, "componentType": w.FLOAT, "type": "VEC3", "count": count})
+          for view in views]
+    mesh = model.mesh({"attributes": {"POSITION": at[0], "NORMAL": at[1]}, "indices": model.accessor(faces, w.U32)})
+    model.scene(*[model.node(mesh=mesh) for _ in range(3)])
+    save_compressed(model, f"{folder}/turns.glb")
+    result = expect(f"{folder}/turns.glb", w.triangles(points, faces) * 3)
+    for index, triangle in enumerate(result["triangles"]):
+        first = faces[3 * (index % (len(faces) // 3))]
+        assert triangle["normals"][:3] == list(map(float, normals[first])), (index, triangle)
+
+
 def meshopt_filters_are_undone(folder):
     points = [(0, 0, 0), (1.5, 0, -0.25), (1, 3, 0.5), (0, 1024, 7)]
     normals = [(0, 0, 1), (0.6, 0, 0.8), (-HALF, HALF, 0), (0.36, -0.48, -0.8)]
@@ -524,5 +543,6 @@ run_tests([indices_of_all_types_and_none_give_the_same_quad, strips_and_fans_tur
            alpha_of_vertices_follows_the_material, the_default_scene_is_drawn_or_else_the_first_or_all_roots,
            parts_are_nodes_by_their_path, twenty_thousand_parts_fit, instances_are_expanded,
            unknown_chunks_extras_and_padding_are_passed_over, names_that_are_not_utf8_are_read,
-           meshopt_views_are_decompressed, meshopt_filters_are_undone, draco_meshes_are_decompressed,
+           meshopt_views_are_decompressed,
+           meshopt_views_that_do_not_fit_together_take_turns, meshopt_filters_are_undone, draco_meshes_are_decompressed,
            two_draco_meshes_take_turns])

@@ -56,7 +56,7 @@ def an_index_beyond_far_vertices_is_refused_with_its_triangle(folder):
 
 def primitives_that_share_their_vertices_load_their_own(folder):
     """Exporters that give all primitives the vertices of the whole model are many."""
-    count = 100000
+    count = 200000
     points = [(i % 100, i // 100, i % 7) for i in range(count)]
     model = w.Model()
     position = model.accessor(points, w.FLOAT)

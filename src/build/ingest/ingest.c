@@ -70,6 +70,7 @@ static strl_status open_readers(strl_build_context *context, strl_reader **reade
     for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
         strl_reader_desc desc = {.path = context->desc->inputs[i], .scratch_dir = context->scratch_dir,
                                  .memory_bytes = share < LEAST_READER_BYTES ? LEAST_READER_BYTES : share,
+                                 .whole_bytes = context->memory_bytes,
                                  .names_bytes = context->memory_bytes / 6,
                                  .child = plan_child(context)};
         strl_reader_info info;
