@@ -58,7 +58,7 @@ static void note_costs(strl_build_context *context, const strl_reader *reader)
     strl_build_result *result = context->result;
     strl_reader_costs costs;
     strl_reader_costs_get(reader, &costs);
-    result->scratch_bytes += costs.scratch_bytes;
+    context->spool_bytes += costs.scratch_bytes;
     if (costs.child_rss_bytes > result->peak_rss_bytes)
         result->peak_rss_bytes = costs.child_rss_bytes;
 }
@@ -200,6 +200,8 @@ strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, st
     if (status)
         goto done;
     strl__ingest_warn(context, readers, ingest); /* not before: of a refused model only the refusal is told */
+    strl__build_note_scratch(context);
+    context->spool_bytes = 0;
     for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
         status = strl__request_note_beside(context, readers[i], err);
         strl_reader_close(readers[i]);
