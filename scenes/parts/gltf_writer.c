@@ -357,11 +357,10 @@ static strl_status append_array(gltf_writer *self, const char *head, int array, 
 static strl_status write_head(gltf_writer *self, strl_error *err)
 {
     strl__stream *text = &self->bin;
-    strl_status status =
-        strl__json_print(text, err,
-                         "{\"asset\":{\"version\":\"2.0\"," GENERATOR "},\"scene\":0,\"scenes\":"
-                         "[{\"nodes\":[%" PRIu64 "]}],\n\"materials\":[",
-                         self->counts[NODES]);
+    strl_status status = strl__json_print(text, err,
+                                          "{\"asset\":{\"version\":\"2.0\"," GENERATOR "},\"scene\":0,\"scenes\":"
+                                          "[{\"nodes\":[%" PRIu64 "]}],\n\"materials\":[",
+                                          self->counts[NODES]);
     for (unsigned i = 0; status == STRL_OK && i < self->desc.material_count; i++) {
         status = strl__json_print(text, err, "%s\n", i ? "," : "");
         if (status == STRL_OK)

@@ -228,12 +228,16 @@ static inline size_t strl__gltf_table_bytes(const strl_reader *reader)
     return (size_t)(reader->memory_bytes / 8);
 }
 
-/* ---- gltf_parse.c, gltf_material.c: the JSON's elements into tables */
-strl_status strl__gltf_parse(strl__gltf *gltf, strl_error *err);
+/* ---- gltf_tables.c: memory for what the JSON describes */
 /* Room for one more item in a table; counts against the tables' share. */
 strl_status strl__gltf_add(strl__gltf *gltf, void *items_pointer, size_t *count, size_t *capacity,
                            size_t item_bytes, strl_error *err);
 void *strl__gltf_keep(strl__gltf *gltf, size_t bytes, strl_error *err); /* zeroed, in the arena */
+/* Once all is counted that did not fit: how much memory would do. */
+strl_status strl__gltf_refuse_tables(const strl__gltf *gltf, strl_error *err);
+
+/* ---- gltf_parse.c, gltf_material.c: the JSON's elements into tables */
+strl_status strl__gltf_parse(strl__gltf *gltf, strl_error *err);
 strl_status strl__gltf_parse_material(strl__gltf *gltf, strl__fields *fields, const json_t *value);
 /* Linear light as an sRGB code. Not a number: 255. */
 uint8_t strl__gltf_encode(const strl__gltf *gltf, double linear);

@@ -95,8 +95,7 @@ static strl_status open_file(strl__gltf *gltf, uint32_t index, strl_error *err)
                             gltf->reader->path, index, buffer->bytes, buffer->opened.bytes,
                             strl_file_path(buffer->file));
     if (!status)
-        status = strl__reader_note_beside(gltf->reader, strl_file_path(buffer->file),
-                                          &buffer->opened, err);
+        status = strl__reader_note_beside(gltf->reader, strl_file_path(buffer->file), &buffer->opened, err);
     strl__free(path);
     strl__free(raw);
     return status;

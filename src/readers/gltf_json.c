@@ -94,8 +94,8 @@ static int peek_token(splitter *s)
 static bool ends_with(const splitter *s, size_t from, const char *text)
 {
     size_t length = strlen(text);
-    return !s->muted && s->length <= s->sink->most_bytes && s->length >= from &&
-           s->length - from == length && memcmp(s->text + from, text, length) == 0;
+    return !s->muted && s->length <= s->sink->most_bytes && s->length >= from && s->length - from == length &&
+           memcmp(s->text + from, text, length) == 0;
 }
 
 /* From quote to quote; escapes stay as they are. */

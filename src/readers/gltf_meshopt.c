@@ -68,8 +68,7 @@ strl_status strl__gltf_make_room(strl__gltf *gltf, uint64_t bytes, const char *w
     const uint64_t half = gltf->reader->memory_bytes / 2;
     strl__reader_advise(gltf->reader, half - limit + bytes, half, advice);
     return strl__fail(err, STRL_ERR_LIMIT,
-                      "%s: %s takes %" PRIu64
-                      " bytes decompressed, the memory budget allows %" PRIu64 ": %s",
+                      "%s: %s takes %" PRIu64 " bytes decompressed, the memory budget allows %" PRIu64 ": %s",
                       gltf->reader->path, what, bytes, limit, advice);
 }
 
@@ -167,8 +166,7 @@ static strl_status store_away(strl__gltf *gltf, strl__gltf_decoded *decoded, str
         if (!gltf->stored)
             status = strl_file_create_nameless(folder, &gltf->stored, err);
         if (!status)
-            status = strl_file_write(gltf->stored, gltf->stored_bytes, decoded->bytes,
-                                     (size_t)decoded->size, err);
+            status = strl_file_write(gltf->stored, gltf->stored_bytes, decoded->bytes, (size_t)decoded->size, err);
         view->is_stored = !status;
         view->stored_at = gltf->stored_bytes;
         gltf->stored_bytes += status ? 0 : decoded->size;

@@ -11,68 +11,8 @@
 /* Of the reader's budget the text of an element has such a part; as a tree it takes up to 18 times
  * as much. */
 #define ELEMENT_SHARE 64u
-/* Near the limit tables grow by such a part. */
-#define TIGHT_STEP 16u
 
 typedef strl_status (*parse_element)(strl__gltf *gltf, strl__fields *fields, const json_t *value);
-
-/* The tables of an allocation that does not fit: from now on elements are counted alone. */
-static strl_status fill_up(strl__gltf *gltf, strl_error *err)
-{
-    gltf->is_counting = true;
-    return strl__fail(err, STRL_ERR_LIMIT,
-                      "%s: what its JSON describes takes more than the %" PRIu64
-                      " bytes that the memory budget allows",
-                      gltf->reader->path, gltf->table_limit);
-}
-
-static uint64_t held_bytes(const strl__gltf *gltf)
-{
-    return gltf->table_bytes + gltf->arena.total_bytes;
-}
-
-/* How many items more: half as many as there are, near the limit a 16th; 0: not even that. */
-static size_t choose_step(const strl__gltf *gltf, size_t capacity, size_t item_bytes)
-{
-    const size_t steps[] = {capacity < 16 ? 16 : capacity / 2, capacity / TIGHT_STEP + 1};
-    for (size_t i = 0; i < sizeof steps / sizeof *steps; i++)
-        if (held_bytes(gltf) + (uint64_t)steps[i] * item_bytes <= gltf->table_limit)
-            return steps[i];
-    return 0;
-}
-
-strl_status strl__gltf_add(strl__gltf *gltf, void *items_pointer, size_t *count, size_t *capacity,
-                           size_t item_bytes, strl_error *err)
-{
-    void *items;
-    if (*count == *capacity) {
-        const size_t step = choose_step(gltf, *capacity, item_bytes);
-        if (step == 0 || *count >= UINT32_MAX - 1)
-            return fill_up(gltf, err);
-        memcpy(&items, items_pointer, sizeof items);
-        items = strl__realloc(items, *capacity + step, item_bytes);
-        if (!items)
-            return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for %zu items of its JSON",
-                              gltf->reader->path, *count);
-        memcpy(items_pointer, &items, sizeof items);
-        *capacity += step;
-        gltf->table_bytes += step * item_bytes;
-    }
-    ++*count;
-    return STRL_OK;
-}
-
-void *strl__gltf_keep(strl__gltf *gltf, size_t bytes, strl_error *err)
-{
-    const bool fits = bytes <= gltf->table_limit && held_bytes(gltf) <= gltf->table_limit - bytes;
-    void *block = fits ? strl_arena_alloc_zero(&gltf->arena, 1, bytes) : NULL;
-    if (!fits)
-        fill_up(gltf, err);
-    else if (!block)
-        strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for %zu bytes of what its JSON describes",
-                   gltf->reader->path, bytes);
-    return block;
-}
 
 static void *keep(strl__gltf *gltf, strl__fields *fields, size_t bytes)
 {
@@ -504,25 +444,12 @@ static uint64_t element_bytes(size_t which, const json_t *value)
     if (!json_is_object(value))
         return bytes;
     if (members[which].list)
-        bytes += json_array_size(json_object_get(value, members[which].list)) *
-                 members[which].list_bytes;
+        bytes += json_array_size(json_object_get(value, members[which].list)) * members[which].list_bytes;
     for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
         bytes += json_string_length(json_object_get(value, texts[i])) + 16;
     if (json_object_get(value, "extensions") || json_object_get(value, "sparse"))
         bytes += sizeof(strl__gltf_sparse) + sizeof(strl__gltf_meshopt);
     return bytes;
-}
-
-/* With what is room in tables that have grown near the limit. */
-static strl_status tell_count(const strl__gltf *gltf, strl_error *err)
-{
-    const uint64_t items = held_bytes(gltf) + gltf->counted_bytes, needed = items + items / TIGHT_STEP + (64 << 10);
-    char advice[STRL__ADVICE_BYTES];
-    strl__reader_advise(gltf->reader, needed, gltf->table_limit, advice);
-    return strl__fail(err, STRL_ERR_LIMIT,
-                      "%s: what its JSON describes takes up to %" PRIu64
-                      " bytes, the memory budget allows %" PRIu64 ": %s",
-                      gltf->reader->path, needed, gltf->table_limit, advice);
 }
 
 static size_t member_index(const char *name)
@@ -561,8 +488,7 @@ static strl_status take(void *context, const char *member, uint64_t index, const
             return strl__fail(err, STRL_ERR_FORMAT, "%s: its %s stand in it twice", path, member);
         gltf->seen |= (uint64_t)1 << which;
     }
-    strl_status status =
-        gltf->is_counting ? STRL_OK : members[which].parse(gltf, &fields, value);
+    strl_status status = gltf->is_counting ? STRL_OK : members[which].parse(gltf, &fields, value);
     if (!gltf->is_counting)
         return status;
     gltf->counted_bytes += element_bytes(which, value);
@@ -581,7 +507,6 @@ static strl_status refuse(void *context, uint64_t at, size_t bytes, strl_error *
                       gltf->reader->path, at, bytes, most, advice);
 }
 
-
 strl_status strl__gltf_parse(strl__gltf *gltf, strl_error *err)
 {
     strl_reader *reader = gltf->reader;
@@ -592,7 +517,7 @@ strl_status strl__gltf_parse(strl__gltf *gltf, strl_error *err)
                                   .refuse = refuse};
     strl_status status = strl__json_split(&reader->input, reader->path, &sink, err);
     if (!status && gltf->is_counting)
-        return tell_count(gltf, err);
+        return strl__gltf_refuse_tables(gltf, err);
     if (!status && !gltf->has_asset)
         status = strl__fail(err, STRL_ERR_FORMAT,
                             "%s: expected an asset of version 2.0 in its JSON, found none",

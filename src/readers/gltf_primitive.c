@@ -9,21 +9,19 @@
 
 /* ---- Draco */
 
-static strl_status check_announced(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                   const uint8_t *packed, size_t size, strl__draco_facts *facts,
-                                   strl_error *err)
+static strl_status check_announced(strl__gltf *gltf, const strl__gltf_primitive *primitive, const uint8_t *packed,
+                                   size_t size, strl__draco_facts *facts, strl_error *err)
 {
     /* Of a strip the accessor counts the corners of the strip. */
-    const uint64_t faces_most = strl__gltf_triangle_count(
-        primitive->mode, gltf->accessors[primitive->indices].count);
+    const uint64_t faces_most = strl__gltf_triangle_count(primitive->mode, gltf->accessors[primitive->indices].count);
     if (strl__draco_announced(packed, size, facts))
         return strl__fail(err, STRL_ERR_FORMAT,
                           "%s, bufferViews[%u]: expected a Draco mesh of version 2.2",
                           gltf->reader->path, primitive->draco->view);
     if (facts->faces > faces_most || facts->points > gltf->accessors[primitive->position].count)
         return strl__fail(err, STRL_ERR_FORMAT,
-                          "%s, bufferViews[%u]: expected a Draco mesh of at most %" PRIu64
-                          " faces and %" PRIu64 " points, found %" PRIu64 " and %" PRIu64,
+                          "%s, bufferViews[%u]: expected a Draco mesh of at most %" PRIu64 " faces and %" PRIu64
+                          " points, found %" PRIu64 " and %" PRIu64,
                           gltf->reader->path, primitive->draco->view, faces_most,
                           gltf->accessors[primitive->position].count, facts->faces, facts->points);
     gltf->draco_bytes = 0;
@@ -49,17 +47,15 @@ static strl_status check_decoded(const strl__gltf *gltf, const strl__gltf_primit
     return STRL_OK;
 }
 
-static strl_status decode_announced(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                    const uint8_t *packed, const strl__draco_facts *facts,
-                                    strl_error *err)
+static strl_status decode_announced(strl__gltf *gltf, const strl__gltf_primitive *primitive, const uint8_t *packed,
+                                    const strl__draco_facts *facts, strl_error *err)
 {
     const size_t size = (size_t)gltf->views[primitive->draco->view].bytes;
     char why[120];
     strl__draco_room room = {.bytes = strl__gltf_room(gltf) - facts->connectivity_bytes};
     gltf->draco = strl__draco_decode(packed, size, facts, &room, why);
     if (room.wanted > room.bytes)
-        return strl__gltf_make_room(gltf, facts->connectivity_bytes + room.wanted, "a Draco mesh",
-                                    err);
+        return strl__gltf_make_room(gltf, facts->connectivity_bytes + room.wanted, "a Draco mesh", err);
     if (!gltf->draco)
         return strl__fail(err, STRL_ERR_FORMAT, "%s, bufferViews[%u]: its Draco mesh is damaged: %s",
                           gltf->reader->path, primitive->draco->view, why);
@@ -269,9 +265,8 @@ static strl_status place_instance(strl__gltf *gltf, const strl__gltf_instances *
     return status;
 }
 
-strl_status strl__gltf_read_elements(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                     uint64_t first, size_t count, uint32_t *elements,
-                                     strl_error *err)
+strl_status strl__gltf_read_elements(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t first,
+                                     size_t count, uint32_t *elements, strl_error *err)
 {
     if (!gltf->draco)
         return strl__gltf_read_indices(gltf, primitive->indices, first, count, elements, err);
@@ -279,13 +274,12 @@ strl_status strl__gltf_read_elements(strl__gltf *gltf, const strl__gltf_primitiv
     return STRL_OK;
 }
 
-static strl_status index_fail(const strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                              uint32_t found, uint64_t triangle, strl_error *err)
+static strl_status index_fail(const strl__gltf *gltf, const strl__gltf_primitive *primitive, uint32_t found,
+                              uint64_t triangle, strl_error *err)
 {
-    return strl__fail(
-        err, STRL_ERR_FORMAT,
-        "%s, accessors[%u]: expected indices below %" PRIu64 ", found %u in triangle %" PRIu64,
-        gltf->reader->path, primitive->indices, gltf->pass.vertex_count, found, triangle);
+    return strl__fail(err, STRL_ERR_FORMAT,
+                      "%s, accessors[%u]: expected indices below %" PRIu64 ", found %u in triangle %" PRIu64,
+                      gltf->reader->path, primitive->indices, gltf->pass.vertex_count, found, triangle);
 }
 
 static strl_status read_first(strl__gltf *gltf, const strl__gltf_primitive *primitive,
@@ -333,8 +327,7 @@ strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primit
     if (pass->triangle_count == 0)
         return STRL_OK;
     if (primitive->indices != STRL__NO_ITEM)
-        status = strl__gltf_find_range(gltf, &gltf->primitives[primitive - gltf->primitives],
-                                       elements, err);
+        status = strl__gltf_find_range(gltf, &gltf->primitives[primitive - gltf->primitives], elements, err);
     if (!status && primitive->indices != STRL__NO_ITEM)
         status = load_vertices(gltf, primitive, err);
     if (!status && primitive->mode == 6 && !gltf->draco)
@@ -396,16 +389,15 @@ static void add_corners(strl__gltf *gltf, const uint32_t slots[3])
 }
 
 /* One corner after the other, where the vertices lie far apart; of triangles from `first` on. */
-static strl_status look_up(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t first,
-                           size_t count, strl_error *err)
+static strl_status look_up(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t first, size_t count,
+                           strl_error *err)
 {
     const unsigned mode = mode_of(primitive), shared = mode == 4 ? 0 : mode == 5 ? 2 : 1;
     strl_status status = STRL_OK;
     for (size_t i = 0; i < count && !status; i++) {
         uint32_t index = gltf->elements[i];
         if (index >= gltf->pass.vertex_count)
-            return index_fail(gltf, primitive, index,
-                              first + (mode == 4 ? i / 3 : i > shared ? i - shared : 0), err);
+            return index_fail(gltf, primitive, index, first + (mode == 4 ? i / 3 : i > shared ? i - shared : 0), err);
         status = read_corners(gltf, primitive, index, 1, &gltf->corners[i], err);
     }
     return status;
@@ -420,8 +412,7 @@ static strl_status read_run(strl__gltf *gltf, const strl__gltf_primitive *primit
     const size_t elements = mode == 4 ? 3 * count : mode == 5 ? count + 2 : count + 1;
     if (primitive->indices == STRL__NO_ITEM)
         return read_corners(gltf, primitive, begin, elements, gltf->corners, err);
-    strl_status status =
-        strl__gltf_read_elements(gltf, primitive, begin, elements, gltf->elements, err);
+    strl_status status = strl__gltf_read_elements(gltf, primitive, begin, elements, gltf->elements, err);
     if (!status && gltf->pass.is_scattered)
         status = look_up(gltf, primitive, first, elements, err);
     return status;

@@ -4,8 +4,7 @@
  * vertices in a row. */
 #define ROW_VERTICES 16u
 
-static strl_status measure(strl__gltf *gltf, strl__gltf_primitive *primitive, uint64_t elements,
-                           strl_error *err)
+static strl_status measure(strl__gltf *gltf, strl__gltf_primitive *primitive, uint64_t elements, strl_error *err)
 {
     const uint64_t most = STRL__GLTF_CHUNK / 3 * 3;
     uint32_t lowest = UINT32_MAX, highest = 0;
@@ -25,8 +24,7 @@ static strl_status measure(strl__gltf *gltf, strl__gltf_primitive *primitive, ui
     return status;
 }
 
-strl_status strl__gltf_find_range(strl__gltf *gltf, strl__gltf_primitive *primitive,
-                                  uint64_t elements, strl_error *err)
+strl_status strl__gltf_find_range(strl__gltf *gltf, strl__gltf_primitive *primitive, uint64_t elements, strl_error *err)
 {
     strl__gltf_pass *pass = &gltf->pass;
     strl_status status = STRL_OK;
@@ -35,8 +33,8 @@ strl_status strl__gltf_find_range(strl__gltf *gltf, strl__gltf_primitive *primit
     if (status)
         return status;
     /* An index that is too large is refused with its triangle, when that is read. */
-    const uint64_t end = primitive->highest < pass->vertex_count ? (uint64_t)primitive->highest + 1
-                                                                 : pass->vertex_count;
+    const uint64_t end =
+        primitive->highest < pass->vertex_count ? (uint64_t)primitive->highest + 1 : pass->vertex_count;
     pass->first_loaded = primitive->lowest < end ? primitive->lowest : end;
     pass->loaded_count = end - pass->first_loaded;
     pass->is_scattered = pass->loaded_count > STRL__GLTF_CHUNK + ROW_VERTICES * elements;

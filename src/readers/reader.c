@@ -281,12 +281,12 @@ strl_status strl_reader_next(strl_reader *reader, strl_triangle *triangles, size
     return reader->failure.status;
 }
 
-void strl__reader_advise(const strl_reader *reader, uint64_t needed, uint64_t limit,
-                         char advice[STRL__ADVICE_BYTES])
+void strl__reader_advise(const strl_reader *reader, uint64_t needed, uint64_t limit, char advice[STRL__ADVICE_BYTES])
 {
     const uint64_t whole = reader->whole_bytes ? reader->whole_bytes : reader->memory_bytes;
     const double megabytes = (double)whole / (double)limit * (double)needed / (1 << 20);
-    snprintf(advice, STRL__ADVICE_BYTES, reader->whole_bytes ? "--memory %.0fM would do" : "reading it takes about %.0fM of memory",
+    snprintf(advice, STRL__ADVICE_BYTES,
+             reader->whole_bytes ? "--memory %.0fM would do" : "reading it takes about %.0fM of memory",
              ceil(megabytes));
 }
 
@@ -355,8 +355,7 @@ const char *strl_reader_missing(const strl_reader *reader, uint32_t index)
 }
 
 /* An entry of its own and no limit of their number: each of them was opened. */
-strl_status strl__reader_note_beside(strl_reader *reader, const char *path,
-                                     const strl_file_info *info, strl_error *err)
+strl_status strl__reader_note_beside(strl_reader *reader, const char *path, const strl_file_info *info, strl_error *err)
 {
     strl__beside made = {.key = strl__checksum(path, strlen(path))};
     for (size_t i = 0; i < reader->beside_count; i++)
@@ -374,8 +373,7 @@ strl_status strl__reader_note_beside(strl_reader *reader, const char *path,
     if (info)
         made.info = *info;
     made.path = strl__strdup(path);
-    if (!made.path || !strl__grow(&reader->beside, &reader->beside_capacity,
-                                  reader->beside_count + 1, sizeof made)) {
+    if (!made.path || !strl__grow(&reader->beside, &reader->beside_capacity, reader->beside_count + 1, sizeof made)) {
         strl__free(made.path);
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", reader->path);
     }

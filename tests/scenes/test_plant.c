@@ -293,11 +293,15 @@ static void a_failure_leaves_no_file(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        TEST(counts_are_met_to_the_last_dozen), TEST(sizes_out_of_range_are_refused),
-        TEST(the_seed_fixes_every_byte),        TEST(the_bytes_are_those_of_the_first_machine),
-        TEST(small_buffers_are_many),           TEST(buffers_of_an_older_model_go),
+        TEST(counts_are_met_to_the_last_dozen),
+        TEST(sizes_out_of_range_are_refused),
+        TEST(the_seed_fixes_every_byte),
+        TEST(the_bytes_are_those_of_the_first_machine),
+        TEST(small_buffers_are_many),
+        TEST(buffers_of_an_older_model_go),
         TEST(every_kind_of_file_has_the_same_counts),
-        TEST(what_cannot_be_is_refused),        TEST(a_stop_leaves_no_file),
+        TEST(what_cannot_be_is_refused),
+        TEST(a_stop_leaves_no_file),
         TEST(a_failure_leaves_no_file),
     };
     return cmocka_run_group_tests(tests, make_folder, remove_folder);

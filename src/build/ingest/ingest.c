@@ -68,7 +68,8 @@ static strl_status open_readers(strl_build_context *context, strl_reader **reade
     strl_status status = STRL_OK;
     uint64_t share = context->memory_bytes / 4; /* one at a time is read */
     for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
-        strl_reader_desc desc = {.path = context->desc->inputs[i], .scratch_dir = context->scratch_dir,
+        strl_reader_desc desc = {.path = context->desc->inputs[i],
+                                 .scratch_dir = context->scratch_dir,
                                  .memory_bytes = share < LEAST_READER_BYTES ? LEAST_READER_BYTES : share,
                                  .whole_bytes = context->memory_bytes,
                                  .names_bytes = context->memory_bytes / 6,
