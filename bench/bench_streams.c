@@ -30,7 +30,8 @@ static const struct {
     {"colours", STRL__STREAM_COLOUR, STRL__STREAM_PALETTE},
     {"palettes", STRL__STREAM_PALETTE, STRL__STREAM_SELECT},
     {"copied_triangles", STRL__STREAM_SELECT, STRL__STREAM_COPY_NORMAL},
-    {"copied_normals", STRL__STREAM_COPY_NORMAL, STRL__STREAM_COUNT},
+    {"copied_normals", STRL__STREAM_COPY_NORMAL, STRL__STREAM_TEXCOORD},
+    {"texture_coordinates", STRL__STREAM_TEXCOORD, STRL__STREAM_COUNT},
 };
 
 struct node {

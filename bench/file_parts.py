@@ -3,13 +3,13 @@ import measure
 import scale_parts
 import sheets
 
-SHOWN_FRAMES, SHOWN_SIZE = 6, "1280x720"
+SHOWN_FRAMES = 6
 ASSEMBLIES = ("isosurface_10m", "clinic", "plant_10m")
 
 
 def render(bench, model_file, target, path, *options):
     stats = target.with_suffix(".jsonl")
-    bench.program("render", model_file, "--path", path, "--size", SHOWN_SIZE, "--error", 1, "-o", target, "--stats", stats,
+    bench.program("render", model_file, "--path", path, "--size", bench.options.size, "--error", 1, "-o", target, "--stats", stats,
                   "--depth", *options)
     return measure.read_lines(stats)
 
@@ -17,26 +17,28 @@ def render(bench, model_file, target, path, *options):
 def look_at(bench, model, supersample):
     """An orbit of the container beside the same of the input, as compare sees it, and a sheet for people."""
     folders = [bench.scratch / f"{model}_{side}" for side in ("reference", "ours")]
-    options = ("--supersample", supersample)
-    render(bench, bench.reference_of(model), folders[0], "orbit", "--frames", SHOWN_FRAMES, "--full", *options)
+    options, shown = ("--supersample", supersample), min(SHOWN_FRAMES, bench.options.frames)
+    render(bench, bench.reference_of(model), folders[0], "orbit", "--frames", shown, "--full", *options)
     frames = render(bench, bench.container_of(model), folders[1], folders[0] / "path.json", *options)
     compared = bench.program("compare", *folders, "--error", 1, "--json", allowed=(0, 1)).json()
     sheet = bench.scratch / "sheets" / f"{model}_x{supersample}.png"
     sheet.parent.mkdir(exist_ok=True)
-    sheets.side_by_side(*(folder / "contact.png" for folder in folders), SHOWN_FRAMES, sheet)
+    if shown > 1:
+        sheets.side_by_side(*(folder / "contact.png" for folder in folders), shown, sheet)
     bench.drop(*folders)
     return compared, {name: measure.spread([frame[name] for frame in frames]) for name in ("triangles", "draws")}
 
 
 def show(bench, model):
-    if bench.kept("model", model, {}):
+    settings = {"frames": min(SHOWN_FRAMES, bench.options.frames), "size": bench.options.size}
+    if bench.kept("model", model, settings):
         return
     _, built = scale_parts.build_once(bench, model)
     verified = bench.program("verify", bench.container_of(model), "--against", *bench.inputs_of(model), "--memory", "1G",
                              "--json", allowed=(0, 1))
     compared, drawn = look_at(bench, model, 1)
     filtered, _ = look_at(bench, model, 4)
-    bench.log.add("model", model, {}, files=len(bench.inputs_of(model)), verified=verified.json(), holds=verified.status == 0,
+    bench.log.add("model", model, settings, files=len(bench.inputs_of(model)), verified=verified.json(), holds=verified.status == 0,
                   said=verified.errors, compare=compared, filtered=filtered, drawn=drawn, **built)
 
 

@@ -60,12 +60,12 @@ static int print_json(const strl_build_result *r)
 {
     uint64_t dropped = r->dropped_nonfinite + r->dropped_degenerate;
     json_t *object = json_pack(
-        "{s:I, s:I, s:{s:I, s:I, s:I, s:I, s:I}, s:f, s:{s:I, s:I}, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:f, s:f, s:f, s:o, s:I, s:I, s:b}",
+        "{s:I, s:I, s:{s:I, s:I, s:I, s:I, s:I}, s:f, s:{s:I, s:I, s:I}, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:f, s:f, s:f, s:o, s:I, s:I, s:b}",
         "triangles_in", (json_int_t)r->triangles_in, "triangles_leaf", (json_int_t)r->triangles_leaf, "dropped",
         "triangles", (json_int_t)dropped, "nonfinite", (json_int_t)r->dropped_nonfinite, "degenerate",
         (json_int_t)r->dropped_degenerate, "lines", (json_int_t)r->dropped_lines, "points",
         (json_int_t)r->dropped_points, "dropped_longest_edge", r->dropped_longest, "warnings", "missing_libraries", (json_int_t)r->missing_libraries,
-        "coarse_lattices", (json_int_t)r->coarse_lattices, "vertices", (json_int_t)r->vertices, "parts", (json_int_t)r->parts, "materials",
+        "missing_images", (json_int_t)r->missing_images, "coarse_lattices", (json_int_t)r->coarse_lattices, "vertices", (json_int_t)r->vertices, "parts", (json_int_t)r->parts, "materials",
         (json_int_t)r->materials, "placements", (json_int_t)r->placements, "nodes", (json_int_t)r->nodes, "groups",
         (json_int_t)r->groups, "levels", (json_int_t)r->levels, "root_triangles", (json_int_t)r->root_triangles,
         "bytes_out", (json_int_t)r->bytes_out, "step", r->step, "quantisation_error", r->quantisation_error, "seconds",
@@ -112,6 +112,9 @@ static void print_text(const strl_build_result *r, const char *output)
     if (r->missing_libraries)
         printf("missing: %llu material librar%s, whose materials are white\n", (unsigned long long)r->missing_libraries,
                r->missing_libraries == 1 ? "y" : "ies");
+    if (r->missing_images)
+        printf("missing: %llu image%s, whose materials have their colours alone\n", (unsigned long long)r->missing_images,
+               strl_cli_plural(r->missing_images));
     if (r->coarse_lattices)
         printf("the lattice is coarser than a sixteenth of the short edges\n");
     printf("lattice step %.9g: no point moves by more than %.3g\n", r->step, r->quantisation_error);

@@ -204,6 +204,7 @@ static void header_to_json(json_t *object, const strl_container *container)
     json_object_set_new(object, "unit", json_string(info->unit));
     json_object_set_new(object, "up", json_string(axes[info->up_axis]));
     json_object_set_new(object, "has_colour", json_boolean(info->has_colour));
+    json_object_set_new(object, "has_images", json_boolean(info->has_images));
     json_object_set_new(object, "closed", json_boolean(info->closed_hint != 0));
     json_object_set_new(object, "bounds", reals(info->bounds, 6));
     put_count(object, "triangles_in", info->triangles_in);
@@ -231,8 +232,8 @@ static void print_header(const char *path, const strl_container *container)
            strl_cli_plural(triangles), share(info->file_bytes, triangles));
     char unit[sizeof info->unit];
     format_unit(info, unit);
-    printf("  unit %s, up %c, %s, %s\n", unit[0] ? unit : "unknown", "xyz"[info->up_axis],
-           info -> has_colour ? "coloured" : "white", info->closed_hint ? "input closed" : "input open");
+    printf("  unit %s, up %c, %s%s, %s\n", unit[0] ? unit : "unknown", "xyz"[info->up_axis],
+           info->has_colour ? "coloured" : "white", info->has_images ? ", images and texture coordinates" : "", info->closed_hint ? "input closed" : "input open");
     printf("  bounds %.9g %.9g %.9g to %.9g %.9g %.9g\n", info->bounds[0], info->bounds[1], info->bounds[2],
            info->bounds[3], info->bounds[4], info->bounds[5]);
     printf("  read %" PRIu64 " triangle%s; dropped %" PRIu64 " not finite, %" PRIu64 " degenerate; skipped %" PRIu64

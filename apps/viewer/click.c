@@ -26,9 +26,9 @@ static void find_names(strl__viewer *v, strl_picked *picked)
 static void journal_pick(strl__viewer *v, const strl_picked *picked)
 {
     double difference[3], distance = strl_picks_distance(&v->picks, difference);
-    json_t *object = json_pack("{s:s,s:s,s:o,s:o,s:f}", "part", picked->part, "material", picked->material, "point",
-                               strl_journal_vector(picked->pick.point), "normal",
-                               strl_journal_vector(picked->pick.normal), "error", picked->pick.error);
+    json_t *object = json_pack("{s:o,s:o,s:o,s:o,s:f}", "part", strl_journal_text(picked->part), "material",
+                               strl_journal_text(picked->material), "point", strl_journal_vector(picked->pick.point),
+                               "normal", strl_journal_vector(picked->pick.normal), "error", picked->pick.error);
     if (object && distance >= 0) {
         json_object_set_new(object, "distance", json_real(distance));
         json_object_set_new(object, "difference", strl_journal_vector(difference));
@@ -69,7 +69,7 @@ void strl__viewer_click(strl__viewer *v, const strl_click *click)
 
 static void look_at(strl__viewer *v, const double bounds[6])
 {
-    strl_recorder_stop(&v->recorder);
+    strl__viewer_end_replay(v);
     if (v->controls.mode == STRL_NAVIGATOR_WALK)
         v->controls.mode = STRL_NAVIGATOR_ORBIT;
     strl_pose pose = strl_navigator_pose_on(&v->navigator, bounds);

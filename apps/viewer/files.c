@@ -90,12 +90,18 @@ strl_status strl__viewer_open_model(strl__viewer *v, const char *path, strl_erro
     strl_settings_get_bookmarks(&v->settings, info->model_id, &v->bookmarks);
     strl__viewer_reset(v);
     strl_journal_write(v->journal, "opened",
-                       json_pack("{s:s,s:I,s:i}", "file", path, "triangles", (json_int_t)model->triangles, "parts",
-                                 (int)info->part_count));
+                       json_pack("{s:o,s:I,s:i}", "file", strl_journal_text(path), "triangles",
+                                 (json_int_t)model->triangles, "parts", (int)info->part_count));
     if (model->triangles == 0)
         strl__viewer_say(v, "the model is empty: of its file %llu lines, %llu points and no triangle were found",
                          (unsigned long long)info->dropped_lines, (unsigned long long)info->dropped_points);
     return STRL_OK;
+}
+
+static bool is_same_model(const strl_viewer_model *a, const strl_viewer_model *b)
+{
+    const uint8_t *id = strl_container_get_info(a->container)->model_id;
+    return memcmp(id, strl_container_get_info(b->container)->model_id, 16) == 0;
 }
 
 /* The walk and the renderer begin anew, the rest stays. */
@@ -106,6 +112,8 @@ strl_status strl__viewer_set_budgets(strl__viewer *v, strl_error *err)
     v->desc.memory_bytes = (uint64_t)((double)v->controls.memory_mib * (1 << 20));
     v->desc.gpu_memory_bytes = (uint64_t)((double)v->controls.gpu_memory_mib * (1 << 20));
     strl_status status = open_walk(v, v->path, &model, err);
+    if (status == STRL_OK && !is_same_model(v->model, model))
+        status = strl__fail(err, STRL_ERR_ARGUMENT, "%s holds another model now: drop it here to open that", v->path);
     if (status == STRL_OK)
         status = strl__viewer_make_renderer(v, err);
     if (status == STRL_OK) {
@@ -136,7 +144,7 @@ void strl__viewer_poll_opener(strl__viewer *v)
     if (v->news.state == STRL_OPENER_READY)
         open_built(v);
     if (v->news.state == STRL_OPENER_FAILED) {
-        strl_journal_write(v->journal, "build", json_pack("{s:s}", "failed", v->news.error.message));
+        strl_journal_write(v->journal, "build", json_pack("{s:o}", "failed", strl_journal_text(v->news.error.message)));
         strl__viewer_say(v, "%s", v->news.error.status == STRL_ERR_CANCELLED ? "cancelled" : v->news.error.message);
         v->frames_left = STRL__FRAMES_AFTER_INPUT;
     }
@@ -149,6 +157,7 @@ void strl__viewer_remember(strl__viewer *v)
 {
     strl_error err = {0};
     strl_settings *settings = &v->settings;
+    strl_settings_renew(settings);
     if ((double)v->controls.error_px != v->begun.error_px)
         settings->error_px = v->controls.error_px;
     if (v->desc.memory_bytes != v->begun.memory_bytes)

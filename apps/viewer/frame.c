@@ -19,7 +19,7 @@ static void take_screenshot(strl__viewer *v)
         return;
     }
     strl__viewer_say(v, "saved %.300s", path);
-    strl_journal_write(v->journal, "screenshot", json_pack("{s:s}", "file", path));
+    strl_journal_write(v->journal, "screenshot", json_pack("{s:o}", "file", strl_journal_text(path)));
 }
 
 static strl_draw_options draw_options(const strl__viewer *v)
@@ -157,6 +157,7 @@ static void show_panels(strl__viewer *v, const strl_render_stats *drawn)
     double offset = v->controls.section_offset = v->section.offset;
     strl_gui_show(v->gui, &facts, &v->controls);
     v->reveal = UINT32_MAX;
+    v->shows_rest = facts.idle && !facts.message[0];
     take_section(v, offset);
     if (strcmp(v->controls.search, v->parts.tree.search) != 0)
         strl_part_tree_search(&v->parts.tree, v->controls.search);

@@ -17,6 +17,8 @@ extern "C" {
 struct strl_gui {
     ImGuiContext *context;
     float scale;
+    float laid_out[3]; /* width, height and scale for which the panels have their places */
+    bool menu_open;
 };
 
 namespace strl_panels
@@ -43,6 +45,11 @@ void heading(const char *text)
     ImGui::Spacing();
     ImGui::TextColored(faint, "%s", text);
     ImGui::Separator();
+}
+
+ImGuiCond when_of(const place &at)
+{
+    return at.anew ? ImGuiCond_Always : ImGuiCond_FirstUseEver;
 }
 
 bool begin_table(const char *name)
@@ -133,10 +140,12 @@ void show_controls(const strl_gui_facts *facts, strl_gui_controls *controls)
     ImGui::RadioButton("walk", &mode, STRL_NAVIGATOR_WALK);
     controls->mode = (strl_navigator_mode)mode;
     if (mode != STRL_NAVIGATOR_ORBIT)
-        ImGui::TextColored(faint, "%.3g units/s", facts->speed);
+        ImGui::TextColored(faint, "%.3g %s/s", facts->speed, facts->unit[0] ? facts->unit : "units");
     ImGui::Checkbox("orthographic", &controls->orthographic);
     ImGui::SameLine();
-    ImGui::Checkbox("parts", &controls->parts);
+    bool parts = controls->parts;
+    if (ImGui::Checkbox("parts", &parts))
+        strl_requests_add(&controls->requests, STRL_ACTION_PARTS, 0);
     int debug = controls->debug;
     ImGui::SetNextItemWidth(-1);
     ImGui::Combo("##colours", &debug, "colours of the model\0colours by cluster\0colours by level\0colours by error\0");
@@ -211,11 +220,12 @@ void show_statistics(const strl_gui_facts *facts)
     ImGui::EndTable();
 }
 
-void show_panel(float scale, const strl_gui_facts *facts, strl_gui_controls *controls)
+void show_panel(const place &at, const strl_gui_facts *facts, strl_gui_controls *controls)
 {
     char text[32];
-    ImGui::SetNextWindowPos(ImVec2(margin * scale, margin * scale), ImGuiCond_FirstUseEver);
-    ImGui::SetNextWindowSizeConstraints(ImVec2(panel_width * scale, 0), ImVec2(panel_width * scale, FLT_MAX));
+    float width = panel_width * at.scale, room = at.height - 2 * margin * at.scale;
+    ImGui::SetNextWindowPos(ImVec2(margin * at.scale, margin * at.scale), when_of(at));
+    ImGui::SetNextWindowSizeConstraints(ImVec2(width, 0), ImVec2(width, room > 1 ? room : 1));
     ImGui::Begin("Stroll", NULL,
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav);
     format_count(text, sizeof text, facts->model_triangles);
@@ -246,22 +256,31 @@ const ImGuiWindowFlags overlay_flags = ImGuiWindowFlags_NoDecoration | ImGuiWind
                                        ImGuiWindowFlags_NoNav | ImGuiWindowFlags_NoInputs |
                                        ImGuiWindowFlags_NoSavedSettings;
 
+/* Letters become smaller where the window is too small for them. */
 void show_help(const char *keys)
 {
-    ImVec2 size = ImGui::GetIO().DisplaySize;
+    ImVec2 size = ImGui::GetIO().DisplaySize, text = ImGui::CalcTextSize(keys);
+    ImVec2 padding = ImGui::GetStyle().WindowPadding;
+    float fit = std::fmin((size.x - 2 * padding.x) / text.x, (size.y - 2 * padding.y) / text.y);
     ImGui::SetNextWindowPos(ImVec2(size.x * 0.5f, size.y * 0.5f), ImGuiCond_Always, ImVec2(0.5f, 0.5f));
     ImGui::SetNextWindowBgAlpha(0.94f);
     ImGui::Begin("##help", NULL, overlay_flags);
+    ImGui::SetWindowFontScale(std::fmin(std::fmax(fit, 0.2f), 1.0f));
     ImGui::TextUnformatted(keys);
     ImGui::End();
 }
+
+/* Of the window's width: sentences with long names go over several lines. */
+const float message_share = 0.75f;
 
 void show_message(float scale, const char *message)
 {
     ImVec2 size = ImGui::GetIO().DisplaySize;
     ImGui::SetNextWindowPos(ImVec2(size.x * 0.5f, size.y - margin * scale), ImGuiCond_Always, ImVec2(0.5f, 1));
     ImGui::Begin("##message", NULL, overlay_flags);
+    ImGui::PushTextWrapPos(size.x * message_share);
     ImGui::TextUnformatted(message);
+    ImGui::PopTextWrapPos();
     ImGui::End();
 }
 
@@ -276,6 +295,28 @@ void show_lines(const strl_gui_facts *facts)
         list->AddLine(ImVec2(at[0] / scale.x, at[1] / scale.y), ImVec2(at[2] / scale.x, at[3] / scale.y), line_colour,
                       1.5f);
     }
+}
+
+/* Of a menu or a choice. */
+bool is_menu_open()
+{
+    return ImGui::IsPopupOpen("", ImGuiPopupFlags_AnyPopup);
+}
+
+/* The panels have no navigation by keys, which would do this. */
+void close_menu_by_key()
+{
+    if (is_menu_open() && ImGui::IsKeyPressed(ImGui::GetKeyIndex(ImGuiKey_Escape), false))
+        ImGui::SetWindowFocus(NULL);
+}
+
+place place_panels(strl_gui *gui)
+{
+    ImVec2 size = ImGui::GetIO().DisplaySize;
+    const float wanted[3] = {size.x, size.y, gui->scale};
+    bool anew = std::memcmp(wanted, gui->laid_out, sizeof wanted) != 0;
+    std::memcpy(gui->laid_out, wanted, sizeof wanted);
+    return place{gui->scale, size.x, size.y, anew};
 }
 
 } // namespace
@@ -326,10 +367,11 @@ void strl_gui_show(strl_gui *gui, const strl_gui_facts *facts, strl_gui_controls
     ImGui_ImplOpenGL3_NewFrame();
     ImGui_ImplGlfw_NewFrame();
     ImGui::NewFrame();
-    place at = {gui->scale, ImGui::GetIO().DisplaySize.x, ImGui::GetIO().DisplaySize.y};
+    close_menu_by_key();
+    place at = place_panels(gui);
     show_lines(facts);
     show_marks(facts);
-    show_panel(gui->scale, facts, controls);
+    show_panel(at, facts, controls);
     show_section(at, facts, controls);
     if (controls->parts)
         show_parts(at, facts, controls);
@@ -339,6 +381,7 @@ void strl_gui_show(strl_gui *gui, const strl_gui_facts *facts, strl_gui_controls
         show_help(facts->keys);
     if (facts->message[0])
         show_message(gui->scale, facts->message);
+    gui->menu_open = is_menu_open();
     ImGui::Render();
     ImGui_ImplOpenGL3_RenderDrawData(ImGui::GetDrawData());
 }
@@ -352,5 +395,5 @@ bool strl_gui_takes_mouse(const strl_gui *gui)
 bool strl_gui_takes_keyboard(const strl_gui *gui)
 {
     ImGui::SetCurrentContext(gui->context);
-    return ImGui::GetIO().WantTextInput;
+    return ImGui::GetIO().WantTextInput || gui->menu_open;
 }

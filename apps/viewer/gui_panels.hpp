@@ -16,8 +16,10 @@ const float panel_width = 290, margin = 12;
 struct place {
     float scale;
     float width, height; /* of the window, screen units */
+    bool anew;           /* panels go back to their places: the window's or the text's size is another */
 };
 
+ImGuiCond when_of(const place &at);
 void heading(const char *text);
 bool begin_table(const char *name);
 void row(const char *name, const char *value);

@@ -32,9 +32,9 @@ bool asks(strl_gui_controls *controls, const char *label, strl_action action, ui
 void begin_panel(const place &at, const char *name, float x, float y, float pivot_x, float pivot_y, float height)
 {
     float room = at.height - 2 * margin * at.scale;
-    ImGui::SetNextWindowPos(ImVec2(x, y), ImGuiCond_FirstUseEver, ImVec2(pivot_x, pivot_y));
+    ImGui::SetNextWindowPos(ImVec2(x, y), when_of(at), ImVec2(pivot_x, pivot_y));
     if (height > 0)
-        ImGui::SetNextWindowSize(ImVec2(panel_width * at.scale, height < room ? height : room), ImGuiCond_FirstUseEver);
+        ImGui::SetNextWindowSize(ImVec2(panel_width * at.scale, height < room ? height : room), when_of(at));
     else
         ImGui::SetNextWindowSizeConstraints(ImVec2(panel_width * at.scale, 0), ImVec2(panel_width * at.scale, room));
     ImGui::Begin(name, NULL,
@@ -98,6 +98,7 @@ void part_row(const strl_parts *parts, uint32_t index, strl_gui_controls *contro
         if (ImGui::IsMouseDoubleClicked(0))
             strl_requests_add(&controls->requests, STRL_ACTION_LOOK, index);
     }
+    tooltip(node->is_part ? strl_part_tree_name(tree, tree->order[node->first_part]) : label);
     part_menu(index, controls);
     /* Drawn apart: a label's text would be an identity, and ends at ##. */
     ImGui::GetWindowDrawList()->AddText(at, ImGui::GetColorU32(ImGuiCol_Text), label[0] ? label : "(no name)");
@@ -199,7 +200,11 @@ void show_section(const place &at, const strl_gui_facts *facts, strl_gui_control
     if (!facts->section->on)
         return;
     const char *axes[] = {"x", "y", "z"};
-    begin_panel(at, "Section", (panel_width + 2 * margin) * at.scale, margin * at.scale, 0, 0, 0);
+    /* Beside the main panel, or below where the parts are there. */
+    float left = (panel_width + 2 * margin) * at.scale;
+    bool room = at.width >= left + (panel_width + margin) * at.scale + (controls->parts ? left : 0);
+    begin_panel(at, "Section", room ? left : margin * at.scale,
+                room ? margin * at.scale : at.height - margin * at.scale, 0, room ? 0 : 1, 0);
     for (uint32_t axis = 0; axis < 3; axis++) {
         asks(controls, axes[axis], STRL_ACTION_SECTION_AXIS, axis);
         ImGui::SameLine();

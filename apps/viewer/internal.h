@@ -45,6 +45,7 @@ typedef struct strl__viewer {
     uint32_t frames_left; /* to draw before resting */
     uint64_t frames_shown;
     bool resting, stirred; /* stirred: something has moved since the last rest was told */
+    bool shows_rest;       /* the panels say that nothing moves, and no message that will have to go */
     bool screenshot;       /* of the next frame; a flag, so that a reset in the same frame does not lose it */
     bool falls;            /* the walker is not at rest above the ground */
     strl_parts parts;
@@ -84,6 +85,10 @@ bool strl__viewer_move(strl__viewer *v, const strl_window_input *input, double s
 void strl__viewer_walk(strl__viewer *v); /* puts the visitor's feet on the ground */
 void strl__viewer_toggle_record(strl__viewer *v);
 void strl__viewer_toggle_replay(strl__viewer *v);
+/* Saves what is being recorded, if anything is. */
+void strl__viewer_end_recording(strl__viewer *v);
+/* Before the camera goes elsewhere; a recording goes with it. */
+void strl__viewer_end_replay(strl__viewer *v);
 
 /* files.c */
 /* Instead of the model that is open; that stays on failure. The window and its context are there, or not yet. */

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/memory.h"
 
 strl_status strl_journal_open(const char *path, FILE **journal, strl_error *err)
 {
@@ -27,6 +28,19 @@ void strl_journal_write(FILE *journal, const char *name, json_t *object)
         fflush(journal);
     }
     json_decref(object);
+}
+
+json_t *strl_journal_text(const char *text)
+{
+    json_t *string = json_string(text);
+    size_t bytes = strlen(text) + 1;
+    char *plain = string ? NULL : strl__alloc(bytes, 1);
+    for (size_t i = 0; plain && i < bytes; i++)
+        plain[i] = (char)((unsigned char)text[i] < 0x80 ? text[i] : '?');
+    if (plain)
+        string = json_string(plain);
+    strl__free(plain);
+    return string;
 }
 
 json_t *strl_journal_vector(const double v[3])

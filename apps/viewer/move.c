@@ -8,11 +8,13 @@
 #define MOST_STEP_SECONDS 0.1
 /* Of a walker's height: what a foot steps onto. */
 #define STEP_SHARE 0.2
+/* How much the ground rises at most, of the way. */
+#define STEEPEST 4.0
 
 /* ---- walking */
 
-/* The surface below a point (or above it: the ground has risen), a coordinate on the up axis. */
-static bool find_ground(const strl__viewer *v, const double point[3], double *ground)
+/* The surface below a point, or no more than `rise` above it where nothing is below: a coordinate on the up axis. */
+static bool find_ground(const strl__viewer *v, const double point[3], double rise, double *ground)
 {
     unsigned up = v->model->up_axis;
     strl_pick_filter filter = strl__viewer_filter(v);
@@ -21,7 +23,7 @@ static bool find_ground(const strl__viewer *v, const double point[3], double *gr
         strl_ray ray = {.way = {0}};
         memcpy(ray.from, point, sizeof ray.from);
         ray.way[up] = turn ? 1 : -1;
-        if (strl_pick_list(&v->list, &ray, &filter, &pick)) {
+        if (strl_pick_list(&v->list, &ray, &filter, &pick) && (turn == 0 || pick.distance <= rise)) {
             *ground = pick.point[up];
             return true;
         }
@@ -29,12 +31,14 @@ static bool find_ground(const strl__viewer *v, const double point[3], double *gr
     return false;
 }
 
-static bool stand(strl__viewer *v, double seconds)
+/* went: how far in this frame. A roof over one who has left the ground behind is no ground that has risen. */
+static bool stand(strl__viewer *v, double went, double seconds)
 {
-    double foot[3], ground;
+    double foot[3], ground, over_ground = (1 + STEP_SHARE) * v->navigator.eye_height;
     memcpy(foot, v->navigator.eye, sizeof foot);
     foot[v->model->up_axis] += STEP_SHARE * v->navigator.eye_height;
-    return find_ground(v, foot, &ground) && strl_navigator_stand(&v->navigator, ground, seconds);
+    return find_ground(v, foot, STEEPEST * went - over_ground, &ground) &&
+           strl_navigator_stand(&v->navigator, ground, seconds);
 }
 
 /* Where to walk: here, at the newest pick, or in the middle of the model. */
@@ -44,7 +48,7 @@ static bool find_start(const strl__viewer *v, double point[3])
     const strl_picked *newest = strl_picks_newest(&v->picks);
     double ground;
     memcpy(point, v->navigator.eye, 3 * sizeof *point);
-    bool found = find_ground(v, point, &ground);
+    bool found = find_ground(v, point, INFINITY, &ground);
     if (!found && newest) {
         memcpy(point, newest->pick.point, 3 * sizeof *point);
         ground = point[up];
@@ -53,7 +57,7 @@ static bool find_start(const strl__viewer *v, double point[3])
     if (!found) {
         memcpy(point, v->navigator.centre, 3 * sizeof *point);
         point[up] = v->model->bounds[3 + up] + v->navigator.radius;
-        found = find_ground(v, point, &ground);
+        found = find_ground(v, point, INFINITY, &ground);
     }
     if (found)
         point[up] = ground + v->navigator.eye_height;
@@ -78,7 +82,7 @@ void strl__viewer_walk(strl__viewer *v)
 
 /* ---- paths */
 
-static void end_recording(strl__viewer *v)
+static void save_path(strl__viewer *v)
 {
     char path[4096];
     strl_error err = {0};
@@ -88,7 +92,20 @@ static void end_recording(strl__viewer *v)
         return;
     }
     strl__viewer_say(v, "saved %.300s", path);
-    strl_journal_write(v->journal, "path", json_pack("{s:s,s:i}", "file", path, "frames", (int)v->recorder.path.count));
+    strl_journal_write(v->journal, "path",
+                       json_pack("{s:o,s:i}", "file", strl_journal_text(path), "frames", (int)v->recorder.path.count));
+}
+
+void strl__viewer_end_recording(strl__viewer *v)
+{
+    if (v->recorder.state == STRL_RECORDER_RECORDS)
+        save_path(v);
+}
+
+void strl__viewer_end_replay(strl__viewer *v)
+{
+    if (v->recorder.state == STRL_RECORDER_REPLAYS)
+        strl_recorder_stop(&v->recorder);
 }
 
 void strl__viewer_toggle_record(strl__viewer *v)
@@ -105,8 +122,7 @@ void strl__viewer_toggle_record(strl__viewer *v)
 
 void strl__viewer_toggle_replay(strl__viewer *v)
 {
-    if (v->recorder.state == STRL_RECORDER_RECORDS)
-        end_recording(v);
+    strl__viewer_end_recording(v);
     if (v->recorder.state == STRL_RECORDER_REPLAYS) {
         strl_recorder_stop(&v->recorder);
     } else if (!strl_recorder_replay(&v->recorder)) {
@@ -136,10 +152,10 @@ static void record(strl__viewer *v, double seconds)
 {
     if (v->recorder.state == STRL_RECORDER_RECORDS && v->navigator.orthographic)
         v->path_ends = true;
-    else if (!strl_recorder_add(&v->recorder, &v->camera, seconds))
-        strl__viewer_say(v, "the path is as long as one can be: recording has stopped");
+    else if (!strl_recorder_add(&v->recorder, &v->camera, seconds)) /* as long as one can be */
+        save_path(v);
     if (v->path_ends)
-        end_recording(v);
+        strl__viewer_end_recording(v);
     v->path_ends = false;
 }
 
@@ -164,19 +180,23 @@ static void follow_controls(strl__viewer *v)
 bool strl__viewer_move(strl__viewer *v, const strl_window_input *input, double seconds)
 {
     double step = fmin(seconds, MOST_STEP_SECONDS);
-    bool went = v->navigator.going > 0;
-    if (hand_moves(input) && v->recorder.state == STRL_RECORDER_REPLAYS)
-        strl_recorder_stop(&v->recorder);
+    bool was_going = v->navigator.going > 0;
+    if (hand_moves(input))
+        strl__viewer_end_replay(v);
     follow_controls(v);
     strl_navigator_drag_left(&v->navigator, input->left[0], input->left[1]);
     strl_navigator_drag_right(&v->navigator, input->right[0], input->right[1]);
     strl_navigator_wheel(&v->navigator, input->wheel);
+    double before[3], went = 0;
+    memcpy(before, v->navigator.eye, sizeof before);
     strl_navigator_move(&v->navigator, input->way, input->fast, step);
+    for (int i = 0; i < 3; i++)
+        went = hypot(went, v->navigator.eye[i] - before[i]);
     bool goes = strl_navigator_step(&v->navigator, step);
-    if (went && !goes)
+    if (was_going && !goes)
         strl_journal_write(v->journal, "arrived", json_pack("{s:o}", "eye", strl_journal_vector(v->navigator.eye)));
     bool replays = replay(v, seconds);
-    bool falls = !goes && !replays && v->navigator.mode == STRL_NAVIGATOR_WALK && stand(v, step);
+    bool falls = !goes && !replays && v->navigator.mode == STRL_NAVIGATOR_WALK && stand(v, went, step);
     if (!replays)
         v->camera = strl_navigator_camera(&v->navigator, v->size[0], v->size[1]);
     record(v, seconds);

@@ -19,7 +19,8 @@ void strl__viewer_reset(strl__viewer *v)
                                       .text_scale = old.text_scale,
                                       .requests = old.requests};
     strl_navigator_init(&v->navigator, v->model->bounds, v->model->up_axis, v->model->unit_metres);
-    strl_recorder_stop(&v->recorder);
+    strl__viewer_end_recording(v);
+    strl__viewer_end_replay(v);
     strl_parts_select(&v->parts, 0, 0);
     strl_parts_show_all(&v->parts);
     v->picks.count = 0;
@@ -49,6 +50,14 @@ static bool places_of(const strl__viewer *v, uint32_t node, uint32_t *first, uin
     if (node < tree->node_count)
         *first = tree->nodes[node].first_part, *count = tree->nodes[node].part_count;
     return *count > 0;
+}
+
+/* Shown at what is selected. */
+static void toggle_parts(strl__viewer *v)
+{
+    v->controls.parts = !v->controls.parts;
+    if (v->controls.parts && v->parts.selected_count > 0)
+        v->reveal = strl_part_tree_reveal(&v->parts.tree, v->parts.tree.order[v->parts.selected_first]);
 }
 
 static void obey_parts(strl__viewer *v, strl_request request)
@@ -146,7 +155,7 @@ static void go_bookmark(strl__viewer *v, const strl_bookmark *bookmark)
         strl__viewer_say(v, "there is no bookmark yet: B makes one");
         return;
     }
-    strl_recorder_stop(&v->recorder);
+    strl__viewer_end_replay(v);
     v->controls.orthographic = bookmark->orthographic;
     strl_navigator_go(&v->navigator, &bookmark->pose, STRL__GO_SECONDS);
     strl__viewer_say(v, "%s", bookmark->name);
@@ -177,7 +186,7 @@ static void obey_bookmarks(strl__viewer *v, strl_request request)
 static void go_home(strl__viewer *v)
 {
     strl_pose home = strl_navigator_home(&v->navigator);
-    strl_recorder_stop(&v->recorder);
+    strl__viewer_end_replay(v);
     strl_navigator_go(&v->navigator, &home, STRL__GO_SECONDS);
 }
 
@@ -267,7 +276,7 @@ bool strl__viewer_obey(strl__viewer *v, strl_request request)
     else if (action == STRL_ACTION_HELP)
         v->controls.help = !v->controls.help;
     else if (action == STRL_ACTION_PARTS)
-        v->controls.parts = !v->controls.parts;
+        toggle_parts(v);
     else if (action == STRL_ACTION_FORGET_PICKS)
         v->picks.count = 0;
     else if (action == STRL_ACTION_OPEN_NODE)

@@ -133,7 +133,7 @@ strl_status strl_opener_start(strl_opener *opener, const char *file, strl_error 
 {
     strl_file_info info;
     if (opener->state == STRL_OPENER_BUILDS)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "%s waits: another file is being built", file);
+        return strl__fail(err, STRL_ERR_ARGUMENT, "%s is not opened: another file is still being built", file);
     if (strlen(file) >= sizeof opener->input)
         return strl__fail(err, STRL_ERR_LIMIT, "%.200s: the path is too long", file);
     strl_status status = strl_path_stat(file, &info, err);

@@ -6,13 +6,14 @@
 #include "base/fail.h"
 #include "base/memory.h"
 
-#define MOST_TEXT_BYTES ((size_t)1 << 31)
+#define DEFAULT_MEMORY_BYTES ((uint64_t)512 << 20)
 #define MOST_NAME 4096u
 #define MOST_DEPTH 255u
 
 /* ---- names */
 
-static strl_status load_names(strl_part_tree *tree, strl_part_name_fn name, void *context, strl_error *err)
+static strl_status load_names(strl_part_tree *tree, uint64_t most_bytes, strl_part_name_fn name, void *context,
+                              strl_error *err)
 {
     size_t capacity = 0;
     char text[MOST_NAME];
@@ -21,8 +22,10 @@ static strl_status load_names(strl_part_tree *tree, strl_part_name_fn name, void
         if (status != STRL_OK)
             return status;
         size_t bytes = strlen(text) + 1;
-        if (tree->text_bytes + bytes > MOST_TEXT_BYTES ||
-            !strl__grow(&tree->text, &capacity, tree->text_bytes + bytes, 1))
+        if (tree->text_bytes + bytes > most_bytes) /* no name: the end alone */
+            bytes = 1;
+        text[bytes - 1] = 0;
+        if (tree->text_bytes + bytes > UINT32_MAX || !strl__grow(&tree->text, &capacity, tree->text_bytes + bytes, 1))
             return strl__fail(err, STRL_ERR_MEMORY, "no memory for the names of %u parts", tree->part_count);
         tree->names[part] = (uint32_t)tree->text_bytes;
         memcpy(tree->text + tree->text_bytes, text, bytes);
@@ -54,6 +57,7 @@ static int compare_parts(const void *a, const void *b, void *context)
 typedef struct growth {
     strl_part_tree *tree;
     size_t capacity;
+    uint64_t most_nodes; /* by splitting; each part has one in any case */
     uint32_t open[MOST_DEPTH + 1];
     uint32_t depth; /* of the open ones */
 } growth;
@@ -81,7 +85,7 @@ static bool add_node(growth *g, const char *piece, size_t bytes, uint32_t first_
 }
 
 /* Steps that the path shares with the part before stay open; the others are closed and the path's own made. Steps
- * beyond the greatest depth stay in one piece. */
+ * beyond the greatest depth or the nodes' bound stay in one piece. */
 static bool add_part(growth *g, uint32_t at)
 {
     strl_part_tree *tree = g->tree;
@@ -89,7 +93,7 @@ static bool add_part(growth *g, uint32_t at)
     uint32_t depth = 0;
     bool same = true;
     for (;;) {
-        size_t bytes = depth + 1 < MOST_DEPTH ? strcspn(piece, "/") : strlen(piece);
+        size_t bytes = depth + 1 < MOST_DEPTH && tree->node_count < g->most_nodes ? strcspn(piece, "/") : strlen(piece);
         bool last = piece[bytes] == 0;
         strl_part_node *open = depth < g->depth ? &tree->nodes[g->open[depth]] : NULL;
         /* Parts of one name are rows of their own. */
@@ -109,9 +113,9 @@ static bool add_part(growth *g, uint32_t at)
     return true;
 }
 
-static bool grow_tree(strl_part_tree *tree)
+static bool grow_tree(strl_part_tree *tree, uint64_t most_nodes)
 {
-    growth g = {.tree = tree};
+    growth g = {.tree = tree, .most_nodes = most_nodes};
     for (uint32_t at = 0; at < tree->part_count; at++)
         if (!add_part(&g, at))
             return false;
@@ -181,15 +185,16 @@ uint32_t strl_part_tree_reveal(strl_part_tree *tree, uint32_t part)
 
 /* ---- life */
 
-strl_status strl_part_tree_init(strl_part_tree *tree, uint32_t part_count, strl_part_name_fn name, void *context,
-                                strl_error *err)
+strl_status strl_part_tree_init(strl_part_tree *tree, uint32_t part_count, uint64_t memory_bytes,
+                                strl_part_name_fn name, void *context, strl_error *err)
 {
+    uint64_t half = (memory_bytes ? memory_bytes : DEFAULT_MEMORY_BYTES) / 2;
     *tree = (strl_part_tree){.part_count = part_count};
     tree->names = strl__alloc_zero(part_count, sizeof *tree->names);
     tree->order = strl__alloc_zero(part_count, sizeof *tree->order);
     tree->places = strl__alloc_zero(part_count, sizeof *tree->places);
     strl_status status = tree->names && tree->order && tree->places
-                             ? load_names(tree, name, context, err)
+                             ? load_names(tree, half, name, context, err)
                              : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u parts", part_count);
     if (status == STRL_OK) {
         for (uint32_t part = 0; part < part_count; part++)
@@ -197,7 +202,7 @@ strl_status strl_part_tree_init(strl_part_tree *tree, uint32_t part_count, strl_
         qsort_r(tree->order, part_count, sizeof *tree->order, compare_parts, tree);
         for (uint32_t place = 0; place < part_count; place++)
             tree->places[tree->order[place]] = place;
-        bool whole = grow_tree(tree);
+        bool whole = grow_tree(tree, half / sizeof *tree->nodes);
         tree->rows = whole ? strl__alloc(tree->node_count, sizeof *tree->rows) : NULL;
         if (!tree->rows)
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a tree of %u parts", part_count);

@@ -40,10 +40,12 @@ typedef struct strl_part_tree {
     char search[STRL_PART_TREE_SEARCH]; /* what the rows were found with */
 } strl_part_tree;
 
-/* name(context, part, ...) tells each name (UTF-8, cut to fit). The tree is empty on failure. */
+/* name(context, part, ...) tells each name (UTF-8, cut to fit). memory_bytes bounds names and nodes, but for the least of
+ * both that each part needs, some 60 bytes; 0 = 512 MiB. Beyond it parts have no name, and paths are not split: a model
+ * with many opens all the same. The tree is empty on failure. */
 typedef strl_status (*strl_part_name_fn)(void *context, uint32_t part, char *name, size_t size, strl_error *err);
-strl_status strl_part_tree_init(strl_part_tree *tree, uint32_t part_count, strl_part_name_fn name, void *context,
-                                strl_error *err);
+strl_status strl_part_tree_init(strl_part_tree *tree, uint32_t part_count, uint64_t memory_bytes,
+                                strl_part_name_fn name, void *context, strl_error *err);
 void strl_part_tree_deinit(strl_part_tree *tree);
 
 /* The whole name of a part; "" where there is no such part. Borrowed. */

@@ -10,7 +10,7 @@ strl_status strl_parts_init(strl_parts *parts, uint32_t part_count, strl_part_na
                             strl_error *err)
 {
     *parts = (strl_parts){.version = 1};
-    strl_status status = strl_part_tree_init(&parts->tree, part_count, name, context, err);
+    strl_status status = strl_part_tree_init(&parts->tree, part_count, 0, name, context, err);
     if (status != STRL_OK)
         return status;
     parts->hidden = strl__alloc_zero(part_count, 1);

@@ -57,6 +57,18 @@ strl_status strl_settings_load(strl_settings *settings, const char *path, strl_e
     return status;
 }
 
+void strl_settings_renew(strl_settings *settings)
+{
+    json_t *root = settings->path ? json_load_file(settings->path, 0, NULL) : NULL;
+    if (!json_is_object(root)) {
+        json_decref(root);
+        return;
+    }
+    json_decref(settings->root);
+    settings->root = root;
+    read_values(settings);
+}
+
 void strl_settings_deinit(strl_settings *settings)
 {
     json_decref(settings->root);

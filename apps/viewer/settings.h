@@ -21,6 +21,9 @@ typedef struct strl_settings {
 /* path NULL: nothing is read and nothing will be written. A missing file is no failure. After a failure the file will
  * not be written: what somebody has in it is not lost to a slip of the keyboard. */
 strl_status strl_settings_load(strl_settings *settings, const char *path, strl_error *err);
+/* Before a change: another window may have written since. Takes the file as it is now, values and bookmarks; where it
+ * cannot be read, what is known stays. */
+void strl_settings_renew(strl_settings *settings);
 /* Makes the folder, and its folder, where they are missing. */
 strl_status strl_settings_save(const strl_settings *settings, strl_error *err);
 void strl_settings_deinit(strl_settings *settings);

@@ -39,7 +39,7 @@ const char strl_viewer_keys[] =
     "+ -            larger, smaller pixel error\n"
     "1 2 3 0        colours by cluster, level, error; of the model\n"
     "X L            wireframe; flat or smooth\n"
-    "C              freeze the camera that selects and culls, and look at its work from elsewhere\n"
+    "C              freeze what is selected and culled, and look at it from elsewhere\n"
     "P              save the picture as PNG\n"
     "drop a file    opens a container; builds one of a mesh first\n"
     "F1             this help\n"
@@ -52,7 +52,7 @@ void strl__viewer_say(strl__viewer *v, const char *format, ...)
     vsnprintf(v->message, sizeof v->message, format, arguments);
     va_end(arguments);
     v->message_end_ns = strl_clock_ns() + (uint64_t)(MESSAGE_SECONDS * 1e9);
-    strl_journal_write(v->journal, "said", json_pack("{s:s}", "text", v->message));
+    strl_journal_write(v->journal, "said", json_pack("{s:o}", "text", strl_journal_text(v->message)));
 }
 
 /* ---- the loop */
@@ -94,8 +94,19 @@ static void tell_rest(strl__viewer *v)
     double cursor[2];
     strl_window_cursor(v->window, cursor);
     if (v->stirred)
-        strl_journal_write(v->journal, "rest", json_pack("{s:[f,f]}", "cursor", cursor[0], cursor[1]));
+        strl_journal_write(
+            v->journal, "rest",
+            json_pack("{s:[f,f],s:I}", "cursor", cursor[0], cursor[1], "frames", (json_int_t)v->frames_shown));
     v->stirred = false;
+}
+
+/* At rest the picture stays, unless people wait for something: a build, a part, a cursor that blinks where they type,
+ * nodes that are asked for again. */
+static bool needs_frame(const strl__viewer *v)
+{
+    const strl_walk_stats *walk = strl_walk_get_stats(v->model->walk);
+    return !v->resting || v->frames_left > 0 || !v->shows_rest || v->news.state == STRL_OPENER_BUILDS ||
+           v->look_waits || walk->missing_nodes > 0 || walk->requests_pending > 0 || strl_gui_takes_keyboard(v->gui);
 }
 
 /* Rests when the picture is the wanted one and nothing has happened for a few frames. */
@@ -114,13 +125,17 @@ static double decide_wait(strl__viewer *v, bool drawable)
     return 0;
 }
 
-static void take_dropped(strl__viewer *v, const char *file)
+static void take_dropped(strl__viewer *v, const strl_window_input *input)
 {
     strl_error err = {0};
-    if (!file[0])
+    if (input->dropped_count == 0)
         return;
-    if (strl_opener_start(v->opener, file, &err) != STRL_OK)
+    if (!input->dropped[0])
+        strl__viewer_say(v, "the path of the dropped file is too long");
+    else if (strl_opener_start(v->opener, input->dropped, &err) != STRL_OK)
         strl__viewer_say(v, "%s", err.message);
+    else if (input->dropped_count > 1)
+        strl__viewer_say(v, "%s is opened, the other %u files are not", input->dropped, input->dropped_count - 1);
 }
 
 /* What keys, mouse and the panels of the last frame ask for. True: quit. */
@@ -137,7 +152,7 @@ static bool take_wishes(strl__viewer *v, const strl_window_input *input)
     for (int from = 0; from < 2; from++)
         for (uint32_t r = 0; r < asked[from].count; r++)
             quit = strl__viewer_obey(v, asked[from].items[r]) || quit;
-    take_dropped(v, input->dropped);
+    take_dropped(v, input);
     strl__viewer_poll_opener(v);
     strl__viewer_poll_index(v);
     return quit;
@@ -154,7 +169,7 @@ static strl_status run_loop(strl__viewer *v, strl_error *err)
         double seconds = tick(&v->clock);
         quit = take_wishes(v, &input);
         status = fit_size(v, &drawable, err);
-        if (status == STRL_OK && drawable) {
+        if (status == STRL_OK && drawable && needs_frame(v)) {
             if (strl__viewer_move(v, &input, seconds) && v->frames_left == 0)
                 v->frames_left = 1;
             status = strl__viewer_draw(v, err);
@@ -268,6 +283,7 @@ strl_status strl_viewer_run(const strl_viewer_desc *desc, strl_error *err)
     strl_status status = open_viewer(v, err);
     if (status == STRL_OK) {
         status = run_loop(v, err);
+        strl__viewer_end_recording(v);
         strl__viewer_remember(v);
     }
     close_viewer(v);

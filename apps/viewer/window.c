@@ -147,8 +147,13 @@ static void on_drop(GLFWwindow *handle, int count, const char **paths)
 {
     strl_window *window = glfwGetWindowUserPointer(handle);
     window->pending.touched = true;
-    if (count > 0 && strlen(paths[0]) < sizeof window->pending.dropped)
-        memcpy(window->pending.dropped, paths[0], strlen(paths[0]) + 1);
+    if (count < 1)
+        return;
+    size_t bytes = strlen(paths[0]);
+    window->pending.dropped_count = (unsigned)count;
+    bytes = bytes < sizeof window->pending.dropped ? bytes : 0;
+    memcpy(window->pending.dropped, paths[0], bytes);
+    window->pending.dropped[bytes] = 0;
 }
 
 static void on_scroll(GLFWwindow *handle, double x, double y)
@@ -329,11 +334,12 @@ void strl_window_take_input(strl_window *window, double wait_seconds, strl_windo
         glfwPollEvents();
     *input = window->pending;
     window->pending = (strl_window_input){0};
+    /* Asked also while a panel has the keyboard: a tap is kept until somebody asks, and would be a step later. */
+    const double way[3] = {held(window, GLFW_KEY_D, GLFW_KEY_A), held(window, GLFW_KEY_E, GLFW_KEY_Q),
+                           held(window, GLFW_KEY_W, GLFW_KEY_S)};
     if (window->keyboard_taken)
         return;
-    input->way[0] = held(window, GLFW_KEY_D, GLFW_KEY_A);
-    input->way[1] = held(window, GLFW_KEY_E, GLFW_KEY_Q);
-    input->way[2] = held(window, GLFW_KEY_W, GLFW_KEY_S);
+    memcpy(input->way, way, sizeof input->way);
     input->fast = glfwGetKey(window->handle, GLFW_KEY_LEFT_SHIFT) == GLFW_PRESS ||
                   glfwGetKey(window->handle, GLFW_KEY_RIGHT_SHIFT) == GLFW_PRESS;
     if (input->way[0] != 0 || input->way[1] != 0 || input->way[2] != 0)

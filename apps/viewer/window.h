@@ -25,8 +25,9 @@ typedef struct strl_window_input {
     strl_requests requests; /* of keys: once when one goes down */
     strl_click clicks[STRL_WINDOW_MOST_CLICKS];
     unsigned click_count;
-    char dropped[4096]; /* the last file let fall on the window; empty = none */
-    bool touched;       /* something happened at all */
+    unsigned dropped_count; /* files let fall on the window at once */
+    char dropped[4096];     /* the first of them; empty where its path is too long */
+    bool touched;           /* something happened at all */
 } strl_window_input;
 
 typedef struct strl_window strl_window;

@@ -72,7 +72,7 @@ static strl_status print_list(strl_walk *walk, const strl_draw_list *list, strl_
 {
     for (uint32_t i = 0; i < list->count; i++) {
         const strl_draw_item *item = &list->items[i];
-        if (!item->visible || i >= 5)
+        if (!item->visible || item->index_count == 0 || i >= 5) /* an empty model's only node has no corner */
             continue;
         char name[64] = "";
         strl_status status = STRL_OK;

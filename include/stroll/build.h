@@ -40,7 +40,7 @@ typedef struct strl_build_estimate {
 typedef struct strl_build_desc {
     const char *const *inputs;
     uint32_t input_count;
-    const char *output;
+    const char *output;     /* as the inputs: UTF-8 paths */
     const char *scratch;    /* folder in which OUTPUT.tmp is made, itself made where missing; NULL = beside the output */
     uint64_t memory_bytes;  /* 0 = 1 GiB; least STRL_BUILD_LEAST_MEMORY */
     unsigned jobs;          /* threads that work; 0 = one per processor */
@@ -82,6 +82,7 @@ typedef struct strl_build_result {
     uint64_t dropped_nonfinite, dropped_degenerate, dropped_lines, dropped_points;
     double dropped_longest; /* the longest edge of a triangle without area on the lattice, model units: claims leave these out */
     uint64_t missing_libraries; /* material libraries that could not be read: what they define is white */
+    uint64_t missing_images;    /* images of materials that could not be used: these have their colours alone */
     uint32_t coarse_lattices;   /* 1 where the step had to be more than a sixteenth of the 1st-percentile edge */
     uint64_t vertices, nodes, groups, bytes_out, scratch_bytes;
     uint32_t parts, materials, levels, root_triangles, inputs;
@@ -96,9 +97,10 @@ typedef struct strl_build_result {
 
 /* Builds the structure of clusters. Works on threads of its own, desc->jobs at most, and returns when they
  * are done; several builds at a time are legal, of different outputs. What desc points at is borrowed for
- * the call. result is filled in as far as the build came, also on failure. Fails with STRL_ERR_UNSUPPORTED,
- * STRL_ERR_FORMAT where an input cannot be read, STRL_ERR_LIMIT where memory or scratch do not suffice,
- * STRL_ERR_DISK_FULL, STRL_ERR_IO, STRL_ERR_CANCELLED.
+ * the call. result is filled in as far as the build came, also on failure. Fails with STRL_ERR_ARGUMENT where
+ * there is no input or no output, one is the other, memory_bytes is below the least or a resumed build was
+ * asked for something else, STRL_ERR_UNSUPPORTED, STRL_ERR_FORMAT where an input cannot be read,
+ * STRL_ERR_LIMIT where memory or scratch do not suffice, STRL_ERR_DISK_FULL, STRL_ERR_IO, STRL_ERR_CANCELLED.
  *
  * Writes desc->output, which appears only when whole. On failure nothing is left of it but what desc->keep
  * asks for, and an older file of that name stays. The bytes are the same whether the build was stopped and

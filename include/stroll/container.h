@@ -22,6 +22,7 @@ typedef struct strl_container_info {
     char unit[16];    /* "m", "mm", ..., "" = unknown */
     uint32_t up_axis; /* 0 x, 1 y, 2 z; stored, never applied */
     bool has_colour;  /* some vertex or material is not white */
+    bool has_images;  /* some material names an image; vertices then have texture coordinates */
     double bounds[6]; /* of all placements, world units: min xyz, max xyz, as the writer found them */
     uint32_t tree_count, part_count, material_count;
     uint64_t placement_count;
@@ -35,6 +36,20 @@ typedef struct strl_placement {
     uint32_t tree;
     double transform[12]; /* model to world, row-major affine 3x4 */
 } strl_placement;
+
+typedef enum strl_wrap { STRL_WRAP_REPEAT, STRL_WRAP_CLAMP, STRL_WRAP_MIRROR } strl_wrap;
+
+#define STRL_TEXCOORD_MOST 65535 /* of a code */
+
+/* The image of a material. Its colours are in the vertices already, as far as it could be read; who draws it instead takes
+ * the material's colour in place of the vertices'. A vertex's coordinate is texcoord_min + code / STRL_TEXCOORD_MOST *
+ * texcoord_extent: u to the right and v down from the image's upper left corner, 1 = all of it. */
+typedef struct strl_material_image {
+    const char *reference; /* as the model names it: a URI or path beside the model; "images[3] (NAME)" where it is inside
+                              of the model's file; NULL = the material has none */
+    strl_wrap wrap[2];     /* of u, of v */
+    float texcoord_min[2], texcoord_extent[2];
+} strl_material_image;
 
 typedef struct strl_container strl_container;
 
@@ -58,6 +73,10 @@ STRL_API strl_status strl_container_part(strl_container *container, uint32_t par
 STRL_API strl_status strl_container_material(strl_container *container, uint32_t material, char *name, size_t size,
                                              uint32_t *rgba, strl_error *err);
 
+/* The image of material < material_count. reference takes its name as above, cut to fit; image->reference is that, or NULL. */
+STRL_API strl_status strl_container_material_image(strl_container *container, uint32_t material, char *reference,
+                                                   size_t size, strl_material_image *image, strl_error *err);
+
 /* Which part and material each vertex of a draw item is of: placement, node and vertex_count are the
  * item's. parts and materials take vertex_count numbers each; NULL is legal. The three corners of a
  * triangle may be of different parts only where simplification has merged these; the first stands for it.
@@ -66,6 +85,11 @@ STRL_API strl_status strl_container_material(strl_container *container, uint32_t
 STRL_API strl_status strl_container_vertex_parts(strl_container *container, uint32_t placement, uint32_t node,
                                                  uint32_t vertex_count, uint32_t *parts, uint32_t *materials,
                                                  strl_error *err);
+
+/* In the same way the texture coordinates, as codes over the range of the image of the vertex's material; 0 where that has
+ * none. */
+STRL_API strl_status strl_container_vertex_texcoords(strl_container *container, uint32_t placement, uint32_t node,
+                                                     uint32_t vertex_count, uint16_t (*texcoords)[2], strl_error *err);
 
 #ifdef __cplusplus
 }

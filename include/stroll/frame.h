@@ -29,6 +29,7 @@ typedef struct strl_vertex {
 /* What a vertex belongs to: indices into the container's tables of names. All corners of a triangle mostly agree. */
 typedef struct strl_vertex_label {
     uint32_t part, material;
+    uint16_t texcoord[2]; /* codes over the range of the material's image (stroll/container.h); 0 where it has none */
 } strl_vertex_label;
 
 /* What strl_vertex.position holds. A walk gives lattice positions only; floats are for triangles drawn as read. */

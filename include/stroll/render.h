@@ -63,7 +63,8 @@ typedef struct strl_draw_options {
     double sky_up[3];       /* world direction from which the sky shines; zero = +z */
     double section[4];      /* world: only points p with x p.x + y p.y + z p.z <= w are drawn; zero = all */
     /* Of parts by number, strl_part_style each; parts past the end are plain. It works on items with labels. NULL = all
-     * plain. The version tells contents apart: vertices are sent again only where it differs from the draw before. */
+     * plain. Borrowed for the draw. The version tells contents apart: vertices are sent again only where it differs from that of the
+     * draw before; change it with the contents. */
     const uint8_t *part_styles;
     uint32_t part_count;
     uint64_t styles_version;

@@ -39,7 +39,7 @@ typedef struct strl_walk_desc {
     double error_px;           /* allowed pixel error; 0 = 1 */
     uint32_t requests_in_flight; /* 0 = 16; at most 256 */
     const strl_executor *executor; /* copied */
-    bool labels; /* keep the part and material of each vertex: 8 bytes a vertex more, within memory_bytes */
+    bool labels; /* keep part, material and texture coordinate of each vertex: 12 bytes a vertex more, within memory_bytes */
 } strl_walk_desc;
 
 typedef struct strl_walk_stats {

@@ -12,7 +12,7 @@
 
 /* The file: magic, format, checksum of the rest, then the rest. */
 static const char MAGIC[8] = {'s', 't', 'r', 'l', 's', 't', 'o', 'p'};
-#define FORMAT 6u /* changes with whatever any builder saves */
+#define FORMAT 7u /* changes with whatever any builder saves */
 #define HEAD_BYTES 20u
 #define MOST_BYTES (UINT64_C(1) << 32)
 
@@ -29,6 +29,7 @@ static void write_counters(const strl_build_context *context, strl_writer *write
     strl_writer_u64(writer, result->dropped_points);
     strl_writer_f64(writer, result->dropped_longest);
     strl_writer_u64(writer, result->missing_libraries);
+    strl_writer_u64(writer, result->missing_images);
     strl_writer_u32(writer, result->coarse_lattices);
 }
 
@@ -128,6 +129,7 @@ static strl_status read_counters(strl_build_context *context, strl_cursor *curso
     result->dropped_points = strl_cursor_u64(cursor);
     result->dropped_longest = strl_cursor_f64(cursor);
     result->missing_libraries = strl_cursor_u64(cursor);
+    result->missing_images = strl_cursor_u64(cursor);
     result->coarse_lattices = strl_cursor_u32(cursor);
     context->progress.triangles_in = result->triangles_in;
     if (context->memory_bytes < STRL_BUILD_LEAST_MEMORY)

@@ -74,6 +74,7 @@ strl_status strl_container_open(strl_source *source, strl_container **container,
     made->placements = (strl__table){.name = "placements", .section = sections[STRL__SECTION_PLACEMENTS - 1]};
     made->parts = (strl__table){.name = "parts", .section = sections[STRL__SECTION_PARTS - 1]};
     made->materials = (strl__table){.name = "materials", .section = sections[STRL__SECTION_MATERIALS - 1]};
+    made->images = (strl__table){.name = "images", .section = sections[STRL__SECTION_IMAGES - 1]};
     *container = made;
     return STRL_OK;
 }
@@ -94,6 +95,7 @@ void strl_container_close(strl_container *container)
     strl__page_table_deinit(&container->placements);
     strl__page_table_deinit(&container->parts);
     strl__page_table_deinit(&container->materials);
+    strl__page_table_deinit(&container->images);
     strl__free(container->trees);
     strl__opened_forget_meshes(container);
     strl_source_close(container->source);

@@ -50,9 +50,11 @@ void strl__header_encode(strl__header *header, uint8_t bytes[STRL__HEADER_BYTES]
     strl_writer_u64(&out, info->dropped_points);
     for (int i = 0; i < 6; i++)
         strl_writer_f64(&out, info->bounds[i]);
-    strl_writer_u32(&out, STRL__KNOWN_SECTIONS);
+    const unsigned sections =
+        header->sections[STRL__SECTION_IMAGES - 1].item_count ? STRL__KNOWN_SECTIONS : STRL__REQUIRED_SECTIONS;
+    strl_writer_u32(&out, sections);
     strl_writer_u32(&out, 0);
-    for (unsigned i = 0; i < STRL__KNOWN_SECTIONS; i++)
+    for (unsigned i = 0; i < sections; i++)
         encode_section(&out, &header->sections[i]);
     compute_model_id(bytes, info->model_id);
     memcpy(bytes + STRL__AT_MODEL_ID, info->model_id, 16);
@@ -120,7 +122,7 @@ static strl_status decode_facts(strl_cursor *in, strl_container_info *info, strl
     return STRL_OK;
 }
 
-static const char *const section_names[] = {"trees", "placements", "parts", "materials"};
+static const char *const section_names[] = {"trees", "placements", "parts", "materials", "images"};
 
 static strl_status check_known_section(const strl__section *section, uint64_t file_bytes, strl_error *err)
 {
@@ -177,11 +179,15 @@ static strl_status decode_sections(strl_cursor *in, strl__header *header, strl_e
         if (status != STRL_OK)
             return status;
         header->sections[section.kind - 1] = section;
-        known++;
+        known += section.kind <= STRL__REQUIRED_SECTIONS;
     }
-    if (known != STRL__KNOWN_SECTIONS)
+    if (known != STRL__REQUIRED_SECTIONS)
         return strl__fail(err, STRL_ERR_FORMAT, "header: %" PRIu32 " of the %u required sections are present", known,
-                          STRL__KNOWN_SECTIONS);
+                          STRL__REQUIRED_SECTIONS);
+    const uint64_t images = header->sections[STRL__SECTION_IMAGES - 1].item_count;
+    if (images && images != header->sections[STRL__SECTION_MATERIALS - 1].item_count)
+        return strl__fail(err, STRL_ERR_FORMAT, "section images: %" PRIu64 " items, expected one for each of %" PRIu64
+                          " materials", images, header->sections[STRL__SECTION_MATERIALS - 1].item_count);
     while (strl_cursor_left(in))
         if (strl_cursor_u8(in))
             return strl__fail(err, STRL_ERR_FORMAT, "header: a reserved byte is not zero");
@@ -208,6 +214,7 @@ strl_status strl__header_decode(const uint8_t bytes[STRL__HEADER_BYTES], uint64_
     info->tree_count = (uint32_t)header->sections[STRL__SECTION_TREES - 1].item_count;
     info->placement_count = header->sections[STRL__SECTION_PLACEMENTS - 1].item_count;
     info->part_count = (uint32_t)header->sections[STRL__SECTION_PARTS - 1].item_count;
+    info->has_images = header->sections[STRL__SECTION_IMAGES - 1].item_count > 0;
     info->material_count = (uint32_t)header->sections[STRL__SECTION_MATERIALS - 1].item_count;
     return status;
 }

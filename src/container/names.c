@@ -2,8 +2,10 @@
 #include "container/names.h"
 
 #include <inttypes.h>
+#include <math.h>
 #include <string.h>
 
+#include "base/cursor.h"
 #include "base/fail.h"
 #include "container/opened.h"
 
@@ -137,6 +139,63 @@ static strl_status get_name(strl_container *container, strl__table *table, uint3
     if (status != STRL_OK)
         return strl_source_fail(container->source, status, err);
     copy_cut(table->last->text, table->last->bytes, name, size);
+    return STRL_OK;
+}
+
+/* In the order of the format; ranges were checked. */
+static void decode_image(const uint8_t head[STRL__IMAGE_HEAD_BYTES], strl_material_image *image)
+{
+    strl_cursor in = strl_cursor_make(head, STRL__IMAGE_HEAD_BYTES);
+    for (int k = 0; k < 2; k++)
+        image->wrap[k] = (strl_wrap)strl_cursor_u8(&in);
+    strl_cursor_u16(&in);
+    for (int k = 0; k < 2; k++)
+        image->texcoord_min[k] = strl_cursor_f32(&in);
+    for (int k = 0; k < 2; k++)
+        image->texcoord_extent[k] = strl_cursor_f32(&in);
+}
+
+static bool image_is_good(const strl_material_image *image)
+{
+    bool good = true;
+    for (int k = 0; k < 2; k++)
+        good = good && image->wrap[k] <= STRL_WRAP_MIRROR && isfinite(image->texcoord_min[k]) &&
+               isfinite(image->texcoord_extent[k]) && image->texcoord_extent[k] >= 0;
+    return good;
+}
+
+strl_status strl_container_material_image(strl_container *container, uint32_t material, char *reference, size_t size,
+                                          strl_material_image *image, strl_error *err)
+{
+    const uint8_t *item = NULL;
+    uint32_t bytes = 0;
+    uint64_t first;
+    *image = (strl_material_image){0};
+    if (size)
+        reference[0] = 0;
+    if (material >= container->header.info.material_count)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "there is no material %" PRIu32 ", expected less than %" PRIu32, material,
+                          container->header.info.material_count);
+    if (!container->header.info.has_images)
+        return STRL_OK;
+    strl_status status = strl__page_table_get(&container->images, container->source, material, &item, &bytes, &first, err);
+    if (status != STRL_OK)
+        return strl_source_fail(container->source, status, err);
+    if (bytes == 0)
+        return STRL_OK;
+    bool is_whole = bytes >= STRL__IMAGE_HEAD_BYTES;
+    uint32_t length = is_whole ? bytes - STRL__IMAGE_HEAD_BYTES : 0;
+    const uint8_t *text = item + STRL__IMAGE_HEAD_BYTES;
+    if (is_whole)
+        decode_image(item, image);
+    if (!is_whole || length > STRL__MAX_NAME_BYTES || !strl__utf8_is_name(text, length) || !image_is_good(image))
+        return strl_source_fail(container->source,
+                                strl__fail(err, STRL_ERR_FORMAT,
+                                           "table of images: item %" PRIu32 " of %" PRIu32
+                                           " bytes has a bad range or way to repeat, or a reference that is no UTF-8",
+                                           material, bytes), err);
+    copy_cut(text, length, reference, size);
+    image->reference = reference;
     return STRL_OK;
 }
 

@@ -56,6 +56,8 @@ strl_status strl_container_writer_create(const strl_container_writer_desc *desc,
     if (status == STRL_OK)
         status = strl__page_table_writer_create(&made->materials, err);
     if (status == STRL_OK)
+        status = strl__page_table_writer_create(&made->images, err);
+    if (status == STRL_OK)
         status = open_files(made, desc, err);
     if (status != STRL_OK)
         strl_container_writer_destroy(made);
@@ -167,6 +169,41 @@ strl_status strl_container_writer_add_material(strl_container_writer *writer, co
     return add_name(writer, writer->materials, &writer->last_material, head, STRL__MATERIAL_HEAD_BYTES, name, err);
 }
 
+/* References are told whole: there are few. */
+static strl_status add_image(strl_container_writer *writer, const uint8_t *head, uint32_t head_bytes, const char *reference,
+                             strl_error *err)
+{
+    uint8_t clean[STRL__MAX_NAME_BYTES];
+    size_t bytes = 0;
+    strl_status status;
+    if (reference && !strl__utf8_clean(reference, clean, sizeof clean, &bytes))
+        status = strl__fail(err, STRL_ERR_LIMIT, "the name of the image \"%.40s\" is longer than %u bytes", reference,
+                            STRL__MAX_NAME_BYTES);
+    else if (strl__page_table_writer_count(writer->images) >= STRL_NONE - 1)
+        status = strl__fail(err, STRL_ERR_LIMIT, "a container holds at most %" PRIu32 " images", STRL_NONE - 1);
+    else
+        status = strl__page_table_writer_add(writer->images, &writer->sink, head, head_bytes, clean, (uint32_t)bytes, err);
+    writer->failed |= status != STRL_OK;
+    return status;
+}
+
+strl_status strl_container_writer_add_image(strl_container_writer *writer, const strl_material_image *image,
+                                            strl_error *err)
+{
+    uint8_t head[STRL__IMAGE_HEAD_BYTES];
+    strl_writer out = {.data = head, .capacity = sizeof head};
+    if (!image->reference)
+        return add_image(writer, NULL, 0, NULL, err);
+    strl_writer_u8(&out, (uint8_t)image->wrap[0]);
+    strl_writer_u8(&out, (uint8_t)image->wrap[1]);
+    strl_writer_u16(&out, 0);
+    for (int k = 0; k < 2; k++)
+        strl_writer_f32(&out, image->texcoord_min[k]);
+    for (int k = 0; k < 2; k++)
+        strl_writer_f32(&out, image->texcoord_extent[k]);
+    return add_image(writer, head, sizeof head, image->reference, err);
+}
+
 static strl_status add_defaults(strl_container_writer *writer, strl_error *err)
 {
     strl_status status = STRL_OK;
@@ -208,6 +245,8 @@ static strl_status write_sections(strl_container_writer *writer, strl_error *err
         status = strl__page_table_writer_finish(writer->parts, sink, &sections[STRL__SECTION_PARTS - 1], err);
     if (status == STRL_OK)
         status = strl__page_table_writer_finish(writer->materials, sink, &sections[STRL__SECTION_MATERIALS - 1], err);
+    if (status == STRL_OK && strl__page_table_writer_count(writer->images))
+        status = strl__page_table_writer_finish(writer->images, sink, &sections[STRL__SECTION_IMAGES - 1], err);
     if (status == STRL_OK)
         status = write_trees(writer, &sections[STRL__SECTION_TREES - 1], err);
     return status;
@@ -264,6 +303,7 @@ void strl_container_writer_destroy(strl_container_writer *writer)
     strl__page_table_writer_destroy(writer->placements);
     strl__page_table_writer_destroy(writer->parts);
     strl__page_table_writer_destroy(writer->materials);
+    strl__page_table_writer_destroy(writer->images);
     strl__free(writer->trees);
     strl__free(writer->page.data);
     strl__free(writer->path);

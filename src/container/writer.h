@@ -34,6 +34,9 @@ strl_status strl_container_writer_add_placement(strl_container_writer *writer, c
 strl_status strl_container_writer_add_part(strl_container_writer *writer, const char *name, strl_error *err);
 strl_status strl_container_writer_add_material(strl_container_writer *writer, const char *name, uint32_t rgba,
                                                strl_error *err);
+/* Of the next material, in their order; of none, or of each one (a zeroed one where it has no image). */
+strl_status strl_container_writer_add_image(strl_container_writer *writer, const strl_material_image *image,
+                                            strl_error *err);
 /* Completes the file and renames it into place. *bytes_out: its size. Refused after any call that failed. */
 strl_status strl_container_writer_finish(strl_container_writer *writer, uint64_t *bytes_out, strl_error *err);
 /* After finish, or instead of it (then nothing is left behind). NULL is legal. */

@@ -18,7 +18,7 @@ struct strl_container_writer {
     strl__sink sink;
     strl_file *spill; /* node records of the tree at hand, by id; owned */
     strl__header header;
-    strl__page_table_writer *placements, *parts, *materials;
+    strl__page_table_writer *placements, *parts, *materials, *images;
     strl__name last_part, last_material; /* what was added last */
     strl__written_tree *trees; /* [tree_count], owned, up to STRL__MAX_TREES */
     size_t tree_capacity;

@@ -14,6 +14,7 @@ typedef struct strl_wedge {
     uint32_t point;     /* index into the mesh's points */
     uint16_t normal[2]; /* octahedral, 10 bits each */
     uint32_t colour;    /* sRGB-encoded RGBA8, R lowest byte */
+    uint32_t texcoord;  /* two codes of 16 bits, u lowest */
     uint32_t palette;   /* opaque: wedges of different palette are never merged into one */
 } strl_wedge;
 

@@ -6,7 +6,7 @@
 
 #include "base/fail.h"
 
-enum { FLAG_COLOUR = 1, FLAG_PALETTE_INDEX = 2, FLAG_COPIES = 4 };
+enum { FLAG_COLOUR = 1, FLAG_PALETTE_INDEX = 2, FLAG_COPIES = 4, FLAG_TEXCOORD = 8, FLAGS_KNOWN = 15 };
 
 struct head {
     uint8_t flags, normal_bits;
@@ -25,8 +25,8 @@ static strl_status read_head(strl_cursor *cursor, strl_payload_sizes *sizes, str
     sizes->base_triangle_count = strl_cursor_u32(cursor);
     if (cursor->failed)
         return strl__fail(err, STRL_ERR_FORMAT, "node payload of %zu bytes is too short for its head", cursor->size);
-    if (version != 1 || head->flags > (FLAG_COLOUR | FLAG_PALETTE_INDEX | FLAG_COPIES))
-        return strl__fail(err, STRL_ERR_FORMAT, "node payload has version %u and flags %u, expected 1 and at most 7",
+    if (version != 1 || head->flags > FLAGS_KNOWN)
+        return strl__fail(err, STRL_ERR_FORMAT, "node payload has version %u and flags %u, expected 1 and at most 15",
                           version, head->flags);
     if (head->normal_bits != 8 && head->normal_bits != 10)
         return strl__fail(err, STRL_ERR_FORMAT, "node payload has normals of 2 x %u bits, expected 8 or 10", head->normal_bits);
@@ -61,7 +61,7 @@ static strl_status allocate(const strl_payload_sizes *sizes, uint8_t flags, strl
     pm->triangle_count = sizes->triangle_count;
     pm->step_count = sizes->step_count;
     pm->palette_count = sizes->palette_count;
-    if (!strl_pm_create(pm, flags & FLAG_COLOUR, flags & FLAG_PALETTE_INDEX, arena))
+    if (!strl_pm_create(pm, flags & FLAG_COLOUR, flags & FLAG_PALETTE_INDEX, flags & FLAG_TEXCOORD, arena))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to decode a node payload");
     memset(pm->parent, 0, sizes->base_vertex_count * sizeof *pm->parent);
     return STRL_OK;
@@ -71,7 +71,7 @@ static strl_status decode_parts(struct strl__decoder *d, strl_cursor *cursor)
 {
     const strl_payload_sizes *sizes = &d->sizes;
     uint64_t items = (uint64_t)sizes->vertex_count + sizes->triangle_count + sizes->palette_count;
-    strl_status status = strl__streams_read(cursor, cursor->size, items, d->scratch, &d->in, d->err);
+    strl_status status = strl__streams_read(cursor, strl__stream_count(d->pm->texcoord != NULL), cursor->size, items, d->scratch, &d->in, d->err);
     if (status)
         return status;
     d->from = strl_arena_alloc(d->scratch, (size_t)sizes->base_vertex_count + 3, sizeof *d->from);

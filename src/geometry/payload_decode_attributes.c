@@ -56,6 +56,16 @@ static void decode_colours(struct strl__decoder *d)
     }
 }
 
+static void decode_texcoords(struct strl__decoder *d)
+{
+    for (uint32_t v = 0; v < d->sizes.vertex_count; v++) {
+        uint32_t before = v ? d->pm->texcoord[predictor(d, v)] : 0;
+        uint32_t a = before + strl__unzigzag(strl__pull(&d->in, STRL__STREAM_TEXCOORD));
+        uint32_t b = (before >> 16) + strl__unzigzag(strl__pull(&d->in, STRL__STREAM_TEXCOORD + 1));
+        d->pm->texcoord[v] = (a & 0xffff) | (b & 0xffff) << 16;
+    }
+}
+
 static bool decode_palette_indices(struct strl__decoder *d)
 {
     for (uint32_t v = 0; v < d->sizes.vertex_count; v++) {
@@ -108,6 +118,8 @@ strl_status strl__decode_attributes(struct strl__decoder *d)
         return strl__fail(d->err, STRL_ERR_MEMORY, "no memory to decode a node payload");
     if (d->pm->colour)
         decode_colours(d);
+    if (d->pm->texcoord)
+        decode_texcoords(d);
     if (d->pm->palette_index && !decode_palette_indices(d))
         return strl__fail(d->err, STRL_ERR_FORMAT, "node payload names an entry past its palette");
     decode_palette(d);

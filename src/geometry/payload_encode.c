@@ -73,7 +73,7 @@ static bool init(struct strl__encoder *e)
 static void write_head(const strl_pm *pm, bool copies, strl_writer *writer)
 {
     strl_writer_u8(writer, 1);
-    strl_writer_u8(writer, (uint8_t)((pm->colour ? 1 : 0) | (pm->palette_index ? 2 : 0) | (copies ? 4 : 0)));
+    strl_writer_u8(writer, (uint8_t)((pm->colour ? 1 : 0) | (pm->palette_index ? 2 : 0) | (copies ? 4 : 0) | (pm->texcoord ? 8 : 0)));
     strl_writer_u8(writer, (uint8_t)strl__normal_bits(pm));
     strl_writer_u16(writer, (uint16_t)pm->vertex_count);
     strl_writer_u16(writer, (uint16_t)pm->vertex_end[0]);
@@ -133,8 +133,8 @@ strl_status strl_payload_encode(const strl_pm *pm, const strl_payload_reference 
     strl_status status = strl__payload_collect(pm, reference, scratch, &streams, order, err);
     if (!status) {
         write_head(pm, reference != NULL, writer);
-        status = strl__streams_write(&streams, start, (uint64_t)pm->vertex_count + pm->triangle_count + pm->palette_count,
-                                     writer, err);
+        status = strl__streams_write(&streams, strl__stream_count(pm->texcoord != NULL), start,
+                                     (uint64_t)pm->vertex_count + pm->triangle_count + pm->palette_count, writer, err);
     }
     if (status && writer->size > start)
         writer->size = start;

@@ -63,6 +63,17 @@ static void encode_colours(struct strl__encoder *e)
     }
 }
 
+static void encode_texcoords(struct strl__encoder *e)
+{
+    for (uint32_t v = 0; v < e->pm->vertex_count; v++) {
+        uint32_t before = v ? e->pm->texcoord[predictor(e, v)] : 0, code = e->pm->texcoord[pm_vertex(e, v)];
+        for (unsigned k = 0; k < 2; k++) {
+            uint32_t difference = (code >> 16 * k) - (before >> 16 * k);
+            strl__push(&e->out, STRL__STREAM_TEXCOORD + k, strl__zigzag(((difference + 0x8000u) & 0xffffu) - 0x8000u));
+        }
+    }
+}
+
 static void encode_palette_indices(struct strl__encoder *e)
 {
     for (uint32_t v = 0; v < e->pm->vertex_count; v++) {
@@ -107,6 +118,8 @@ strl_status strl__encode_attributes(struct strl__encoder *e)
         return strl__fail(e->err, STRL_ERR_MEMORY, "no memory to encode a node payload");
     if (e->pm->colour)
         encode_colours(e);
+    if (e->pm->texcoord)
+        encode_texcoords(e);
     if (e->pm->palette_index)
         encode_palette_indices(e);
     encode_palette(e);

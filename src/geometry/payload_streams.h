@@ -34,8 +34,15 @@ enum {
     STRL__STREAM_PALETTE = STRL__STREAM_COLOUR + 4,
     STRL__STREAM_SELECT = STRL__STREAM_PALETTE + 3, /* one a context */
     STRL__STREAM_COPY_NORMAL = STRL__STREAM_SELECT + 4, /* STRL__SELECT_CONTEXTS */
-    STRL__STREAM_COUNT = STRL__STREAM_COPY_NORMAL + 2
+    STRL__STREAM_TEXCOORD = STRL__STREAM_COPY_NORMAL + 2, /* only in payloads with texture coordinates */
+    STRL__STREAM_COUNT = STRL__STREAM_TEXCOORD + 2
 };
+
+/* How many streams a payload has. */
+static inline unsigned strl__stream_count(bool has_texcoords)
+{
+    return has_texcoords ? STRL__STREAM_COUNT : STRL__STREAM_TEXCOORD;
+}
 
 #define STRL__OPERATION_CONTEXTS 6u
 #define STRL__SELECT_CONTEXTS 4u
@@ -103,8 +110,8 @@ static inline void strl__push(struct strl__streams_out *streams, unsigned id, ui
 
 /* Appends the coded streams to writer: the last part of a payload that starts at byte `start` of writer, padded as the
  * format asks; item_count = vertices + triangles + palette entries. */
-strl_status strl__streams_write(const struct strl__streams_out *streams, size_t start, uint64_t item_count,
-                                strl_writer *writer, strl_error *err);
+strl_status strl__streams_write(const struct strl__streams_out *streams, unsigned stream_count, size_t start,
+                                uint64_t item_count, strl_writer *writer, strl_error *err);
 /* What each stream costs, its count and its table included. */
 void strl__streams_bits(const struct strl__streams_out *streams, double bits[STRL__STREAM_COUNT]);
 void strl__streams_deinit(struct strl__streams_out *streams);
@@ -121,7 +128,7 @@ struct strl__streams_in {
 };
 
 /* Decodes all streams from what is left of cursor, into scratch. payload_bytes: the whole payload's size. */
-strl_status strl__streams_read(strl_cursor *cursor, size_t payload_bytes, uint64_t item_count, strl_arena *scratch,
+strl_status strl__streams_read(strl_cursor *cursor, unsigned stream_count, size_t payload_bytes, uint64_t item_count, strl_arena *scratch,
                                struct strl__streams_in *streams, strl_error *err);
 
 static inline uint32_t strl__pull(struct strl__streams_in *streams, unsigned id)

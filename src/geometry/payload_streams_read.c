@@ -223,7 +223,7 @@ static uint8_t *padded_copy(strl_cursor *cursor, size_t bytes, strl_arena *scrat
     return copy;
 }
 
-strl_status strl__streams_read(strl_cursor *cursor, size_t payload_bytes, uint64_t item_count, strl_arena *scratch,
+strl_status strl__streams_read(strl_cursor *cursor, unsigned stream_count, size_t payload_bytes, uint64_t item_count, strl_arena *scratch,
                                struct strl__streams_in *streams, strl_error *err)
 {
     *streams = (struct strl__streams_in){0};
@@ -246,7 +246,7 @@ strl_status strl__streams_read(strl_cursor *cursor, size_t payload_bytes, uint64
     reader.words_end = reader.words + (size_t)word_count * 2;
     reader.bit_end = (uint64_t)bit_bytes * 8;
     uint64_t values_left = item_limit - item_count;
-    for (unsigned id = 0; id < STRL__STREAM_COUNT; id++) {
+    for (unsigned id = 0; id < stream_count; id++) {
         strl_status status = read_stream(&reader, &values_left, slots, scratch, &streams->stream[id], err);
         if (status)
             return status;

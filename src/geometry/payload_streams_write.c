@@ -187,14 +187,14 @@ static void write_sections(const struct rans_writer *rans, struct bit_writer *bi
     strl_writer_bytes(writer, bits->out.data, bits->out.size);
 }
 
-strl_status strl__streams_write(const struct strl__streams_out *streams, size_t start, uint64_t item_count,
-                                strl_writer *writer, strl_error *err)
+strl_status strl__streams_write(const struct strl__streams_out *streams, unsigned stream_count, size_t start,
+                                uint64_t item_count, strl_writer *writer, strl_error *err)
 {
     struct table table[STRL__STREAM_COUNT];
     uint32_t count[STRL__SYMBOLS];
     struct bit_writer bits = {0};
     struct rans_writer rans = {.state = {STRL__RANS_LOW, STRL__RANS_LOW, STRL__RANS_LOW, STRL__RANS_LOW}};
-    for (unsigned id = 0; id < STRL__STREAM_COUNT; id++) {
+    for (unsigned id = 0; id < stream_count; id++) {
         choose_table(&streams->stream[id], count, &table[id]);
         write_raw(&streams->stream[id], &table[id], &bits);
         item_count += streams->stream[id].count;
@@ -204,7 +204,7 @@ strl_status strl__streams_write(const struct strl__streams_out *streams, size_t 
     rans.words = strl__alloc(rans.capacity, 1);
     bool failed = streams->failed || !rans.words;
     if (!failed) {
-        for (unsigned id = STRL__STREAM_COUNT; id-- > 0;)
+        for (unsigned id = stream_count; id-- > 0;)
             if (table[id].mode == STRL__MODE_TABLE)
                 code_stream(&streams->stream[id], &table[id], &rans);
         write_sections(&rans, &bits, writer);

@@ -4,12 +4,13 @@
 
 #include "base/fail.h"
 
-bool strl_pm_create(strl_pm *pm, bool has_colours, bool has_palette_indices, strl_arena *arena)
+bool strl_pm_create(strl_pm *pm, bool has_colours, bool has_palette_indices, bool has_texcoords, strl_arena *arena)
 {
     size_t vertices = pm->vertex_count, states = (size_t)pm->step_count + 1;
     pm->position = strl_arena_alloc(arena, vertices, sizeof *pm->position);
     pm->normal = strl_arena_alloc(arena, vertices, sizeof *pm->normal);
     pm->colour = has_colours ? strl_arena_alloc(arena, vertices, sizeof *pm->colour) : NULL;
+    pm->texcoord = has_texcoords ? strl_arena_alloc(arena, vertices, sizeof *pm->texcoord) : NULL;
     pm->palette_index = has_palette_indices ? strl_arena_alloc(arena, vertices, sizeof *pm->palette_index) : NULL;
     pm->parent = strl_arena_alloc(arena, vertices, sizeof *pm->parent);
     pm->triangle = strl_arena_alloc(arena, pm->triangle_count, sizeof *pm->triangle);
@@ -19,6 +20,7 @@ bool strl_pm_create(strl_pm *pm, bool has_colours, bool has_palette_indices, str
     pm->appearance_error = strl_arena_alloc(arena, states, sizeof *pm->appearance_error);
     pm->palette = strl_arena_alloc(arena, pm->palette_count, sizeof *pm->palette);
     return pm->position && pm->normal && (pm->colour || !has_colours) && (pm->palette_index || !has_palette_indices) &&
+           (pm->texcoord || !has_texcoords) &&
            pm->parent && pm->triangle && pm->vertex_end && pm->triangle_end && pm->geometric_error &&
            pm->appearance_error && pm->palette;
 }

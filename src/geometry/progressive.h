@@ -49,6 +49,7 @@ typedef struct strl_pm {
     int32_t (*position)[3];      /* [vertex_count], lattice units, offset from the node's anchor */
     uint16_t (*normal)[2];       /* [vertex_count], octahedral, 10 bits each (0..1023); see geometry/octahedral.h */
     uint32_t *colour;            /* [vertex_count], sRGB-encoded RGBA8; NULL = all 0xffffffff */
+    uint32_t *texcoord;          /* [vertex_count], two codes of 16 bits, u lowest; NULL = all 0 */
     uint16_t *palette_index;     /* [vertex_count]; NULL = all 0 */
     uint16_t *parent;            /* [vertex_count]; entries below vertex_end[0] are unused and 0 */
     uint16_t (*triangle)[3];     /* [triangle_count], corners in the finest state */
@@ -61,7 +62,7 @@ typedef struct strl_pm {
 
 /* Gives the mesh its arrays, from the arena and unset: the four counts are set and within the limits above. False without
  * memory. */
-bool strl_pm_create(strl_pm *pm, bool has_colours, bool has_palette_indices, strl_arena *arena);
+bool strl_pm_create(strl_pm *pm, bool has_colours, bool has_palette_indices, bool has_texcoords, strl_arena *arena);
 
 /* Checks every invariant that this file states (of the limit of moves only the moved corners): counts, order, errors,
  * indices, one position per step, no degenerate triangle in any state, each step's triangles hold one of its vertices.

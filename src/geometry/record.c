@@ -43,6 +43,7 @@ static bool allocate(strl_pm *pm, uint32_t vertices, uint32_t triangles, uint32_
     pm->position = strl_arena_alloc(arena, vertices, sizeof *pm->position);
     pm->normal = strl_arena_alloc(arena, vertices, sizeof *pm->normal);
     pm->colour = strl_arena_alloc(arena, vertices, sizeof *pm->colour);
+    pm->texcoord = strl_arena_alloc(arena, vertices, sizeof *pm->texcoord);
     pm->palette_index = strl_arena_alloc(arena, vertices, sizeof *pm->palette_index);
     pm->parent = strl_arena_alloc_zero(arena, vertices, sizeof *pm->parent);
     pm->triangle = strl_arena_alloc(arena, triangles, sizeof *pm->triangle);
@@ -50,7 +51,7 @@ static bool allocate(strl_pm *pm, uint32_t vertices, uint32_t triangles, uint32_
     pm->triangle_end = strl_arena_alloc_zero(arena, (size_t)steps + 2, sizeof *pm->triangle_end);
     pm->geometric_error = strl_arena_alloc(arena, (size_t)steps + 1, sizeof(float));
     pm->appearance_error = strl_arena_alloc(arena, (size_t)steps + 1, sizeof(float));
-    return pm->position && pm->normal && pm->colour && pm->palette_index && pm->parent && pm->triangle &&
+    return pm->position && pm->normal && pm->colour && pm->texcoord && pm->palette_index && pm->parent && pm->triangle &&
            pm->vertex_end && pm->triangle_end && pm->geometric_error && pm->appearance_error;
 }
 
@@ -90,6 +91,7 @@ static bool fill_palette(strl_pm *pm, const strl_simplified *simplified, const o
 static void fill_vertices(strl_pm *pm, const strl_mesh *mesh, const strl_simplified *simplified, const ordering *o)
 {
     bool white = true;
+    uint32_t texcoords = 0;
     for (uint32_t w = 0; w < simplified->wedge_count; w++) {
         const strl_wedge *wedge = &simplified->wedge[w];
         uint32_t v = o->wedge_vertex[w];
@@ -97,6 +99,7 @@ static void fill_vertices(strl_pm *pm, const strl_mesh *mesh, const strl_simplif
         memcpy(pm->normal[v], wedge->normal, sizeof *pm->normal);
         pm->colour[v] = wedge->colour;
         white &= wedge->colour == 0xffffffffu;
+        texcoords |= pm->texcoord[v] = wedge->texcoord;
         uint32_t step = o->point_step[wedge->point], parent = simplified->wedge_parent[w];
         if (step && parent != w)
             pm->parent[v] = (uint16_t)o->wedge_vertex[parent];
@@ -105,6 +108,8 @@ static void fill_vertices(strl_pm *pm, const strl_mesh *mesh, const strl_simplif
     }
     if (white)
         pm->colour = NULL;
+    if (!texcoords)
+        pm->texcoord = NULL;
     for (uint32_t s = 0; s <= pm->step_count; s++)
         pm->vertex_end[s] = o->step_first[s];
 }

@@ -15,7 +15,8 @@
 static size_t batch_corner_bytes(const strl__batch_desc *desc)
 {
     return sizeof(strl__corner) + sizeof(strl__face) / 3 + 1 + (desc->indexed ? 8u : 0) +
-           (desc->indexed_normals ? 8u : 0) + (desc->sorted ? 16u : 0);
+           (desc->indexed_normals ? 8u : 0) + (desc->indexed_texcoords ? 8u : 0) +
+           (desc->sorted ? 16u : 0);
 }
 
 strl_status strl__batch_init(strl__batch *batch, const strl__batch_desc *desc, strl_error *err)
@@ -35,10 +36,13 @@ strl_status strl__batch_init(strl__batch *batch, const strl__batch_desc *desc, s
         batch->vertex = strl__alloc(capacity, sizeof *batch->vertex);
     if (desc->indexed_normals)
         batch->normal = strl__alloc(capacity, sizeof *batch->normal);
+    if (desc->indexed_texcoords)
+        batch->texcoord = strl__alloc(capacity, sizeof *batch->texcoord);
     for (unsigned i = 0; i < 2 && desc->sorted; i++)
         batch->keys[i] = strl__alloc(capacity, sizeof *batch->keys[i]);
     bool whole = batch->faces && batch->corners && (batch->vertex || !desc->indexed) &&
                  (batch->normal || !desc->indexed_normals) &&
+                 (batch->texcoord || !desc->indexed_texcoords) &&
                  ((batch->keys[0] && batch->keys[1]) || !desc->sorted);
     if (whole)
         return STRL_OK;
@@ -52,6 +56,7 @@ void strl__batch_deinit(strl__batch *batch)
     strl__free(batch->corners);
     strl__free(batch->vertex);
     strl__free(batch->normal);
+    strl__free(batch->texcoord);
     strl__free(batch->keys[0]);
     strl__free(batch->keys[1]);
     strl__polygon_deinit(&batch->polygon);
@@ -171,6 +176,12 @@ strl_status strl__batch_resolve(strl__batch *batch, strl__table *vertices, strl_
     return status;
 }
 
+strl_status strl__batch_resolve_texcoords(strl__batch *batch, strl__table *texcoords,
+                                          strl_error *err)
+{
+    return resolve(batch, texcoords, batch->texcoord, err);
+}
+
 static bool is_finite_corner(const strl__corner *corner)
 {
     return __builtin_isfinite(corner->position[0]) && __builtin_isfinite(corner->position[1]) &&
@@ -182,6 +193,12 @@ static bool has_normal(const strl__corner *corner)
     return corner->normal[0] != 0 || corner->normal[1] != 0 || corner->normal[2] != 0;
 }
 
+/* Finite, and not so far from the image that nothing of it could be told. */
+static bool is_texcoord(const float texcoord[2])
+{
+    return texcoord[0] > -1e6f && texcoord[0] < 1e6f && texcoord[1] > -1e6f && texcoord[1] < 1e6f;
+}
+
 static void make_triangle(const strl__batch *batch, const strl__face *face,
                           const strl__corner *const corners[3], strl_triangle *triangle)
 {
@@ -190,10 +207,19 @@ static void make_triangle(const strl__batch *batch, const strl__face *face,
         memcpy(triangle->normal[i], corners[i]->normal, sizeof triangle->normal[i]);
         triangle->colour[i] = batch->has_corner_colour ? corners[i]->colour : face->colour;
     }
+    bool has_texcoord = batch->has_texcoord;
+    for (unsigned i = 0; i < 3 && has_texcoord; i++)
+        has_texcoord = is_texcoord(corners[i]->texcoord);
+    for (unsigned i = 0; i < 3; i++) {
+        triangle->texcoord[i][0] = has_texcoord ? corners[i]->texcoord[0] : 0;
+        triangle->texcoord[i][1] = has_texcoord ? corners[i]->texcoord[1] : 0;
+    }
     triangle->part = face->part;
     triangle->material = face->material;
     triangle->flags =
         batch->has_corner_colour || batch->has_face_colour ? STRL_TRIANGLE_HAS_COLOUR : 0;
+    if (has_texcoord)
+        triangle->flags |= STRL_TRIANGLE_HAS_TEXCOORD;
     if (has_normal(corners[0]) && has_normal(corners[1]) && has_normal(corners[2]))
         triangle->flags |= STRL_TRIANGLE_HAS_NORMAL;
     else

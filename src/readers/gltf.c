@@ -133,6 +133,18 @@ static void add_up(strl__gltf *gltf)
     reader->listed_vertices = gltf->vertices;
 }
 
+/* Images have what tables leave of the half, a quarter of all at most. */
+static void share_out(strl__gltf *gltf)
+{
+    strl__textures *textures = &gltf->reader->textures;
+    gltf->table_bytes += textures->capacity * sizeof *textures->items;
+    gltf->table_bytes += textures->picture_capacity * sizeof *textures->pictures;
+    const uint64_t half = gltf->reader->memory_bytes / 2, held = gltf->table_bytes + gltf->arena.total_bytes;
+    const uint64_t left = held < half ? half - held : 0;
+    if (textures->limit_bytes > left)
+        textures->limit_bytes = left;
+}
+
 static strl_status open_json(strl_reader *reader, strl_error *err)
 {
     strl__gltf *gltf = strl__gltf_of(reader);
@@ -142,6 +154,9 @@ static strl_status open_json(strl_reader *reader, strl_error *err)
     strl_status status = strl__gltf_parse(gltf, err);
     if (!status)
         status = strl__gltf_link(gltf, err);
+    if (!status)
+        status = strl__gltf_link_maps(gltf, err);
+    share_out(gltf);
     if (!status)
         status = strl__gltf_check_scene(gltf, err);
     if (!status)
@@ -156,7 +171,10 @@ static void init(strl_reader *reader)
     gltf->scene = STRL__NO_ITEM;
     gltf->table_limit = reader->memory_bytes / 16 * 7;
     strl_arena_init(&gltf->arena, (size_t)gltf->table_limit);
-    strl__gltf_init_thresholds(gltf);
+    strl__textures_init(&reader->textures, reader->memory_bytes / 4);
+    reader->textures.open = strl__gltf_open_picture;
+    reader->textures.context = gltf;
+    gltf->paint.measured = STRL__NO_ITEM;
 }
 
 static strl_status gltf_open(strl_reader *reader, strl_error *err)
@@ -302,6 +320,7 @@ static void gltf_close(strl_reader *reader)
     strl__gltf *gltf = strl__gltf_of(reader);
     strl__gltf_close_buffers(gltf);
     strl__gltf_close_decoded(gltf);
+    strl__gltf_end_paint(gltf);
     strl_arena_deinit(&gltf->arena);
     strl__free(gltf->accessors);
     strl__free(gltf->views);
@@ -311,6 +330,9 @@ static void gltf_close(strl_reader *reader)
     strl__free(gltf->nodes);
     strl__free(gltf->materials);
     strl__free(gltf->scenes);
+    strl__free(gltf->maps);
+    strl__free(gltf->samplers);
+    strl__free(gltf->images);
     strl__free(gltf->children);
     strl__free(gltf->roots);
     strl__free(gltf->world);

@@ -8,8 +8,9 @@
  * applied.
  *
  * Of the reader's budget at most seven sixteenths are for tables, half less those for what is
- * decompressed, an eighth for buffers that stand in the JSON as text, an eighth for the vertices
- * of a primitive. */
+ * decompressed and for images, which take a quarter at most, an eighth for buffers that stand in
+ * the JSON as text, an eighth for the vertices of a primitive; a 16th for measuring these under an
+ * image. */
 #ifndef STRL_READERS_GLTF_H
 #define STRL_READERS_GLTF_H
 
@@ -17,8 +18,11 @@
 #include "readers/gltf_draco.h"
 #include "readers/gltf_fields.h"
 #include "readers/internal.h"
+#include "readers/texture.h"
 
 #define STRL__GLTF_DEPTH_MAX 1024u /* of nodes */
+
+#define STRL__GLTF_SETS 4u /* of texture coordinates */
 
 /* Numbers that follow each other in a buffer view. */
 typedef struct strl__gltf_column {
@@ -81,18 +85,21 @@ typedef struct strl__gltf_buffer {
     strl_file_info opened;     /* of a file beside the model */
     uint64_t file_offset;
     uint8_t *memory; /* owned; where the bytes are instead of file */
+    uint64_t memory_bytes;
+    bool is_loose; /* an image: its bytes are as many as there are */
 } strl__gltf_buffer;
 
 typedef struct strl__gltf_draco_use {
     uint32_t view;
-    uint32_t position, normal, colour; /* unique ids in the compressed mesh, or STRL__NO_ITEM */
+    /* unique ids in the compressed mesh, or STRL__NO_ITEM */
+    uint32_t position, normal, colour, texcoord[STRL__GLTF_SETS];
 } strl__gltf_draco_use;
 
 typedef struct strl__gltf_primitive {
     uint8_t mode;   /* as in the file: 0 points, 1..3 lines, 4 triangles, 5 strip, 6 fan */
     bool has_range; /* lowest and highest are known */
     uint32_t indices, material;        /* or STRL__NO_ITEM, as all below */
-    uint32_t position, normal, colour; /* accessors */
+    uint32_t position, normal, colour, texcoord[STRL__GLTF_SETS]; /* accessors */
     strl__gltf_draco_use *draco;       /* in the arena; NULL: not compressed */
     uint32_t lowest, highest;          /* of its indices; beyond its vertices perhaps */
 } strl__gltf_primitive;
@@ -133,7 +140,24 @@ typedef struct strl__gltf_material {
     double cutoff;   /* of a mask, else negative */
     bool is_opaque;  /* alpha counts for nothing */
     uint32_t listed; /* among the reader's, once it is */
+    uint32_t map;    /* a texture of the file's, or STRL__NO_ITEM */
+    uint32_t set;    /* of texture coordinates */
+    double transform[6]; /* of them: rows of u and v */
+    uint32_t texture; /* among the reader's, or STRL__NO_TEXTURE */
 } strl__gltf_material;
+
+typedef struct strl__gltf_map {
+    uint32_t image, sampler; /* or STRL__NO_ITEM */
+} strl__gltf_map;
+
+typedef struct strl__gltf_sampler {
+    strl__wrap wrap[2];
+} strl__gltf_sampler;
+
+typedef struct strl__gltf_image {
+    char *uri, *name; /* in the arena; may be NULL */
+    uint32_t view;    /* or STRL__NO_ITEM */
+} strl__gltf_image;
 
 typedef struct strl__gltf_scene {
     uint32_t first_root, root_count; /* in roots */
@@ -167,6 +191,17 @@ typedef struct strl__gltf_pass {
     bool flips;
 } strl__gltf_pass;
 
+/* The image of the primitive that is read. */
+typedef struct strl__gltf_paint {
+    const strl__image *image; /* borrowed for the placement; NULL: none that can be used */
+    uint32_t texture, draco_id;
+    uint32_t texcoord; /* an accessor, or STRL__NO_ITEM: there is no image */
+    uint32_t measured; /* the primitive to which what follows belongs, or STRL__NO_ITEM */
+    uint64_t first, count; /* vertices that were loaded when it was measured */
+    strl__footprint *footprints; /* owned; of these; NULL: all have the same */
+    double footprint;
+} strl__gltf_paint;
+
 #define STRL__GLTF_CHUNK 1024u /* elements read at once */
 
 typedef struct strl__gltf {
@@ -183,11 +218,16 @@ typedef struct strl__gltf {
     strl__gltf_node *nodes;
     strl__gltf_material *materials;
     strl__gltf_scene *scenes;
+    strl__gltf_map *maps;
+    strl__gltf_sampler *samplers;
+    strl__gltf_image *images;
     uint32_t *children, *roots;
     size_t accessor_count, view_count, buffer_count, mesh_count, primitive_count, node_count;
-    size_t material_count, scene_count, child_count, root_count;
+    size_t material_count, scene_count, child_count, root_count, map_count, sampler_count;
+    size_t image_count;
     size_t accessor_capacity, view_capacity, buffer_capacity, mesh_capacity, primitive_capacity;
     size_t node_capacity, material_capacity, scene_capacity, child_capacity, root_capacity;
+    size_t map_capacity, sampler_capacity, image_capacity;
     bool has_asset;
     uint32_t scene;                       /* as the file says, or STRL__NO_ITEM */
     uint64_t seen;                        /* top-level members, one bit each */
@@ -204,9 +244,10 @@ typedef struct strl__gltf {
     uint64_t triangles, vertices; /* of all placements; of all meshes */
     strl__gltf_matrix *world;     /* owned; of node's ancestors and itself, by depth */
     strl__gltf_pass pass;
+    strl__gltf_paint paint;
     uint8_t *window;        /* owned */
-    double thresholds[255]; /* linear light from where the sRGB code is one more */
     double values[STRL__GLTF_CHUNK * 4];
+    double tints[STRL__GLTF_CHUNK * 4]; /* linear R, G, B, and A, of vertices under an image */
     strl__corner corners[STRL__GLTF_CHUNK];
     uint32_t elements[STRL__GLTF_CHUNK];
     strl__corner first_corner; /* of a fan */
@@ -239,9 +280,8 @@ strl_status strl__gltf_refuse_tables(const strl__gltf *gltf, strl_error *err);
 /* ---- gltf_parse.c, gltf_material.c: the JSON's elements into tables */
 strl_status strl__gltf_parse(strl__gltf *gltf, strl_error *err);
 strl_status strl__gltf_parse_material(strl__gltf *gltf, strl__fields *fields, const json_t *value);
-/* Linear light as an sRGB code. Not a number: 255. */
-uint8_t strl__gltf_encode(const strl__gltf *gltf, double linear);
-void strl__gltf_init_thresholds(strl__gltf *gltf);
+char *strl__gltf_keep_text(strl__gltf *gltf, strl__fields *fields, const json_t *value,
+                           const char *key); /* in the arena; NULL where absent */
 /* The alpha of a vertex under a material; STRL__NO_ITEM is the default one. */
 uint8_t strl__gltf_alpha(const strl__gltf *gltf, uint32_t material, double alpha);
 
@@ -273,6 +313,11 @@ strl_status strl__gltf_read_view(strl__gltf *gltf, uint32_t view, uint64_t offse
                                  size_t size, strl_error *err);
 strl_status strl__gltf_read_buffer(strl__gltf *gltf, uint32_t buffer, uint64_t offset, void *data,
                                    size_t size, strl_error *err);
+
+/* Where an image's uri leads: its bytes become known by opening. */
+strl_status strl__gltf_open_loose(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32_t image,
+                                  strl_error *err);
+void strl__gltf_close_buffer(strl__gltf *gltf, strl__gltf_buffer *buffer);
 
 /* ---- gltf_meshopt.c */
 strl_status strl__gltf_check_meshopt(strl__gltf *gltf, uint32_t view, strl_error *err);
@@ -323,6 +368,46 @@ strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primit
                                        strl_error *err);
 /* Adds its triangles to the batch until that is full or there are no more. */
 strl_status strl__gltf_add_triangles(strl__gltf *gltf, const strl__gltf_primitive *primitive,
+                                     strl_error *err);
+
+unsigned strl__gltf_mode_of(const strl__gltf_primitive *primitive); /* as its elements stand */
+/* Of a vertex attribute into gltf->values, count <= STRL__GLTF_CHUNK. */
+strl_status strl__gltf_read_attribute(strl__gltf *gltf, uint32_t accessor, uint32_t draco_id,
+                                      uint64_t first, size_t count, strl_error *err);
+strl_status strl__gltf_read_elements(strl__gltf *gltf, const strl__gltf_primitive *primitive,
+                                     uint64_t first, size_t count, uint32_t *elements,
+                                     strl_error *err);
+/* Where the corners of a triangle stand, from the one where it begins; a fan's first is apart. */
+#define STRL__GLTF_FAN_CENTRE UINT32_MAX
+void strl__gltf_corners_of(unsigned mode, uint64_t triangle, size_t at, uint32_t slots[3]);
+
+/* ---- gltf_map.c: images, textures and samplers. What of them cannot be understood is as if the
+ * image could not be used. */
+strl_status strl__gltf_parse_map(strl__gltf *gltf, strl__fields *fields, const json_t *value);
+strl_status strl__gltf_parse_sampler(strl__gltf *gltf, strl__fields *fields, const json_t *value);
+strl_status strl__gltf_parse_image(strl__gltf *gltf, strl__fields *fields, const json_t *value);
+/* The texture of a material, where it has one; info is its member in the JSON. */
+void strl__gltf_parse_map_use(const char *path, strl__gltf_material *material, const json_t *info);
+/* The materials' textures into the reader's; after parsing. */
+strl_status strl__gltf_link_maps(strl__gltf *gltf, strl_error *err);
+/* For the reader's textures; context: the strl__gltf. */
+strl_status strl__gltf_open_picture(void *context, const strl__picture *picture,
+                                    const char *ending, strl__picture_place *found,
+                                    strl_error *err);
+/* The accessor of the coordinates at which a primitive shows its material's image; STRL__NO_ITEM:
+ * none. */
+uint32_t strl__gltf_texcoord(const strl__gltf *gltf, const strl__gltf_primitive *primitive);
+
+/* ---- gltf_paint.c: vertices under an image */
+/* Sets paint for a placement that is about to be read: its image, and what each vertex stands for
+ * of it. */
+strl_status strl__gltf_begin_paint(strl__gltf *gltf, const strl__gltf_primitive *primitive,
+                                   strl_error *err);
+void strl__gltf_end_paint(strl__gltf *gltf); /* gives back what it holds */
+/* Texture coordinates and, where there is an image, it times gltf->tints, for vertices first.. into
+ * corners. */
+strl_status strl__gltf_paint_corners(strl__gltf *gltf, const strl__gltf_primitive *primitive,
+                                     uint64_t first, size_t count, strl__corner *corners,
                                      strl_error *err);
 
 #endif

@@ -64,28 +64,35 @@ static char *beside(const char *model, const char *uri, bool decode, bool *good)
     return path;
 }
 
-static strl_status open_file(strl__gltf *gltf, uint32_t index, strl_error *err)
+/* The member of the JSON that it stands in. */
+static const char *list_of(const strl__gltf_buffer *buffer)
 {
-    strl__gltf_buffer *buffer = &gltf->buffers[index];
+    return buffer->is_loose ? "images" : "buffers";
+}
+
+static strl_status open_file(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32_t index,
+                             strl_error *err)
+{
+    const char *list = list_of(buffer);
     bool good, good_raw;
     if (!is_relative(buffer->uri))
         return strl__fail(err, STRL_ERR_UNSUPPORTED,
-                          "%s, buffers[%u]: expected the name of a file beside the model, found "
+                          "%s, %s[%u]: expected the name of a file beside the model, found "
                           "'%.120s'",
-                          gltf->reader->path, index, buffer->uri);
+                          gltf->reader->path, list, index, buffer->uri);
     char *path = beside(gltf->reader->path, buffer->uri, true, &good);
     char *raw = beside(gltf->reader->path, buffer->uri, false, &good_raw);
     strl_status status = STRL_OK;
     if (!path || !raw)
         status = strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", gltf->reader->path);
     else if (!good)
-        status = strl__fail(err, STRL_ERR_FORMAT, "%s, buffers[%u]: a zero ends the name '%.120s'",
-                            gltf->reader->path, index, buffer->uri);
+        status = strl__fail(err, STRL_ERR_FORMAT, "%s, %s[%u]: a zero ends the name '%.120s'",
+                            gltf->reader->path, list, index, buffer->uri);
     else
         status = strl_file_open(!strl_path_exists(path) && strl_path_exists(raw) ? raw : path,
                                 &buffer->file, err);
     if (status && path && raw && good)
-        status = strl__fail_context(err, status, "%s, buffers[%u]", gltf->reader->path, index);
+        status = strl__fail_context(err, status, "%s, %s[%u]", gltf->reader->path, list, index);
     buffer->owns_file = buffer->is_beside = !status;
     if (!status)
         status = strl_file_stat(buffer->file, &buffer->opened, err);
@@ -96,6 +103,8 @@ static strl_status open_file(strl__gltf *gltf, uint32_t index, strl_error *err)
                             strl_file_path(buffer->file));
     if (!status)
         status = strl__reader_note_beside(gltf->reader, strl_file_path(buffer->file), &buffer->opened, err);
+    if (!status && buffer->is_loose)
+        buffer->bytes = buffer->opened.bytes;
     strl__free(path);
     strl__free(raw);
     return status;
@@ -122,6 +131,7 @@ static strl_status open_binary(strl__gltf *gltf, uint32_t index, strl_error *err
 /* A data URI under way: where it stands in the model's file, and what it became so far. */
 typedef struct data_text {
     strl__gltf *gltf;
+    strl__gltf_buffer *buffer;
     uint32_t index;
     strl_file *file;  /* the model's, or its text in UTF-8; borrowed */
     uint64_t at, end; /* in the file */
@@ -133,13 +143,14 @@ typedef struct data_text {
 
 static strl_status text_fail(const data_text *text, const char *expected, strl_error *err)
 {
-    return strl__fail(err, STRL_ERR_FORMAT, "%s, byte %" PRIu64 ", buffers[%u]: expected %s",
-                      text->gltf->reader->path, text->at, text->index, expected);
+    return strl__fail(err, STRL_ERR_FORMAT, "%s, byte %" PRIu64 ", %s[%u]: expected %s",
+                      text->gltf->reader->path, text->at, list_of(text->buffer), text->index,
+                      expected);
 }
 
 static strl_status flush_decoded(data_text *text, strl_error *err)
 {
-    strl__gltf_buffer *buffer = &text->gltf->buffers[text->index];
+    strl__gltf_buffer *buffer = text->buffer;
     uint64_t left = buffer->bytes - text->decoded;
     size_t size = text->waiting < left ? text->waiting : (size_t)left;
     strl_status status = STRL_OK;
@@ -210,7 +221,7 @@ static strl_status pass_header(data_text *text, strl_error *err)
 static strl_status decode_text(data_text *text, strl_error *err)
 {
     char chars[TEXT_BYTES];
-    strl__gltf_buffer *buffer = &text->gltf->buffers[text->index];
+    strl__gltf_buffer *buffer = text->buffer;
     strl_status status = pass_header(text, err);
     while (!status && text->at < text->end) {
         const uint64_t begin = text->at, left = text->end - begin;
@@ -223,6 +234,8 @@ static strl_status decode_text(data_text *text, strl_error *err)
     }
     if (!status)
         status = flush_decoded(text, err);
+    if (!status && buffer->is_loose)
+        buffer->bytes = text->decoded;
     if (!status && text->decoded < buffer->bytes)
         status =
             strl__fail(err, STRL_ERR_FORMAT,
@@ -232,44 +245,48 @@ static strl_status decode_text(data_text *text, strl_error *err)
 }
 
 /* To memory or to scratch. */
-static strl_status make_place(strl__gltf *gltf, uint32_t index, strl_error *err)
+static strl_status make_place(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32_t index,
+                              strl_error *err)
 {
-    strl__gltf_buffer *buffer = &gltf->buffers[index];
     const uint64_t limit = gltf->reader->memory_bytes / 8;
     if (buffer->bytes <= limit - gltf->text_bytes) {
         buffer->memory = strl__alloc((size_t)buffer->bytes, 1);
-        gltf->text_bytes += buffer->memory ? buffer->bytes : 0;
+        buffer->memory_bytes = buffer->memory ? buffer->bytes : 0;
+        gltf->text_bytes += buffer->memory_bytes;
         return buffer->memory ? STRL_OK
                               : strl__fail(err, STRL_ERR_MEMORY,
-                                           "%s, buffers[%u]: no memory for %" PRIu64 " bytes",
-                                           gltf->reader->path, index, buffer->bytes);
+                                           "%s, %s[%u]: no memory for %" PRIu64 " bytes",
+                                           gltf->reader->path, list_of(buffer), index,
+                                           buffer->bytes);
     }
     if (!gltf->reader->scratch_dir)
         return strl__fail(err, STRL_ERR_ARGUMENT,
-                          "%s, buffers[%u]: its %" PRIu64 " bytes do not fit the %" PRIu64
+                          "%s, %s[%u]: its %" PRIu64 " bytes do not fit the %" PRIu64
                           " of memory and no scratch folder was given",
-                          gltf->reader->path, index, buffer->bytes, limit);
+                          gltf->reader->path, list_of(buffer), index, buffer->bytes, limit);
     strl_status status = strl_file_create_nameless(gltf->reader->scratch_dir, &buffer->file, err);
     buffer->owns_file = !status;
     return status;
 }
 
 /* uri is "data:@OFFSET+BYTES", as the JSON's splitter writes it. */
-static strl_status open_text(strl__gltf *gltf, uint32_t index, strl_error *err)
+static strl_status open_text(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32_t index,
+                             strl_error *err)
 {
-    data_text text = {.gltf = gltf, .index = index, .file = gltf->reader->input.file};
+    data_text text = {.gltf = gltf, .buffer = buffer, .index = index, .file = gltf->reader->input.file};
     uint64_t bytes;
-    strl__gltf_buffer *buffer = &gltf->buffers[index];
     if (sscanf(buffer->uri, "data:@%" SCNu64 "+%" SCNu64, &text.at, &bytes) != 2)
-        return strl__fail(err, STRL_ERR_INTERNAL, "%s, buffers[%u]: '%.80s' is no place in it",
-                          gltf->reader->path, index, buffer->uri);
+        return strl__fail(err, STRL_ERR_INTERNAL, "%s, %s[%u]: '%.80s' is no place in it",
+                          gltf->reader->path, list_of(buffer), index, buffer->uri);
     text.end = text.at + bytes;
-    if (buffer->bytes > bytes) /* before it sizes anything */
+    if (buffer->is_loose)
+        buffer->bytes = bytes / 4 * 3 + 3;
+    if (!buffer->is_loose && buffer->bytes > bytes) /* before it sizes anything */
         return strl__fail(err, STRL_ERR_FORMAT,
                           "%s, buffers[%u]: expected %" PRIu64
                           " bytes, found a data URI of %" PRIu64 " letters",
                           gltf->reader->path, index, buffer->bytes, bytes);
-    strl_status status = make_place(gltf, index, err);
+    strl_status status = make_place(gltf, buffer, index, err);
     return status ? status : decode_text(&text, err);
 }
 
@@ -284,11 +301,27 @@ strl_status strl__gltf_open_buffer(strl__gltf *gltf, uint32_t index, strl_error 
     if (!buffer->uri)
         status = open_binary(gltf, index, err);
     else if (strncmp(buffer->uri, "data:", 5) == 0)
-        status = open_text(gltf, index, err);
+        status = open_text(gltf, buffer, index, err);
     else
-        status = open_file(gltf, index, err);
+        status = open_file(gltf, buffer, index, err);
     buffer->is_open = !status;
     return status;
+}
+
+strl_status strl__gltf_open_loose(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32_t image,
+                                  strl_error *err)
+{
+    buffer->is_loose = true;
+    return strncmp(buffer->uri, "data:", 5) == 0 ? open_text(gltf, buffer, image, err)
+                                                 : open_file(gltf, buffer, image, err);
+}
+
+void strl__gltf_close_buffer(strl__gltf *gltf, strl__gltf_buffer *buffer)
+{
+    if (buffer->owns_file)
+        strl_file_close(buffer->file, NULL); /* read from, or scratch */
+    strl__free(buffer->memory);
+    gltf->text_bytes -= buffer->memory_bytes;
 }
 
 strl_status strl__gltf_check_unchanged(const strl__gltf *gltf, strl_error *err)
@@ -303,11 +336,8 @@ strl_status strl__gltf_check_unchanged(const strl__gltf *gltf, strl_error *err)
 
 void strl__gltf_close_buffers(strl__gltf *gltf)
 {
-    for (size_t i = 0; i < gltf->buffer_count; i++) {
-        if (gltf->buffers[i].owns_file)
-            strl_file_close(gltf->buffers[i].file, NULL); /* read from, or scratch */
-        strl__free(gltf->buffers[i].memory);
-    }
+    for (size_t i = 0; i < gltf->buffer_count; i++)
+        strl__gltf_close_buffer(gltf, &gltf->buffers[i]);
 }
 
 strl_status strl__gltf_read_buffer(strl__gltf *gltf, uint32_t index, uint64_t offset, void *data,

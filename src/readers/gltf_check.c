@@ -26,6 +26,10 @@ static const expectation expected_normal = {"NORMAL", 3, 3,
 static const expectation expected_colour = {"COLOR_0", 3, 4,
                                             TYPE(STRL__F32) | TYPE(STRL__U8) | TYPE(STRL__U16),
                                             "three or four floats, unsigned bytes or shorts"};
+static const expectation expected_texcoord = {"TEXCOORD", 2, 2,
+                                              TYPE(STRL__F32) | TYPE(STRL__I8) | TYPE(STRL__U8) |
+                                                  TYPE(STRL__I16) | TYPE(STRL__U16),
+                                              "two floats, bytes or shorts"};
 static const expectation expected_indices = {
     "indices", 1, 1, TYPE(STRL__U8) | TYPE(STRL__U16) | TYPE(STRL__U32), "unsigned integers"};
 static const expectation expected_translation = {"TRANSLATION", 3, 3, TYPE(STRL__F32),
@@ -61,6 +65,16 @@ static strl_status check_use(strl__gltf *gltf, uint32_t index, const expectation
     return status;
 }
 
+static strl_status count_fail(const strl__gltf *gltf, const strl__gltf_primitive *primitive,
+                              uint32_t index, const expectation *expected, strl_error *err)
+{
+    return strl__fail(err, STRL_ERR_FORMAT,
+                      "%s, accessors[%u]: expected %" PRIu64 " elements of %s, as many as POSITION "
+                      "has, found %" PRIu64,
+                      gltf->reader->path, index, gltf->accessors[primitive->position].count,
+                      expected->name, gltf->accessors[index].count);
+}
+
 /* NORMAL and COLOR_0 follow POSITION. Their integers are always normalized, said or not. */
 static strl_status check_companion(strl__gltf *gltf, const strl__gltf_primitive *primitive,
                                    uint32_t index, const expectation *expected, bool is_compressed,
@@ -77,11 +91,23 @@ static strl_status check_companion(strl__gltf *gltf, const strl__gltf_primitive 
         accessor->sparse->values.normalized = accessor->values.normalized;
     if (accessor->count >= gltf->accessors[primitive->position].count)
         return STRL_OK;
-    return strl__fail(err, STRL_ERR_FORMAT,
-                      "%s, accessors[%u]: expected %" PRIu64 " elements of %s, as many as POSITION "
-                      "has, found %" PRIu64,
-                      gltf->reader->path, index, gltf->accessors[primitive->position].count,
-                      expected->name, accessor->count);
+    return count_fail(gltf, primitive, index, expected, err);
+}
+
+/* Where the material has an image. Integers may stand for themselves (KHR_mesh_quantization). */
+static strl_status check_texcoord(strl__gltf *gltf, const strl__gltf_primitive *primitive,
+                                  strl_error *err)
+{
+    const uint32_t index = strl__gltf_texcoord(gltf, primitive);
+    if (index == STRL__NO_ITEM)
+        return STRL_OK;
+    const strl__gltf_draco_use *draco = primitive->draco;
+    const uint32_t set = gltf->materials[primitive->material].set;
+    strl_status status = check_use(gltf, index, &expected_texcoord,
+                                   draco && draco->texcoord[set] != STRL__NO_ITEM, err);
+    if (status || gltf->accessors[index].count >= gltf->accessors[primitive->position].count)
+        return status;
+    return count_fail(gltf, primitive, index, &expected_texcoord, err);
 }
 
 static strl_status check_triangles(strl__gltf *gltf, const strl__gltf_primitive *primitive,
@@ -96,6 +122,8 @@ static strl_status check_triangles(strl__gltf *gltf, const strl__gltf_primitive 
     if (!status)
         status = check_companion(gltf, primitive, primitive->colour, &expected_colour,
                                  draco && draco->colour != STRL__NO_ITEM, err);
+    if (!status)
+        status = check_texcoord(gltf, primitive, err);
     if (!status && primitive->indices != STRL__NO_ITEM)
         status = check_use(gltf, primitive->indices, &expected_indices, draco != NULL, err);
     if (!status && draco)

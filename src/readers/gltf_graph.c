@@ -318,8 +318,10 @@ strl_status strl__gltf_list_material(strl__gltf *gltf, uint32_t index, uint32_t 
         snprintf(number, sizeof number, "material %u", index);
         const char *name = material->name && *material->name ? material->name : number;
         status = add_name(gltf, names, name, "material", index, &material->listed, err);
-        if (!status)
+        if (!status) {
             names->items[material->listed].rgba = material->rgba;
+            names->items[material->listed].texture = material->texture;
+        }
     }
     *listed = material->listed;
     return status;

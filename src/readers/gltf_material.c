@@ -1,30 +1,10 @@
-/* Materials come down to one colour: the base colour's factor, linear in the file. Of alpha modes,
+/* Materials come down to one colour, the base colour's factor, linear in the file, and its image,
+ * which the vertices' colours take in. Of alpha modes,
  * OPAQUE makes alpha 1, BLEND keeps it, MASK makes it 0 or 1 by the cutoff, vertex by vertex. */
 #include <math.h>
 #include <string.h>
 
 #include "readers/gltf.h"
-
-/* Codes change half way between them. */
-void strl__gltf_init_thresholds(strl__gltf *gltf)
-{
-    for (unsigned code = 0; code < 255; code++) {
-        double encoded = (code + 0.5) / 255;
-        gltf->thresholds[code] =
-            encoded <= 0.04045 ? encoded / 12.92 : pow((encoded + 0.055) / 1.055, 2.4);
-    }
-}
-
-uint8_t strl__gltf_encode(const strl__gltf *gltf, double linear)
-{
-    unsigned code = 0;
-    if (linear != linear)
-        return 255;
-    for (unsigned step = 128; step; step /= 2)
-        if (linear >= gltf->thresholds[code + step - 1])
-            code += step;
-    return (uint8_t)code;
-}
 
 static uint8_t mask_or_blend(const strl__gltf_material *material, double alpha)
 {
@@ -44,32 +24,36 @@ uint8_t strl__gltf_alpha(const strl__gltf *gltf, uint32_t index, double alpha)
     return mask_or_blend(material, material->cutoff < 0 ? alpha : alpha * material->alpha);
 }
 
-static void parse_factor(strl__fields *fields, const json_t *value, double factor[4])
+/* Returns the member that tells of the image, or NULL. */
+static const json_t *parse_base(strl__fields *fields, const json_t *value, double factor[4])
 {
     const json_t *rough = strl__fields_object(fields, value, "pbrMetallicRoughness");
     const json_t *glossy =
         strl__fields_extension(fields, value, "KHR_materials_pbrSpecularGlossiness");
-    bool has_base = strl__fields_object(fields, rough, "baseColorTexture") != NULL;
-    has_base = strl__fields_numbers(fields, rough, "baseColorFactor", factor, 4) || has_base;
-    if (!has_base)
-        strl__fields_numbers(fields, glossy, "diffuseFactor", factor, 4);
+    const json_t *image = strl__fields_object(fields, rough, "baseColorTexture");
+    if (strl__fields_numbers(fields, rough, "baseColorFactor", factor, 4) || image)
+        return image;
+    strl__fields_numbers(fields, glossy, "diffuseFactor", factor, 4);
+    return strl__fields_object(fields, glossy, "diffuseTexture");
 }
 
 strl_status strl__gltf_parse_material(strl__gltf *gltf, strl__fields *fields, const json_t *value)
 {
     double factor[4] = {1, 1, 1, 1};
-    strl__gltf_material material = {.cutoff = -1, .listed = STRL__NO_ITEM};
+    strl__gltf_material material = {
+        .cutoff = -1, .listed = STRL__NO_ITEM, .texture = STRL__NO_TEXTURE};
     const char *name = strl__fields_text(fields, value, "name");
     const char *mode = strl__fields_text(fields, value, "alphaMode");
     const double cutoff = strl__fields_number(fields, value, "alphaCutoff", 0.5);
-    parse_factor(fields, value, factor);
+    strl__gltf_parse_map_use(fields->path, &material, parse_base(fields, value, factor));
     material.is_opaque = !mode || (strcmp(mode, "MASK") != 0 && strcmp(mode, "BLEND") != 0);
     if (mode && strcmp(mode, "MASK") == 0)
         material.cutoff = fmax(cutoff, 0);
     material.alpha = factor[3];
+    const strl__srgb *srgb = &gltf->reader->textures.srgb;
     material.rgba =
-        strl__pack_colour(strl__gltf_encode(gltf, factor[0]), strl__gltf_encode(gltf, factor[1]),
-                          strl__gltf_encode(gltf, factor[2]), mask_or_blend(&material, factor[3]));
+        strl__pack_colour(strl__srgb_encode(srgb, factor[0]), strl__srgb_encode(srgb, factor[1]),
+                          strl__srgb_encode(srgb, factor[2]), mask_or_blend(&material, factor[3]));
     if (fields->status)
         return fields->status;
     if (name && !(material.name = strl__gltf_keep(gltf, strlen(name) + 1, fields->err)))

@@ -15,8 +15,21 @@
 static uint64_t limit_of(const strl__gltf *gltf)
 {
     const uint64_t half = gltf->reader->memory_bytes / 2;
-    const uint64_t held = gltf->table_bytes + gltf->arena.total_bytes;
+    const uint64_t held =
+        gltf->table_bytes + gltf->arena.total_bytes + gltf->reader->textures.held_bytes;
     return held < half ? half - held : 0;
+}
+
+/* Once images have made room for so many bytes. One that a placement shows stays. */
+static uint64_t limit_for(strl__gltf *gltf, uint64_t bytes)
+{
+    if (bytes + gltf->decoded_bytes + gltf->draco_bytes > limit_of(gltf)) {
+        if (gltf->paint.image)
+            strl__textures_shed(&gltf->reader->textures);
+        else
+            strl__textures_rest(&gltf->reader->textures);
+    }
+    return limit_of(gltf);
 }
 
 static void drop(strl__gltf *gltf, strl__gltf_decoded *decoded)
@@ -57,8 +70,8 @@ static strl__gltf_decoded *find_oldest(strl__gltf *gltf)
 strl_status strl__gltf_make_room(strl__gltf *gltf, uint64_t bytes, const char *what,
                                  strl_error *err)
 {
-    const uint64_t limit = limit_of(gltf);
     strl__gltf_decoded *oldest;
+    const uint64_t limit = limit_for(gltf, bytes);
     while (bytes + gltf->decoded_bytes + gltf->draco_bytes > limit &&
            (oldest = find_oldest(gltf)) != NULL)
         drop(gltf, oldest);
@@ -66,7 +79,11 @@ strl_status strl__gltf_make_room(strl__gltf *gltf, uint64_t bytes, const char *w
         return STRL_OK;
     char advice[STRL__ADVICE_BYTES];
     const uint64_t half = gltf->reader->memory_bytes / 2;
-    strl__reader_advise(gltf->reader, half - limit + bytes, half, advice);
+    const strl__image *image = gltf->paint.image;
+    const uint64_t others = gltf->table_bytes + gltf->arena.total_bytes + bytes;
+    /* A halved image is larger where there is more memory: half of the half, which is its most. */
+    const uint64_t needed = others + (image && image->halvings ? others : gltf->reader->textures.held_bytes);
+    strl__reader_advise(gltf->reader, needed, half, advice);
     return strl__fail(err, STRL_ERR_LIMIT,
                       "%s: %s takes %" PRIu64 " bytes decompressed, the memory budget allows %" PRIu64 ": %s",
                       gltf->reader->path, what, bytes, limit, advice);
@@ -179,7 +196,7 @@ static strl_status add_decoded(strl__gltf *gltf, uint32_t index, strl__gltf_deco
                                strl_error *err)
 {
     const strl__gltf_meshopt *meshopt = gltf->views[index].meshopt;
-    const uint64_t size = meshopt->count * meshopt->stride, limit = limit_of(gltf);
+    const uint64_t size = meshopt->count * meshopt->stride, limit = limit_for(gltf, size + meshopt->bytes);
     strl_status status = STRL_OK;
     strl__gltf_decoded *place = NULL, *oldest;
     while (!status && size + meshopt->bytes + gltf->decoded_bytes + gltf->draco_bytes > limit &&

@@ -22,7 +22,8 @@ static void *keep(strl__gltf *gltf, strl__fields *fields, size_t bytes)
     return block;
 }
 
-static char *keep_text(strl__gltf *gltf, strl__fields *fields, const json_t *value, const char *key)
+char *strl__gltf_keep_text(strl__gltf *gltf, strl__fields *fields, const json_t *value,
+                           const char *key)
 {
     const char *text = strl__fields_text(fields, value, key);
     char *copy = text ? keep(gltf, fields, strlen(text) + 1) : NULL;
@@ -38,7 +39,7 @@ static char *keep_text(strl__gltf *gltf, strl__fields *fields, const json_t *val
 static strl_status parse_buffer(strl__gltf *gltf, strl__fields *fields, const json_t *value)
 {
     strl__gltf_buffer buffer = {.bytes = strl__fields_count(fields, value, "byteLength", 0),
-                                .uri = keep_text(gltf, fields, value, "uri")};
+                                .uri = strl__gltf_keep_text(gltf, fields, value, "uri")};
     strl_status status = fields->status;
     if (!status)
         status = ADD(gltf, buffers, buffer_count, buffer_capacity, fields->err);
@@ -204,6 +205,15 @@ static strl_status parse_accessor(strl__gltf *gltf, strl__fields *fields, const 
 
 /* ---- meshes */
 
+static void parse_texcoords(strl__fields *fields, const json_t *attributes,
+                            uint32_t texcoord[STRL__GLTF_SETS])
+{
+    static const char *const names[STRL__GLTF_SETS] = {"TEXCOORD_0", "TEXCOORD_1", "TEXCOORD_2",
+                                                       "TEXCOORD_3"};
+    for (unsigned set = 0; set < STRL__GLTF_SETS; set++)
+        texcoord[set] = strl__fields_index(fields, attributes, names[set]);
+}
+
 static strl__gltf_draco_use *parse_draco(strl__gltf *gltf, strl__fields *fields,
                                          const json_t *value)
 {
@@ -218,6 +228,7 @@ static strl__gltf_draco_use *parse_draco(strl__gltf *gltf, strl__fields *fields,
         .normal = strl__fields_index(fields, attributes, "NORMAL"),
         .colour = strl__fields_index(fields, attributes, "COLOR_0"),
     };
+    parse_texcoords(fields, attributes, draco->texcoord);
     return draco;
 }
 
@@ -234,6 +245,7 @@ static strl_status parse_primitive(strl__gltf *gltf, strl__fields *fields, const
         .normal = strl__fields_index(fields, attributes, "NORMAL"),
         .colour = strl__fields_index(fields, attributes, "COLOR_0"),
     };
+    parse_texcoords(fields, attributes, primitive.texcoord);
     if (mode > 6)
         strl__fields_fail(fields, "primitives.mode", "a mode of 0 to 6");
     if (draco)
@@ -249,7 +261,7 @@ static strl_status parse_primitive(strl__gltf *gltf, strl__fields *fields, const
 static strl_status parse_mesh(strl__gltf *gltf, strl__fields *fields, const json_t *value)
 {
     const json_t *list = strl__fields_list(fields, value, "primitives");
-    strl__gltf_mesh mesh = {.name = keep_text(gltf, fields, value, "name"),
+    strl__gltf_mesh mesh = {.name = strl__gltf_keep_text(gltf, fields, value, "name"),
                             .first_primitive = (uint32_t)gltf->primitive_count,
                             .primitive_count = (uint32_t)json_array_size(list)};
     strl_status status = fields->status;
@@ -316,7 +328,7 @@ static strl_status parse_node(strl__gltf *gltf, strl__fields *fields, const json
 {
     const json_t *instances = strl__fields_extension(fields, value, "EXT_mesh_gpu_instancing");
     const json_t *list = strl__fields_list(fields, value, "children");
-    strl__gltf_node node = {.name = keep_text(gltf, fields, value, "name"),
+    strl__gltf_node node = {.name = strl__gltf_keep_text(gltf, fields, value, "name"),
                             .mesh = strl__fields_index(fields, value, "mesh"),
                             .parent = STRL__NO_ITEM,
                             .part = STRL__NO_ITEM,
@@ -419,21 +431,25 @@ static const struct {
     const char *name;
     bool is_list;
     parse_element parse;
+    bool is_optional; /* what is no list is passed over */
     size_t bytes;     /* of one in its table */
     const char *list; /* of each what is in tables of its own; may be NULL */
     size_t list_bytes;
 } members[] = {
-    {"asset", false, parse_asset, 0, NULL, 0},
-    {"scene", false, parse_default_scene, 0, NULL, 0},
-    {"extensionsRequired", true, parse_required, 0, NULL, 0},
-    {"scenes", true, parse_scene, sizeof(strl__gltf_scene), "nodes", sizeof(uint32_t)},
-    {"nodes", true, parse_node, sizeof(strl__gltf_node), "children", sizeof(uint32_t)},
-    {"meshes", true, parse_mesh, sizeof(strl__gltf_mesh), "primitives",
+    {"asset", false, parse_asset, false, 0, NULL, 0},
+    {"scene", false, parse_default_scene, false, 0, NULL, 0},
+    {"extensionsRequired", true, parse_required, false, 0, NULL, 0},
+    {"scenes", true, parse_scene, false, sizeof(strl__gltf_scene), "nodes", sizeof(uint32_t)},
+    {"nodes", true, parse_node, false, sizeof(strl__gltf_node), "children", sizeof(uint32_t)},
+    {"meshes", true, parse_mesh, false, sizeof(strl__gltf_mesh), "primitives",
      sizeof(strl__gltf_primitive) + sizeof(strl__gltf_draco_use)},
-    {"accessors", true, parse_accessor, sizeof(strl__gltf_accessor), NULL, 0},
-    {"bufferViews", true, parse_view, sizeof(strl__gltf_view), NULL, 0},
-    {"buffers", true, parse_buffer, sizeof(strl__gltf_buffer), NULL, 0},
-    {"materials", true, strl__gltf_parse_material, sizeof(strl__gltf_material), NULL, 0},
+    {"accessors", true, parse_accessor, false, sizeof(strl__gltf_accessor), NULL, 0},
+    {"bufferViews", true, parse_view, false, sizeof(strl__gltf_view), NULL, 0},
+    {"buffers", true, parse_buffer, false, sizeof(strl__gltf_buffer), NULL, 0},
+    {"materials", true, strl__gltf_parse_material, false, sizeof(strl__gltf_material), NULL, 0},
+    {"textures", true, strl__gltf_parse_map, true, sizeof(strl__gltf_map), NULL, 0},
+    {"samplers", true, strl__gltf_parse_sampler, true, sizeof(strl__gltf_sampler), NULL, 0},
+    {"images", true, strl__gltf_parse_image, true, sizeof(strl__gltf_image), NULL, 0},
 };
 
 /* About what an element takes in the tables and the arena. */
@@ -476,7 +492,10 @@ static strl_status take(void *context, const char *member, uint64_t index, const
     if (members[which].is_list && index == STRL__JSON_WHOLE && json_is_object(value) &&
         !gltf->has_asset && !gltf->has_binary)
         gltf->reader->is_foreign = true; /* as glTF 1 has it */
-    if (members[which].is_list != (index != STRL__JSON_WHOLE))
+    const bool is_wrong = members[which].is_list != (index != STRL__JSON_WHOLE);
+    if (is_wrong && members[which].is_optional)
+        return STRL_OK;
+    if (is_wrong)
         return members[which].is_list
                    ? strl__fail(err, STRL_ERR_UNSUPPORTED,
                                 "%s: expected glTF 2.0, whose %s are a list, found %s", path,

@@ -32,10 +32,15 @@ static strl_status check_decoded(const strl__gltf *gltf, const strl__gltf_primit
                                  strl_error *err)
 {
     const strl__gltf_draco_use *use = primitive->draco;
-    const uint32_t ids[3] = {use->position, use->normal, use->colour};
-    const uint32_t accessors[3] = {primitive->position, primitive->normal, primitive->colour};
+    const uint32_t texcoord = strl__gltf_texcoord(gltf, primitive);
+    const uint32_t ids[4] = {use->position, use->normal, use->colour,
+                             texcoord == STRL__NO_ITEM
+                                 ? STRL__NO_ITEM
+                                 : use->texcoord[gltf->materials[primitive->material].set]};
+    const uint32_t accessors[4] = {primitive->position, primitive->normal, primitive->colour,
+                                   texcoord};
     const uint64_t points = strl__draco_point_count(gltf->draco);
-    for (unsigned i = 0; i < 3; i++)
+    for (unsigned i = 0; i < 4; i++)
         if (accessors[i] != STRL__NO_ITEM &&
             (points > gltf->accessors[accessors[i]].count ||
              (ids[i] != STRL__NO_ITEM && strl__draco_components(gltf->draco, ids[i]) !=
@@ -54,6 +59,11 @@ static strl_status decode_announced(strl__gltf *gltf, const strl__gltf_primitive
     char why[120];
     strl__draco_room room = {.bytes = strl__gltf_room(gltf) - facts->connectivity_bytes};
     gltf->draco = strl__draco_decode(packed, size, facts, &room, why);
+    if (room.wanted > room.bytes && gltf->reader->textures.held_bytes) {
+        strl__textures_rest(&gltf->reader->textures); /* as if none had come before */
+        room.bytes = strl__gltf_room(gltf) - facts->connectivity_bytes;
+        gltf->draco = strl__draco_decode(packed, size, facts, &room, why);
+    }
     if (room.wanted > room.bytes)
         return strl__gltf_make_room(gltf, facts->connectivity_bytes + room.wanted, "a Draco mesh", err);
     if (!gltf->draco)
@@ -110,9 +120,8 @@ static strl_status open_draco(strl__gltf *gltf, const strl__gltf_primitive *prim
 
 /* ---- vertices */
 
-/* Into gltf->values. */
-static strl_status read_attribute(strl__gltf *gltf, uint32_t index, uint32_t draco_id,
-                                  uint64_t first, size_t count, strl_error *err)
+strl_status strl__gltf_read_attribute(strl__gltf *gltf, uint32_t index, uint32_t draco_id,
+                                      uint64_t first, size_t count, strl_error *err)
 {
     const strl__gltf_column *column = &gltf->accessors[index].values;
     if (!gltf->draco || draco_id == STRL__NO_ITEM)
@@ -158,13 +167,30 @@ static void place_normals(strl__gltf *gltf, strl__corner *corners, size_t count)
 static void place_colours(strl__gltf *gltf, uint32_t material, unsigned components,
                           strl__corner *corners, size_t count)
 {
+    const strl__srgb *srgb = &gltf->reader->textures.srgb;
     for (size_t i = 0; i < count; i++) {
         const double *c = gltf->values + components * i;
         corners[i].colour =
-            strl__pack_colour(strl__gltf_encode(gltf, c[0]), strl__gltf_encode(gltf, c[1]),
-                              strl__gltf_encode(gltf, c[2]),
+            strl__pack_colour(strl__srgb_encode(srgb, c[0]), strl__srgb_encode(srgb, c[1]),
+                              strl__srgb_encode(srgb, c[2]),
                               strl__gltf_alpha(gltf, material, components == 4 ? c[3] : 1));
     }
+}
+
+/* Of vertices under an image: their own colours, white where there are none. */
+static strl_status read_tints(strl__gltf *gltf, const strl__gltf_primitive *primitive,
+                              uint32_t draco_id, uint64_t first, size_t count, strl_error *err)
+{
+    for (size_t i = 0; i < 4 * count; i++)
+        gltf->tints[i] = 1;
+    if (primitive->colour == STRL__NO_ITEM)
+        return STRL_OK;
+    const unsigned components = gltf->accessors[primitive->colour].values.components;
+    strl_status status =
+        strl__gltf_read_attribute(gltf, primitive->colour, draco_id, first, count, err);
+    for (size_t i = 0; i < count * components && !status; i++)
+        gltf->tints[4 * (i / components) + i % components] = gltf->values[i];
+    return status;
 }
 
 /* count <= STRL__GLTF_CHUNK */
@@ -172,24 +198,35 @@ static strl_status read_corners(strl__gltf *gltf, const strl__gltf_primitive *pr
                                 uint64_t first, size_t count, strl__corner *corners,
                                 strl_error *err)
 {
-    static const strl__gltf_draco_use none = {0, STRL__NO_ITEM, STRL__NO_ITEM, STRL__NO_ITEM};
+    static const strl__gltf_draco_use none = {
+        0, STRL__NO_ITEM, STRL__NO_ITEM, STRL__NO_ITEM,
+        {STRL__NO_ITEM, STRL__NO_ITEM, STRL__NO_ITEM, STRL__NO_ITEM}};
     const strl__gltf_draco_use *draco = primitive->draco ? primitive->draco : &none;
     strl_status status =
-        read_attribute(gltf, primitive->position, draco->position, first, count, err);
+        strl__gltf_read_attribute(gltf, primitive->position, draco->position, first, count, err);
     if (status)
         return status;
     for (size_t i = 0; i < count; i++) {
         memset(corners[i].normal, 0, sizeof corners[i].normal);
+        memset(corners[i].texcoord, 0, sizeof corners[i].texcoord);
         corners[i].colour = 0xffffffffu;
     }
     place_positions(gltf, corners, count);
     if (primitive->normal != STRL__NO_ITEM) {
-        status = read_attribute(gltf, primitive->normal, draco->normal, first, count, err);
+        status =
+            strl__gltf_read_attribute(gltf, primitive->normal, draco->normal, first, count, err);
         if (!status)
             place_normals(gltf, corners, count);
     }
+    if (!status && gltf->paint.image)
+        status = read_tints(gltf, primitive, draco->colour, first, count, err);
+    if (!status && gltf->paint.texcoord != STRL__NO_ITEM)
+        status = strl__gltf_paint_corners(gltf, primitive, first, count, corners, err);
+    if (status || gltf->paint.image)
+        return status;
     if (!status && primitive->colour != STRL__NO_ITEM) {
-        status = read_attribute(gltf, primitive->colour, draco->colour, first, count, err);
+        status =
+            strl__gltf_read_attribute(gltf, primitive->colour, draco->colour, first, count, err);
         if (!status)
             place_colours(gltf, primitive->material,
                           gltf->accessors[primitive->colour].values.components, corners, count);
@@ -204,7 +241,8 @@ static strl__layout corner_layout(void)
                            .has_position = true,
                            .has_normal = true,
                            .has_colour = true,
-                           .has_alpha = true};
+                           .has_alpha = true,
+                           .has_texcoord = true};
     for (uint32_t i = 0; i < 4; i++) {
         uint32_t byte = layout.big_endian ? 3 - i : i;
         layout.colour[i] = (strl__field){(uint32_t)offsetof(strl__corner, colour) + byte, STRL__U8};
@@ -212,6 +250,9 @@ static strl__layout corner_layout(void)
     for (uint32_t i = 0; i < 3; i++) {
         layout.position[i] =
             (strl__field){(uint32_t)offsetof(strl__corner, position) + 8 * i, STRL__F64};
+        if (i < 2)
+            layout.texcoord[i] =
+                (strl__field){(uint32_t)offsetof(strl__corner, texcoord) + 4 * i, STRL__F32};
         layout.normal[i] =
             (strl__field){(uint32_t)offsetof(strl__corner, normal) + 4 * i, STRL__F32};
     }
@@ -265,8 +306,9 @@ static strl_status place_instance(strl__gltf *gltf, const strl__gltf_instances *
     return status;
 }
 
-strl_status strl__gltf_read_elements(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t first,
-                                     size_t count, uint32_t *elements, strl_error *err)
+strl_status strl__gltf_read_elements(strl__gltf *gltf, const strl__gltf_primitive *primitive,
+                                     uint64_t first, size_t count, uint32_t *elements,
+                                     strl_error *err)
 {
     if (!gltf->draco)
         return strl__gltf_read_indices(gltf, primitive->indices, first, count, elements, err);
@@ -299,7 +341,7 @@ static strl_status read_first(strl__gltf *gltf, const strl__gltf_primitive *prim
 }
 
 /* Draco keeps triangles as a list, whatever they were. */
-static unsigned mode_of(const strl__gltf_primitive *primitive)
+unsigned strl__gltf_mode_of(const strl__gltf_primitive *primitive)
 {
     return primitive->draco ? 4 : primitive->mode;
 }
@@ -309,6 +351,7 @@ strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primit
 {
     strl__gltf_pass *pass = &gltf->pass;
     const strl__gltf_node *node = &gltf->nodes[pass->node];
+    gltf->paint.image = NULL; /* of the placement before: from now on it may be given up */
     pass->placement = *strl__gltf_world(gltf);
     strl_status status = node->instances ? place_instance(gltf, node->instances, err) : STRL_OK;
     if (!status)
@@ -322,13 +365,21 @@ strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primit
                                      : gltf->accessors[primitive->position].count;
     pass->triangle = 0;
     pass->is_scattered = false;
-    pass->triangle_count = strl__gltf_triangle_count(mode_of(primitive), elements);
-    gltf->reader->batch.has_corner_colour = primitive->colour != STRL__NO_ITEM;
+    pass->first_loaded = 0;
+    pass->loaded_count = pass->vertex_count;
+    pass->triangle_count = strl__gltf_triangle_count(strl__gltf_mode_of(primitive), elements);
     if (pass->triangle_count == 0)
         return STRL_OK;
     if (primitive->indices != STRL__NO_ITEM)
         status = strl__gltf_find_range(gltf, &gltf->primitives[primitive - gltf->primitives], elements, err);
-    if (!status && primitive->indices != STRL__NO_ITEM)
+    if (!status)
+        status = strl__gltf_begin_paint(gltf, primitive, err);
+    if (status)
+        return status;
+    gltf->reader->batch.has_corner_colour =
+        primitive->colour != STRL__NO_ITEM || gltf->paint.image != NULL;
+    gltf->reader->batch.has_texcoord = gltf->paint.texcoord != STRL__NO_ITEM;
+    if (primitive->indices != STRL__NO_ITEM)
         status = load_vertices(gltf, primitive, err);
     if (!status && primitive->mode == 6 && !gltf->draco)
         status = read_first(gltf, primitive, err);
@@ -340,11 +391,7 @@ strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primit
 
 /* ---- triangles */
 
-/* Where the corners of a run of triangles stand in the chunk that holds their elements: a fan's
- * first corner is apart. */
-#define FAN_CENTRE UINT32_MAX
-
-static void corners_of(unsigned mode, uint64_t triangle, size_t in_chunk, uint32_t slots[3])
+void strl__gltf_corners_of(unsigned mode, uint64_t triangle, size_t in_chunk, uint32_t slots[3])
 {
     const uint32_t at = (uint32_t)in_chunk;
     if (mode == 4) {
@@ -358,7 +405,7 @@ static void corners_of(unsigned mode, uint64_t triangle, size_t in_chunk, uint32
     } else {
         slots[0] = at;
         slots[1] = at + 1;
-        slots[2] = FAN_CENTRE;
+        slots[2] = STRL__GLTF_FAN_CENTRE;
     }
 }
 
@@ -368,7 +415,7 @@ static strl_status add_indexed(strl__gltf *gltf, const strl__gltf_primitive *pri
     const strl__gltf_pass *pass = &gltf->pass;
     strl__batch *batch = &gltf->reader->batch;
     for (unsigned i = 0; i < 3; i++) {
-        uint32_t index = slots[i] == FAN_CENTRE ? gltf->first_element : gltf->elements[slots[i]];
+        uint32_t index = slots[i] == STRL__GLTF_FAN_CENTRE ? gltf->first_element : gltf->elements[slots[i]];
         /* Below first_loaded: the file has changed since the range was found. */
         if (index >= pass->vertex_count || index < pass->first_loaded ||
             index - pass->first_loaded >= pass->loaded_count)
@@ -383,7 +430,7 @@ static void add_corners(strl__gltf *gltf, const uint32_t slots[3])
     strl__batch *batch = &gltf->reader->batch;
     for (unsigned i = 0; i < 3; i++) {
         batch->corners[batch->corner_count + i] =
-            slots[i] == FAN_CENTRE ? gltf->first_corner : gltf->corners[slots[i]];
+            slots[i] == STRL__GLTF_FAN_CENTRE ? gltf->first_corner : gltf->corners[slots[i]];
         batch->vertex[batch->corner_count + i] = STRL__NO_INDEX;
     }
 }
@@ -392,7 +439,7 @@ static void add_corners(strl__gltf *gltf, const uint32_t slots[3])
 static strl_status look_up(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t first, size_t count,
                            strl_error *err)
 {
-    const unsigned mode = mode_of(primitive), shared = mode == 4 ? 0 : mode == 5 ? 2 : 1;
+    const unsigned mode = strl__gltf_mode_of(primitive), shared = mode == 4 ? 0 : mode == 5 ? 2 : 1;
     strl_status status = STRL_OK;
     for (size_t i = 0; i < count && !status; i++) {
         uint32_t index = gltf->elements[i];
@@ -407,7 +454,7 @@ static strl_status look_up(strl__gltf *gltf, const strl__gltf_primitive *primiti
 static strl_status read_run(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t first,
                             size_t count, strl_error *err)
 {
-    const unsigned mode = mode_of(primitive);
+    const unsigned mode = strl__gltf_mode_of(primitive);
     const uint64_t begin = mode == 4 ? 3 * first : mode == 5 ? first : first + 1;
     const size_t elements = mode == 4 ? 3 * count : mode == 5 ? count + 2 : count + 1;
     if (primitive->indices == STRL__NO_ITEM)
@@ -440,14 +487,14 @@ strl_status strl__gltf_add_triangles(strl__gltf *gltf, const strl__gltf_primitiv
 {
     strl__gltf_pass *pass = &gltf->pass;
     strl__batch *batch = &gltf->reader->batch;
-    const unsigned mode = mode_of(primitive);
+    const unsigned mode = strl__gltf_mode_of(primitive);
     strl_status status = STRL_OK;
     while (!status && pass->triangle < pass->triangle_count && !strl__batch_is_full(batch)) {
         const size_t count = run_length(gltf, mode);
         status = read_run(gltf, primitive, pass->triangle, count, err);
         for (size_t i = 0; i < count && !status; i++) {
             uint32_t slots[3];
-            corners_of(mode, pass->triangle + i, i, slots);
+            strl__gltf_corners_of(mode, pass->triangle + i, i, slots);
             if (pass->flips)
                 turn(slots);
             if (primitive->indices == STRL__NO_ITEM || pass->is_scattered)

@@ -7,6 +7,7 @@
 #include "readers/names.h"
 #include "readers/reader.h"
 #include "readers/table.h"
+#include "readers/texture.h"
 
 #define STRL__READER_MEMORY_LEAST ((uint64_t)8 << 20)
 
@@ -26,6 +27,8 @@ typedef struct strl__format {
     strl_status (*start)(strl_reader *reader, strl_error *err); /* to the first face */
     strl_status (*fill)(strl_reader *reader,
                         strl_error *err); /* adds faces to the batch; sets reader->ended */
+    strl_status (*paint)(strl_reader *reader,
+                         strl_error *err); /* colours of a resolved batch; may be NULL */
     uint64_t (*bytes_done)(const strl_reader *reader); /* NULL: where the input stands */
     strl_status (*check_unchanged)(const strl_reader *reader,
                                    strl_error *err); /* files beside this one; may be NULL */
@@ -73,13 +76,14 @@ struct strl_reader {
     bool is_certain; /* not its name alone says what the file is */
     uint64_t listed_vertices; /* where the table of vertices does not hold them all, or was given back; else 0 */
     strl__input input;
-    strl__table vertices, normals;
+    strl__table vertices, normals, texcoords;
     strl__batch batch;
     strl__names parts, materials;
     strl__names missing; /* sentences: why files that this one names could not be read */
     strl__beside *beside; /* owned */
     size_t beside_count, beside_capacity;
     uint64_t beside_bytes; /* of their paths */
+    strl__textures textures; /* of formats that have any */
     strl_reader_drops drops;
     strl_reader_costs costs;
     bool prepared; /* tables and batch are there */

@@ -1,5 +1,6 @@
 #include "readers/names.h"
 
+#include <math.h>
 #include <stdbool.h>
 #include <string.h>
 
@@ -131,7 +132,11 @@ strl_status strl__names_add(strl__names *names, const char *text, size_t length,
     if (!copy)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a name of %zu bytes", used);
     names->text_bytes += used + NAME_OVERHEAD_BYTES;
-    names->items[names->count] = (strl__name){copy, 0xffffffffu};
+    names->items[names->count] = (strl__name){.text = copy,
+                                              .rgba = 0xffffffffu,
+                                              .texture = UINT32_MAX,
+                                              .least = {INFINITY, INFINITY},
+                                              .most = {-INFINITY, -INFINITY}};
     fill_slot(names, (uint32_t)names->count);
     *index = (uint32_t)names->count++;
     return STRL_OK;

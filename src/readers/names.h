@@ -14,6 +14,8 @@
 typedef struct strl__name {
     char *text;    /* UTF-8; where it lies does not change */
     uint32_t rgba; /* sRGB-encoded RGBA8, R in the lowest byte */
+    uint32_t texture; /* of a material: among the reader's; UINT32_MAX: none */
+    float least[2], most[2]; /* texture coordinates of its triangles so far */
 } strl__name;
 
 typedef struct strl__names {

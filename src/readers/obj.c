@@ -1,36 +1,21 @@
 /* Wavefront OBJ. Vertices and faces may stand in any order, so a first pass gathers v and vn (and
  * reads the mtllibs), and every further pass turns f into batches. o and g make parts, usemtl makes
- * materials. Texture coordinates are checked but not kept; free-form geometry and all other
- * statements are passed over. */
+ * materials. Texture coordinates are read where a material has an image, by two more passes (what
+ * they are, and how large the faces round them are); free-form geometry and all other statements
+ * are passed over. */
 #include <inttypes.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/memory.h"
-#include "readers/internal.h"
 #include "readers/mtl.h"
+#include "readers/obj.h"
 #include "readers/text.h"
-
-typedef struct obj_name {
-    char text[STRL__NAME_BYTES_MAX + 1];
-    size_t length;
-} obj_name;
-
-typedef struct obj_state {
-    strl__names library;    /* materials that the mtllibs define */
-    bool has_library;       /* the names were initialised */
-    bool has_colour;        /* some vertex has one */
-    uint64_t vertices_seen; /* of this pass, so far: what negative indices count from */
-    uint64_t normals_seen;
-    uint64_t others;        /* lines that no statement read here begins */
-    obj_name object, group, material;
-    uint32_t part_index, material_index;
-    bool part_known, material_known; /* the indices fit the names */
-} obj_state;
 
 typedef enum obj_keyword {
     OBJ_VERTEX,
     OBJ_NORMAL,
+    OBJ_TEXCOORD,
     OBJ_FACE,
     OBJ_LINE,
     OBJ_POINT,
@@ -43,6 +28,7 @@ typedef enum obj_keyword {
 
 #define VERTEX_BYTES 28u /* three doubles and a colour */
 #define NORMAL_BYTES 12u /* three floats */
+#define TEXCOORD_BYTES 8u /* two floats */
 
 static bool matches(const char *at, const char *word, size_t length)
 {
@@ -58,10 +44,10 @@ static obj_keyword take_keyword(strl__input *input)
         uint8_t length;
         obj_keyword keyword;
     } words[] = {
-        {"v", 1, OBJ_VERTEX},       {"f", 1, OBJ_FACE},  {"vn", 2, OBJ_NORMAL},
-        {"l", 1, OBJ_LINE},         {"p", 1, OBJ_POINT}, {"o", 1, OBJ_OBJECT},
-        {"g", 1, OBJ_GROUP},        {"fo", 2, OBJ_FACE}, {"usemtl", 6, OBJ_USE_MATERIAL},
-        {"mtllib", 6, OBJ_LIBRARY},
+        {"v", 1, OBJ_VERTEX},       {"f", 1, OBJ_FACE},           {"vn", 2, OBJ_NORMAL},
+        {"vt", 2, OBJ_TEXCOORD},    {"l", 1, OBJ_LINE},           {"p", 1, OBJ_POINT},
+        {"o", 1, OBJ_OBJECT},       {"g", 1, OBJ_GROUP},          {"fo", 2, OBJ_FACE},
+        {"mtllib", 6, OBJ_LIBRARY}, {"usemtl", 6, OBJ_USE_MATERIAL},
     };
     const char *at = input->at;
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
@@ -102,6 +88,9 @@ static bool obj_recognises(const strl__input *input, uint64_t file_bytes)
 static strl_status obj_open(strl_reader *reader, strl_error *err)
 {
     (void)err;
+    strl__textures_init(&reader->textures, reader->memory_bytes / 8);
+    reader->textures.open = strl__obj_open_picture;
+    reader->textures.context = reader;
     reader->triangles_hint = reader->opened.bytes / 60 + 1;
     return STRL_OK;
 }
@@ -122,7 +111,7 @@ static strl_status read_coordinates(strl__input *input, double *values, unsigned
 /* v x y z [r g b]; a lone fourth number is a weight, which polygons do not use. */
 static strl_status read_vertex(strl_reader *reader, strl_error *err)
 {
-    obj_state *obj = reader->state;
+    strl__obj *obj = reader->state;
     double values[6];
     unsigned count;
     strl_status status = read_coordinates(&reader->input, values, 3, 6, &count, err);
@@ -146,6 +135,16 @@ static strl_status read_normal(strl_reader *reader, strl_error *err)
     return status ? status : strl__table_append(&reader->normals, normal, err);
 }
 
+/* vt u [v [w]] */
+static strl_status read_texcoord(strl_reader *reader, strl_error *err)
+{
+    double values[3] = {0};
+    unsigned count;
+    strl_status status = read_coordinates(&reader->input, values, 1, 3, &count, err);
+    const float texcoord[2] = {(float)values[0], (float)values[1]};
+    return status ? status : strl__table_append(&reader->texcoords, texcoord, err);
+}
+
 /* The library's path beside the model; owned by the caller. */
 static char *library_path(const strl_reader *reader, const char *name, size_t length)
 {
@@ -165,10 +164,10 @@ static char *library_path(const strl_reader *reader, const char *name, size_t le
 static strl_status read_library(strl_reader *reader, const char *name, size_t length,
                                 strl_error *why, strl_error *err)
 {
-    obj_state *obj = reader->state;
+    strl__obj *obj = reader->state;
     char *path = library_path(reader, name, length);
     strl_status status =
-        path ? strl__mtl_read(path, &obj->library, why, err)
+        path ? strl__mtl_read(path, &obj->library, &reader->textures, why, err)
              : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", reader->path);
     if (!status && !why->status)
         status = strl__reader_note_beside(reader, path, NULL, err);
@@ -251,7 +250,7 @@ static strl_status read_libraries(strl_reader *reader, strl_error *err)
 
 static strl_status gather(strl_reader *reader, strl_error *err)
 {
-    obj_state *obj = reader->state;
+    strl__obj *obj = reader->state;
     strl__input *input = &reader->input;
     strl_status status = STRL_OK;
     for (; !status; strl__text_skip_line(input)) {
@@ -265,6 +264,9 @@ static strl_status gather(strl_reader *reader, strl_error *err)
         case OBJ_NORMAL:
             status = read_normal(reader, err);
             break;
+        case OBJ_TEXCOORD:
+            obj->texcoords_seen++;
+            break;
         case OBJ_LIBRARY:
             status = read_libraries(reader, err);
             break;
@@ -276,6 +278,35 @@ static strl_status gather(strl_reader *reader, strl_error *err)
         }
     }
     return status;
+}
+
+static void rewind_input(strl_reader *reader)
+{
+    strl__input_seek(&reader->input, 0, 1);
+    strl__text_skip_byte_order_mark(&reader->input);
+}
+
+static strl_status gather_texcoords(strl_reader *reader, strl_error *err)
+{
+    strl__input *input = &reader->input;
+    strl_status status = STRL_OK;
+    for (rewind_input(reader); !status; strl__text_skip_line(input)) {
+        strl__text_skip_blanks(input);
+        if (input->at == input->end)
+            return strl__input_status(input, err);
+        if (take_keyword(input) == OBJ_TEXCOORD)
+            status = read_texcoord(reader, err);
+    }
+    return status;
+}
+
+/* Some material has an image, and there are coordinates for it. */
+static bool has_images(const strl__obj *obj)
+{
+    bool found = false;
+    for (size_t i = 0; i < obj->library.count && !found; i++)
+        found = obj->library.items[i].texture != STRL__NO_TEXTURE;
+    return found && obj->texcoords_seen > 0;
 }
 
 static void build_tables(strl_reader *reader)
@@ -293,14 +324,20 @@ static void build_tables(strl_reader *reader)
         vertex.position[i] = (strl__field){8 * i, STRL__F64};
         normal.normal[i] = (strl__field){4 * i, STRL__F32};
     }
+    strl__layout texcoord = {.stride = TEXCOORD_BYTES,
+                             .big_endian = big_endian,
+                             .has_texcoord = true,
+                             .texcoord = {{0, STRL__F32}, {4, STRL__F32}}};
     size_t window = (size_t)(reader->memory_bytes / 2);
     strl__table_build(&reader->vertices, &vertex, reader->scratch_dir, window / 3 * 2);
     strl__table_build(&reader->normals, &normal, reader->scratch_dir, window / 3);
+    strl__table_build(&reader->texcoords, &texcoord, reader->scratch_dir,
+                      (size_t)(reader->memory_bytes / 16));
 }
 
 static strl_status obj_prepare(strl_reader *reader, strl_error *err)
 {
-    obj_state *obj = reader->state;
+    strl__obj *obj = reader->state;
     strl__names_deinit(&reader->missing);
     strl__names_init(&reader->missing, (size_t)(reader->memory_bytes / 64));
     if (obj->has_library)
@@ -309,33 +346,43 @@ static strl_status obj_prepare(strl_reader *reader, strl_error *err)
     obj->has_library = true;
     obj->has_colour = false;
     obj->others = 0;
+    obj->texcoords_seen = 0;
+    strl__free(obj->footprints);
+    obj->footprints = NULL;
+    reader->textures.count = 0; /* of the libraries, which are read again; pictures stay */
     build_tables(reader);
-    strl__input_seek(&reader->input, 0, 1);
-    strl__text_skip_byte_order_mark(&reader->input);
+    rewind_input(reader);
     strl_status status = gather(reader, err);
+    obj->has_images = !status && has_images(obj);
+    if (obj->has_images)
+        status = gather_texcoords(reader, err);
+    if (!status)
+        status = strl__table_finish(&reader->texcoords, err);
     if (!status)
         status = strl__table_finish(&reader->vertices, err);
     if (!status)
         status = strl__table_finish(&reader->normals, err);
     reader->vertices.layout.has_colour = obj->has_colour;
+    if (!status)
+        status = strl__reader_init_batch(reader, true, err);
     reader->is_certain = reader->is_certain || obj->others == 0;
-    return status ? status : strl__reader_init_batch(reader, true, err);
+    return status || !obj->has_images ? status : strl__obj_measure(reader, err);
 }
 
-static strl_status obj_start(strl_reader *reader, strl_error *err)
+strl_status strl__obj_start(strl_reader *reader, strl_error *err)
 {
-    obj_state *obj = reader->state;
+    strl__obj *obj = reader->state;
     (void)err;
-    obj->vertices_seen = obj->normals_seen = 0;
+    obj->vertices_seen = obj->normals_seen = obj->texcoords_seen = 0;
     obj->object.length = obj->group.length = obj->material.length = 0;
     obj->part_known = obj->material_known = false;
-    reader->batch.has_corner_colour = obj->has_colour;
-    strl__input_seek(&reader->input, 0, 1);
-    strl__text_skip_byte_order_mark(&reader->input);
+    reader->batch.has_corner_colour = obj->has_colour || obj->has_images;
+    reader->batch.has_texcoord = obj->has_images;
+    rewind_input(reader);
     return STRL_OK;
 }
 
-static void take_name(strl__input *input, obj_name *name)
+static void take_name(strl__input *input, strl__obj_name *name)
 {
     strl__text_skip_blanks(input);
     size_t length = strl__text_rest_of_line(input);
@@ -343,10 +390,28 @@ static void take_name(strl__input *input, obj_name *name)
     memcpy(name->text, input->at, name->length);
 }
 
+/* What the libraries say of a material. A black colour beside an image would leave nothing of it:
+ * programs that write it mean the image alone. */
+static strl_status define_material(strl_reader *reader, uint32_t defined, strl_error *err)
+{
+    strl__obj *obj = reader->state;
+    const strl__name *from = &obj->library.items[defined];
+    strl__name *to = &reader->materials.items[obj->material_index];
+    const strl__image *image = NULL;
+    strl_status status = STRL_OK;
+    to->rgba = from->rgba;
+    to->texture = from->texture;
+    if (obj->has_images && to->texture != STRL__NO_TEXTURE && (to->rgba & 0xffffffu) == 0)
+        status = strl__textures_get(&reader->textures, to->texture, &image, err);
+    if (image)
+        to->rgba |= 0xffffffu;
+    return status;
+}
+
 /* Parts and materials are added when a first face has them. */
 static strl_status name_face(strl_reader *reader, strl_error *err)
 {
-    obj_state *obj = reader->state;
+    strl__obj *obj = reader->state;
     strl_status status = STRL_OK;
     if (!obj->part_known) {
         char name[2 * sizeof obj->object.text];
@@ -360,12 +425,12 @@ static strl_status name_face(strl_reader *reader, strl_error *err)
         obj->part_known = !status;
     }
     if (!status && !obj->material_known) {
-        const obj_name *material = &obj->material;
+        const strl__obj_name *material = &obj->material;
         uint32_t defined = strl__names_find(&obj->library, material->text, material->length);
         status = strl__names_add(&reader->materials, material->text, material->length,
                                  &obj->material_index, err);
         if (!status && defined != UINT32_MAX)
-            reader->materials.items[obj->material_index].rgba = obj->library.items[defined].rgba;
+            status = define_material(reader, defined, err);
         obj->material_known = !status;
     }
     return status ? strl__fail_context(err, status, "%s, line %" PRIu64, reader->path,
@@ -395,11 +460,12 @@ static bool to_index(int64_t written, uint64_t seen, uint64_t count, uint64_t *i
 }
 
 /* v, v/vt, v//vn or v/vt/vn, where what stands after a slash may be missing. */
-static strl_status read_corner(strl_reader *reader, uint64_t *vertex, uint64_t *normal,
-                               strl_error *err)
+static strl_status read_corner(strl_reader *reader, size_t slot, strl_error *err)
 {
-    obj_state *obj = reader->state;
+    strl__obj *obj = reader->state;
     strl__input *input = &reader->input;
+    strl__batch *batch = &reader->batch;
+    uint64_t normal = STRL__NO_INDEX, texcoord = STRL__NO_INDEX;
     int64_t written[3] = {0, 0, 0};
     bool given[3] = {false, false, false};
     const char *at = input->at;
@@ -413,13 +479,18 @@ static strl_status read_corner(strl_reader *reader, uint64_t *vertex, uint64_t *
     }
     if (!given[0] || !strl__is_token_end(input, at))
         return strl__text_expected(input, "a corner such as 1, 1/2, 1//3 or 1/2/3", err);
-    if (!to_index(written[0], obj->vertices_seen, reader->vertices.count, vertex))
+    if (!to_index(written[0], obj->vertices_seen, reader->vertices.count, &batch->vertex[slot]))
         return index_fail(reader, "vertices", written[0], reader->vertices.count, err);
-    *normal = STRL__NO_INDEX;
     /* Some programs write normal indices without any normals: those are as good as absent. */
     if (given[2] && reader->normals.count > 0 &&
-        !to_index(written[2], obj->normals_seen, reader->normals.count, normal))
+        !to_index(written[2], obj->normals_seen, reader->normals.count, &normal))
         return index_fail(reader, "normals", written[2], reader->normals.count, err);
+    if (batch->normal)
+        batch->normal[slot] = normal;
+    if (given[1] && !to_index(written[1], obj->texcoords_seen, reader->texcoords.count, &texcoord))
+        texcoord = STRL__NO_INDEX; /* shows no image */
+    if (batch->texcoord)
+        batch->texcoord[slot] = texcoord;
     input->at = at;
     return STRL_OK;
 }
@@ -443,7 +514,7 @@ static strl_status too_many_corners(strl_reader *reader, strl_error *err)
 
 static strl_status read_face(strl_reader *reader, strl_error *err)
 {
-    obj_state *obj = reader->state;
+    strl__obj *obj = reader->state;
     strl__batch *batch = &reader->batch;
     strl__face face = {.colour = 0xffffffffu};
     for (;;) {
@@ -452,13 +523,9 @@ static strl_status read_face(strl_reader *reader, strl_error *err)
             break;
         if (face.corner_count == STRL__POLYGON_CORNERS_MAX)
             return too_many_corners(reader, err);
-        size_t slot = batch->corner_count + face.corner_count++;
-        uint64_t normal = STRL__NO_INDEX;
-        strl_status status = read_corner(reader, &batch->vertex[slot], &normal, err);
+        strl_status status = read_corner(reader, batch->corner_count + face.corner_count++, err);
         if (status)
             return status;
-        if (batch->normal)
-            batch->normal[slot] = normal;
     }
     if (face.corner_count < 3) {
         reader->drops.degenerate_faces++;
@@ -477,7 +544,7 @@ static strl_status read_face(strl_reader *reader, strl_error *err)
 
 static strl_status read_statement(strl_reader *reader, strl_error *err)
 {
-    obj_state *obj = reader->state;
+    strl__obj *obj = reader->state;
     strl__input *input = &reader->input;
     switch (take_keyword(input)) {
     case OBJ_VERTEX:
@@ -485,6 +552,9 @@ static strl_status read_statement(strl_reader *reader, strl_error *err)
         break;
     case OBJ_NORMAL:
         obj->normals_seen++;
+        break;
+    case OBJ_TEXCOORD:
+        obj->texcoords_seen++;
         break;
     case OBJ_FACE:
         return read_face(reader, err);
@@ -513,7 +583,7 @@ static strl_status read_statement(strl_reader *reader, strl_error *err)
     return STRL_OK;
 }
 
-static strl_status obj_fill(strl_reader *reader, strl_error *err)
+strl_status strl__obj_fill(strl_reader *reader, strl_error *err)
 {
     strl__input *input = &reader->input;
     for (; !strl__batch_is_full(&reader->batch); strl__text_skip_line(input)) {
@@ -531,20 +601,28 @@ static strl_status obj_fill(strl_reader *reader, strl_error *err)
 
 static void obj_close(strl_reader *reader)
 {
-    obj_state *obj = reader->state;
+    strl__obj *obj = reader->state;
     if (obj->has_library)
         strl__names_deinit(&obj->library);
+    strl__free(obj->footprints);
+}
+
+static strl_status obj_paint(strl_reader *reader, strl_error *err)
+{
+    const strl__obj *obj = reader->state;
+    return obj->has_images ? strl__obj_paint(reader, err) : STRL_OK;
 }
 
 const strl__format strl__format_obj = {
     .name = "obj",
     .default_up = STRL_AXIS_Y,
-    .state_bytes = sizeof(obj_state),
+    .state_bytes = sizeof(strl__obj),
     .weak = true,
     .recognises = obj_recognises,
     .open = obj_open,
     .prepare = obj_prepare,
-    .start = obj_start,
-    .fill = obj_fill,
+    .start = strl__obj_start,
+    .fill = strl__obj_fill,
+    .paint = obj_paint,
     .close = obj_close,
 };

@@ -166,14 +166,20 @@ strl_status strl_reader_open(const strl_reader_desc *desc, strl_reader **reader,
     return strl__reader_open_as(desc, NULL, reader, err);
 }
 
+static void release_tables(strl_reader *reader)
+{
+    strl__table_deinit(&reader->vertices);
+    strl__table_deinit(&reader->normals);
+    strl__table_deinit(&reader->texcoords);
+    strl__batch_deinit(&reader->batch);
+}
+
 void strl_reader_close(strl_reader *reader)
 {
     if (!reader)
         return;
     close_format(reader);
-    strl__table_deinit(&reader->vertices);
-    strl__table_deinit(&reader->normals);
-    strl__batch_deinit(&reader->batch);
+    release_tables(reader);
     strl__input_deinit(&reader->input);
     strl__names_deinit(&reader->parts);
     strl__names_deinit(&reader->materials);
@@ -181,6 +187,7 @@ void strl_reader_close(strl_reader *reader)
     for (size_t i = 0; i < reader->beside_count; i++)
         strl__free(reader->beside[i].path);
     strl__free(reader->beside);
+    strl__textures_deinit(&reader->textures);
     strl_file_close(reader->decoded, NULL); /* without a name: nothing of it is left */
     strl_file_close(reader->file, NULL);    /* only read from */
     strl__free(reader->scratch_dir);
@@ -203,23 +210,19 @@ void strl_reader_info_get(const strl_reader *reader, strl_reader_info *info)
 
 strl_status strl__reader_init_batch(strl_reader *reader, bool indexed, strl_error *err)
 {
-    const strl__table *tables[2] = {&reader->vertices, &reader->normals};
-    strl__batch_desc desc = {.indexed = indexed, .bytes = (size_t)(reader->memory_bytes / 8 * 5)};
+    const strl__table *tables[3] = {&reader->vertices, &reader->normals, &reader->texcoords};
+    const uint64_t images = indexed && reader->texcoords.count ? reader->textures.limit_bytes : 0;
+    strl__batch_desc desc = {.indexed = indexed,
+                             .bytes = (size_t)(reader->memory_bytes / 8 * 5 - images)};
     desc.indexed_normals = indexed && reader->normals.count > 0;
-    for (unsigned i = 0; i < 2; i++)
+    desc.indexed_texcoords = indexed && reader->texcoords.count > 0;
+    for (unsigned i = 0; i < 3; i++)
         if (indexed && tables[i]->count > 0) {
+            const size_t window = strl__table_window_bytes(tables[i]);
             desc.sorted = desc.sorted || !strl__table_is_resident(tables[i]);
-            desc.bytes -=
-                strl__table_window_bytes(tables[i]); /* together at most half of the budget */
+            desc.bytes -= window < desc.bytes ? window : desc.bytes;
         }
     return strl__batch_init(&reader->batch, &desc, err);
-}
-
-static void release_tables(strl_reader *reader)
-{
-    strl__table_deinit(&reader->vertices);
-    strl__table_deinit(&reader->normals);
-    strl__batch_deinit(&reader->batch);
 }
 
 static strl_status make_ready(strl_reader *reader, strl_error *err)
@@ -244,7 +247,29 @@ static strl_status read_batch(strl_reader *reader, strl_error *err)
     if (!status && reader->batch.vertex)
         status = strl__batch_resolve(&reader->batch, &reader->vertices,
                                      reader->normals.count ? &reader->normals : NULL, err);
+    if (!status && reader->batch.texcoord)
+        status = strl__batch_resolve_texcoords(&reader->batch, &reader->texcoords, err);
+    if (!status && reader->format->paint)
+        status = reader->format->paint(reader, err);
     return status;
+}
+
+/* What texture coordinates each material has, by which they are told in fewer bits. */
+static void note_texcoords(strl_reader *reader, const strl_triangle *triangles, size_t count)
+{
+    for (size_t i = 0; i < count; i++) {
+        const strl_triangle *triangle = &triangles[i];
+        if (!(triangle->flags & STRL_TRIANGLE_HAS_TEXCOORD))
+            continue;
+        strl__name *material = &reader->materials.items[triangle->material];
+        for (unsigned k = 0; k < 6; k++) {
+            const float value = triangle->texcoord[k / 2][k % 2];
+            if (value < material->least[k % 2])
+                material->least[k % 2] = value;
+            if (value > material->most[k % 2])
+                material->most[k % 2] = value;
+        }
+    }
 }
 
 static strl_status next_triangles(strl_reader *reader, strl_triangle *triangles, size_t capacity,
@@ -255,6 +280,8 @@ static strl_status next_triangles(strl_reader *reader, strl_triangle *triangles,
         size_t added = 0;
         status = strl__batch_emit(&reader->batch, triangles + *count, capacity - *count, &added,
                                   &reader->drops, err);
+        if (reader->batch.has_texcoord)
+            note_texcoords(reader, triangles + *count, added);
         *count += added;
         if (status || added > 0)
             continue;
@@ -324,6 +351,7 @@ void strl_reader_rest(strl_reader *reader)
     if (reader->vertices.count)
         reader->listed_vertices = reader->vertices.count;
     release_tables(reader);
+    strl__textures_rest(&reader->textures);
     strl__input_rest(&reader->input);
     reader->prepared = reader->started = false;
     reader->ended = true;
@@ -390,6 +418,32 @@ const char *strl_reader_beside(const strl_reader *reader, uint32_t index, strl_f
 {
     *info = reader->beside[index].info;
     return reader->beside[index].path;
+}
+
+bool strl_reader_material_image(const strl_reader *reader, uint32_t material,
+                                strl_reader_image *image)
+{
+    if (material >= reader->materials.count ||
+        reader->materials.items[material].texture == STRL__NO_TEXTURE)
+        return false;
+    const strl__name *name = &reader->materials.items[material];
+    const strl__texture *texture = &reader->textures.items[name->texture];
+    *image = (strl_reader_image){
+        .reference = reader->textures.pictures[texture->picture].reference,
+        .wrap = {texture->wrap[0], texture->wrap[1]},
+        .texcoord_min = {name->least[0], name->least[1]},
+        .texcoord_max = {name->most[0], name->most[1]}};
+    return true;
+}
+
+uint32_t strl_reader_missing_image_count(const strl_reader *reader)
+{
+    return reader->textures.unusable_count;
+}
+
+const char *strl_reader_missing_image(const strl_reader *reader)
+{
+    return reader->textures.first_unusable.message;
 }
 
 uint64_t strl_reader_bytes_done(const strl_reader *reader)

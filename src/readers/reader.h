@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "platform/file.h"
+#include "readers/image.h"
 #include "stroll/error.h"
 
 typedef struct strl_reader strl_reader;
@@ -25,6 +26,7 @@ typedef struct strl_reader_drops {
 
 #define STRL_TRIANGLE_HAS_NORMAL 1u
 #define STRL_TRIANGLE_HAS_COLOUR 2u
+#define STRL_TRIANGLE_HAS_TEXCOORD 4u /* only where the material names an image */
 
 /* One triangle as read. 3 corners. */
 typedef struct strl_triangle {
@@ -34,6 +36,7 @@ typedef struct strl_triangle {
     uint32_t part;          /* index into the reader's parts */
     uint32_t material;      /* index into the reader's materials */
     uint32_t flags;         /* STRL_TRIANGLE_HAS_... : for all three corners */
+    float texcoord[3][2];   /* in the image of the material, u to the right, v down, 1 = all of it; finite; 0 where absent */
 } strl_triangle;
 
 /* What a child process may take that reads what Stroll does not read itself. Zero = defaults. */
@@ -94,10 +97,15 @@ uint64_t strl_reader_vertex_count(const strl_reader *reader);
  * next: what they would bring is as if absent. index < count; why, a sentence that names the file; borrowed until close. */
 uint32_t strl_reader_missing_count(const strl_reader *reader);
 const char *strl_reader_missing(const strl_reader *reader, uint32_t index);
-/* Files beside this one that were read for it (glTF's buffers, OBJ's material libraries; not what an importer opens on its
- * own), each once, with their facts of then; all of them after a whole pass. index < count; borrowed until close. */
+/* Files beside this one that were read for it (glTF's buffers, OBJ's material libraries, images; not what an importer opens
+ * on its own), each once, with their facts of then; all of them after a whole pass. index < count; borrowed until close. */
 uint32_t strl_reader_beside_count(const strl_reader *reader);
 const char *strl_reader_beside(const strl_reader *reader, uint32_t index, strl_file_info *info);
+/* Images that materials name and triangles show, and that could not be used (missing, of a kind that is not read, damaged,
+ * too large), each once, after a whole pass: their materials have their colours alone. Of the first a sentence that names it
+ * and says why; borrowed until close. */
+uint32_t strl_reader_missing_image_count(const strl_reader *reader);
+const char *strl_reader_missing_image(const strl_reader *reader);
 /* Bytes of the file consumed so far in this pass, for progress. */
 uint64_t strl_reader_bytes_done(const strl_reader *reader);
 
@@ -111,6 +119,16 @@ const char *strl_reader_part_name(const strl_reader *reader, uint32_t part);
 uint32_t strl_reader_material_count(const strl_reader *reader);
 /* rgba: sRGB-encoded RGBA8, R in the lowest byte. */
 const char *strl_reader_material(const strl_reader *reader, uint32_t material, uint32_t *rgba);
+
+/* The image of a material, usable or not. */
+typedef struct strl_reader_image {
+    const char *reference; /* as the model names it: a file beside it, or "images[3] (name)" of its own; borrowed until close */
+    strl__wrap wrap[2];    /* of u, of v */
+    float texcoord_min[2], texcoord_max[2]; /* of its triangles so far; min > max: there were none */
+} strl_reader_image;
+
+/* False where the material names none. */
+bool strl_reader_material_image(const strl_reader *reader, uint32_t material, strl_reader_image *image);
 
 void strl_reader_close(strl_reader *reader); /* NULL is legal; removes its spill files */
 

@@ -66,4 +66,7 @@ void strl__layout_decode(const strl__layout *layout, const uint8_t *record, strl
         decode_normal(layout, record, corner->normal);
     if (layout->has_colour)
         corner->colour = decode_colour(layout, record);
+    for (unsigned axis = 0; layout->has_texcoord && axis < 2; axis++)
+        corner->texcoord[axis] = (float)strl__scalar_load(
+            layout->texcoord[axis].type, record + layout->texcoord[axis].offset, layout->big_endian);
 }

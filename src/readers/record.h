@@ -95,6 +95,7 @@ typedef struct strl__corner {
     double position[3];
     float normal[3]; /* zero where absent or not finite */
     uint32_t colour; /* sRGB-encoded RGBA8; 0xffffffff where absent */
+    float texcoord[2]; /* where there are any */
 } strl__corner;
 
 typedef struct strl__field {
@@ -106,10 +107,11 @@ typedef struct strl__field {
 typedef struct strl__layout {
     uint32_t stride; /* bytes of a record, > 0 */
     bool big_endian;
-    bool has_position, has_normal, has_colour, has_alpha;
+    bool has_position, has_normal, has_colour, has_alpha, has_texcoord;
     strl__field position[3];
     strl__field normal[3];
     strl__field colour[4];
+    strl__field texcoord[2];
 } strl__layout;
 
 /* Thread-safe. */

@@ -15,7 +15,8 @@ static strl_part_style style_of(const strl_draw_options *options, const strl_dra
 
 bool strl__style_update(strl_cache_entry *entry, const strl_draw_item *item, const strl_draw_options *options)
 {
-    uint64_t version = options->part_styles ? options->styles_version : 0;
+    /* 0 is without styles, whatever version the caller begins with. */
+    uint64_t version = options->part_styles ? options->styles_version + 1 : 0;
     if (!item->labels || entry->styles_version == version)
         return false;
     uint32_t hidden = 0, marked = 0;

@@ -84,6 +84,7 @@ static void read_section(strl__model *model, strl_cursor *cursor, uint32_t numbe
                 "header: section %u is of unknown kind %u", number, kind);
     HEADER_RULE(model, depth <= 3 && reserved == 0 && (depth == 0 || (kind != STRL__TREES && kind < STRL__SECTIONS)),
                 "header: section %u of kind %u has depth %u and reserved word %u", number, kind, depth, reserved);
+    HEADER_RULE(model, kind != STRL__IMAGES || section.item_count > 0, "header: the section of images has no item");
     if (kind > 0 && kind < STRL__SECTIONS)
         model->sections[kind] = section;
     strl__v_place_good(model, &section.place, "header: a section", number);
@@ -92,8 +93,11 @@ static void read_section(strl__model *model, strl_cursor *cursor, uint32_t numbe
 static void check_sections(strl__model *model)
 {
     const strl__section *s = model->sections;
-    const uint64_t least[STRL__SECTIONS] = {0, 1, 1, 1, 1};
-    const uint64_t most[STRL__SECTIONS] = {0, 512, UINT64_MAX, UINT32_MAX - 1, UINT32_MAX - 1};
+    const uint64_t least[STRL__SECTIONS] = {0, 1, 1, 1, 1, 0};
+    const uint64_t most[STRL__SECTIONS] = {0, 512, UINT64_MAX, UINT32_MAX - 1, UINT32_MAX - 1, UINT32_MAX - 1};
+    HEADER_RULE(model, s[STRL__IMAGES].item_count == 0 || s[STRL__IMAGES].item_count == s[STRL__MATERIALS].item_count,
+                "header: images of %" PRIu64 " materials, expected of all %" PRIu64, s[STRL__IMAGES].item_count,
+                s[STRL__MATERIALS].item_count);
     for (unsigned kind = STRL__TREES; kind < STRL__SECTIONS; kind++)
         HEADER_RULE(model, s[kind].item_count >= least[kind] && s[kind].item_count <= most[kind],
                     "header: section kind %u has %" PRIu64 " items, expected %" PRIu64 " to %" PRIu64, kind,

@@ -16,6 +16,7 @@ typedef struct strl__vmesh {
     int32_t (*position)[3];  /* [vertex_count] from the node's anchor */
     uint16_t (*normal)[2];   /* [vertex_count] */
     uint32_t *colour;        /* [vertex_count]; NULL = white */
+    uint16_t (*texcoord)[2]; /* [vertex_count]; NULL = all 0 */
     uint16_t *palette_index; /* [vertex_count]; NULL = 0 */
     uint16_t *parent;        /* [vertex_count] */
     uint16_t (*triangle)[3]; /* [triangle_count] corners in the finest state */

@@ -53,7 +53,7 @@ typedef struct strl__section {
     strl__place place;
 } strl__section;
 
-enum { STRL__TREES = 1, STRL__PLACEMENTS, STRL__PARTS, STRL__MATERIALS, STRL__SECTIONS };
+enum { STRL__TREES = 1, STRL__PLACEMENTS, STRL__PARTS, STRL__MATERIALS, STRL__IMAGES, STRL__SECTIONS };
 
 typedef struct strl__model {
     const strl_verify_desc *desc;

@@ -43,7 +43,7 @@ static strl_status read_head(strl__v_payload *self, strl_cursor *cursor)
         self->coder[i] = strl_cursor_u32(cursor);
     if (cursor->failed)
         return strl__fail(self->err, STRL_ERR_FORMAT, "the payload ends within its first %u bytes", HEAD_BYTES);
-    if (version != 1 || self->flags > 7)
+    if (version != 1 || self->flags > 15)
         return strl__fail(self->err, STRL_ERR_FORMAT, "payload of version %" PRIu32 " with flags %" PRIu32, version,
                           self->flags);
     if (self->normal_bits != 8 && self->normal_bits != 10)
@@ -73,6 +73,7 @@ static strl_status reserve(strl__v_payload *self)
     mesh->position = strl_arena_alloc(arena, v, sizeof *mesh->position);
     mesh->normal = strl_arena_alloc_zero(arena, v, sizeof *mesh->normal);
     mesh->colour = self->flags & 1 ? strl_arena_alloc_zero(arena, v, sizeof *mesh->colour) : NULL;
+    mesh->texcoord = self->flags & 8 ? strl_arena_alloc_zero(arena, v, sizeof *mesh->texcoord) : NULL;
     mesh->palette_index = self->flags & 2 ? strl_arena_alloc(arena, v, sizeof *mesh->palette_index) : NULL;
     mesh->parent = strl_arena_alloc_zero(arena, v, sizeof *mesh->parent);
     mesh->triangle = strl_arena_alloc(arena, self->triangles, sizeof *mesh->triangle);
@@ -86,6 +87,7 @@ static strl_status reserve(strl__v_payload *self)
     self->ring = strl_arena_alloc(arena, v, sizeof *self->ring);
     self->from = strl_arena_alloc_zero(arena, self->base_vertices, sizeof *self->from);
     bool good = mesh->position && mesh->normal && (mesh->colour || !(self->flags & 1)) &&
+                (mesh->texcoord || !(self->flags & 8)) &&
                 (mesh->palette_index || !(self->flags & 2)) && mesh->parent && mesh->triangle && mesh->vertex_end &&
                 mesh->triangle_end && mesh->geometric_error && mesh->appearance_error && mesh->palette && self->first &&
                 self->next && self->ring && self->from;

@@ -28,7 +28,8 @@ enum strl__v_stream_number {
     STRL__V_PALETTE = 30,
     STRL__V_SELECT = 33, /* one a context */
     STRL__V_COPY_NORMAL = 37,
-    STRL__V_STREAMS = 39
+    STRL__V_TEXCOORD = 39, /* only where flag bit 3 is set */
+    STRL__V_STREAMS = 41
 };
 
 typedef struct strl__v_stream {

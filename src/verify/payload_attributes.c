@@ -91,6 +91,15 @@ static void read_colours(strl__v_payload *self)
     }
 }
 
+static void read_texcoords(strl__v_payload *self)
+{
+    uint16_t(*texcoord)[2] = self->mesh->texcoord;
+    for (uint32_t v = 0; texcoord && v < self->mesh->vertex_count; v++)
+        for (unsigned i = 0; i < 2; i++)
+            texcoord[v][i] = (uint16_t)((v ? texcoord[predecessor(self, v)][i] : 0) +
+                                        strl__v_residual(self, STRL__V_TEXCOORD + i));
+}
+
 static strl_status read_palette(strl__v_payload *self)
 {
     strl__vmesh *mesh = self->mesh;
@@ -155,6 +164,7 @@ strl_status strl__v_payload_attributes(strl__v_payload *self, bool with_looks)
     if (with_looks) {
         status = read_normals(self);
         read_colours(self);
+        read_texcoords(self);
     } else {
         for (unsigned i = 0; i < 2; i++) {
             skip_stream(self, STRL__V_COPY_NORMAL + i, self->copied);
@@ -162,6 +172,8 @@ strl_status strl__v_payload_attributes(strl__v_payload *self, bool with_looks)
         }
         for (unsigned i = 0; i < 4 && self->mesh->colour; i++)
             skip_stream(self, STRL__V_COLOUR + i, self->vertices);
+        for (unsigned i = 0; i < 2 && self->mesh->texcoord; i++)
+            skip_stream(self, STRL__V_TEXCOORD + i, self->vertices);
     }
     if (status == STRL_OK)
         status = read_palette(self);

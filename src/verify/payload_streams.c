@@ -131,7 +131,7 @@ static strl_status read_streams(strl__v_payload *self, rans_coder *coder, size_t
     if (items > most)
         return strl__fail(self->err, STRL_ERR_FORMAT, "%" PRIu64 " items cannot stand in a payload of %zu bytes", items,
                           payload_bytes);
-    for (unsigned number = 0; number < STRL__V_STREAMS; number++) {
+    for (unsigned number = 0; number < (self->flags & 8 ? STRL__V_STREAMS : STRL__V_TEXCOORD); number++) {
         strl_status status = read_stream(self, coder, number, most - items);
         if (status != STRL_OK)
             return status;

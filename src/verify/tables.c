@@ -62,13 +62,13 @@ static bool read_name(table *self, uint64_t item, const uint8_t *tail, size_t by
     return good;
 }
 
-static void check_name(table *self, uint64_t item)
+static void check_name(table *self, uint64_t item, const uint8_t *text, size_t bytes)
 {
-    const uint8_t *text = self->name;
-    size_t at = 0, step = 1, bytes = self->name_bytes;
+    size_t at = 0, step = 1;
     while (at < bytes && (step = utf8_sequence(text + at, bytes - at)) != 0)
         at += step;
-    TABLE_RULE(self, at == bytes, item, "%s %" PRIu64 ": its name of %zu bytes is not UTF-8 (byte %zu)", self->name_of_kind, item,
+    TABLE_RULE(self, at == bytes && bytes <= MOST_NAME_BYTES, item,
+               "%s %" PRIu64 ": its name of %zu bytes is not UTF-8 of at most 32000 bytes (byte %zu)", self->name_of_kind, item,
                bytes, at);
 }
 
@@ -107,8 +107,31 @@ static void check_placement(table *self, uint64_t item, const uint8_t *bytes, si
         widen_bounds(self, &self->model->trees[tree], m);
 }
 
+/* Empty where the material has none. */
+static void check_image(table *self, uint64_t item, const uint8_t *bytes, size_t size)
+{
+    strl_cursor cursor = strl_cursor_make(bytes, size);
+    uint32_t wrap_u = strl_cursor_u8(&cursor), wrap_v = strl_cursor_u8(&cursor), reserved = strl_cursor_u16(&cursor);
+    bool finite = true;
+    for (unsigned i = 0; i < 4; i++) {
+        float number = strl_cursor_f32(&cursor);
+        finite = finite && isfinite(number) && (i < 2 || number >= 0);
+    }
+    if (size == 0)
+        return;
+    bool good = !cursor.failed && wrap_u <= 2 && wrap_v <= 2 && reserved == 0 && finite;
+    TABLE_RULE(self, good, item, "image %" PRIu64 ": %zu bytes, wraps %u and %u, reserved word %u, %s", item, size, wrap_u,
+               wrap_v, reserved, finite ? "a good range" : "a bad range");
+    if (good)
+        check_name(self, item, bytes + cursor.at, size - cursor.at);
+}
+
 static void check_item(table *self, uint64_t item, const uint8_t *bytes, size_t size)
 {
+    if (self->kind == STRL__IMAGES) {
+        check_image(self, item, bytes, size);
+        return;
+    }
     if (self->kind == STRL__PLACEMENTS) {
         check_placement(self, item, bytes, size);
         return;
@@ -116,7 +139,7 @@ static void check_item(table *self, uint64_t item, const uint8_t *bytes, size_t 
     size_t head = self->kind == STRL__MATERIALS ? 4 : 0;
     TABLE_RULE(self, size >= head, item, "%s %" PRIu64 ": %zu bytes are too few", self->name_of_kind, item, size);
     if (size >= head && read_name(self, item, bytes + head, size - head))
-        check_name(self, item);
+        check_name(self, item, self->name, self->name_bytes);
 }
 
 static void check_leaf(table *self, const uint8_t *bytes, size_t size, uint64_t first, uint64_t count)
@@ -206,11 +229,13 @@ static void check_bounds(table *self)
 
 strl_status strl__v_read_tables(strl__model *model, strl_error *err)
 {
-    static const char *const names[STRL__SECTIONS] = {NULL, NULL, "placement", "part", "material"};
+    static const char *const names[STRL__SECTIONS] = {NULL, NULL, "placement", "part", "material", "image"};
     strl_status status = STRL_OK;
     model->placed_plainly = model->sections[STRL__PLACEMENTS].item_count == 1;
     for (unsigned kind = STRL__PLACEMENTS; status == STRL_OK && kind < STRL__SECTIONS; kind++) {
         const strl__section *section = &model->sections[kind];
+        if (section->item_count == 0)
+            continue; /* only images may be absent */
         table self = {.model = model,
                       .kind = kind,
                       .name_of_kind = names[kind],

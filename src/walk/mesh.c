@@ -35,7 +35,8 @@ static void make_labels(const strl_pm *pm, strl_vertex_label *labels)
 {
     for (uint32_t v = 0; v < pm->vertex_count; v++) {
         const strl_palette_entry *entry = &pm->palette[pm->palette_index ? pm->palette_index[v] : 0];
-        labels[v] = (strl_vertex_label){entry->part, entry->material};
+        const uint32_t texcoord = pm->texcoord ? pm->texcoord[v] : 0;
+        labels[v] = (strl_vertex_label){entry->part, entry->material, {(uint16_t)texcoord, (uint16_t)(texcoord >> 16)}};
     }
 }
 

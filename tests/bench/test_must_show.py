@@ -20,7 +20,8 @@ import tables
 
 MODELS = ("isosurface_3k", "isosurface_6k")
 ONE_EACH = ("build", "images_orbit", "images_flythrough", "psnr_orbit", "psnr_flythrough", "verify", "backends",
-            "rate", "bytes", "sizes", "dependencies", "walk", "scale", "shapes", "cap", "walk_cold", "claims", "decode", "kills")
+            "rate", "bytes", "sizes", "dependencies", "walk", "scale", "shapes", "cap", "walk_cold", "claims", "decode", "kills",
+            "model", "assembly")
 
 
 class Test:
@@ -150,7 +151,7 @@ class Test:
 
     def test_refusals(self):
         result = self.must_show("--parts", "build", models=("missing",))
-        self.check("a model that is not there is named", result.returncode == 1 and "missing.ply" in result.stderr,
+        self.check("a model that is not there is named", result.returncode == 1 and "holds no missing" in result.stderr,
                    result.stderr)
         result = self.must_show("--parts", "sprint")
         self.check("an unknown part is wrong usage", result.returncode == 2, result.stderr)

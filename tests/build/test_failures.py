@@ -6,7 +6,7 @@ import signal
 import subprocess
 import time
 
-from building import STROLL, assert_refused, build, must, run, run_tests, sanitizers, write_box_stl, write_grid_obj
+from building import NotHere, STROLL, assert_refused, build, must, run, run_tests, sanitizers, write_box_stl, write_grid_obj
 
 OLDER = b"an older container"
 PATIENCE_S = 600  # a machine may be slow; what waits longer hangs
@@ -82,8 +82,7 @@ def without_rights_it_is_refused(folder):
     prefix = []
     if os.geteuid() == 0:
         if not shutil.which("setpriv"):
-            print("no setpriv: rights not tested")
-            return
+            raise NotHere("no setpriv: rights not tested")
         prefix = ["setpriv", "--reuid", "65534", "--clear-groups"]
     source, closed = os.path.join(folder, "in.stl"), os.path.join(folder, "closed")
     write_box_stl(source)
@@ -93,8 +92,7 @@ def without_rights_it_is_refused(folder):
     os.chmod(source, 0o000)
     program_runs = subprocess.run([*prefix, STROLL, "--version"], stdout=subprocess.DEVNULL).returncode == 0
     if not program_runs:
-        print("nobody cannot run the program from here: rights not tested")
-        return
+        raise NotHere("nobody cannot run the program from here: rights not tested")
     refused(folder, source, "-o", os.path.join(folder, "new.stroll"), holds=["in.stl"], prefix=prefix)
     os.chmod(source, 0o444)
     refused(folder, source, "-o", os.path.join(closed, "new.stroll"), holds=["closed"], prefix=prefix)
@@ -130,8 +128,7 @@ def standard_output_is_no_output(folder):
 
 def a_full_disk_is_one_sentence(folder):
     if os.geteuid() != 0:
-        print("not root: no small disk to fill")
-        return
+        raise NotHere("not root: no small disk to fill")
     source = os.path.join(folder, "in.obj")
     write_grid_obj(source, 250)
     for megabytes, scratch_elsewhere in ((2, False), (1, True), (6, False)):
@@ -140,8 +137,7 @@ def a_full_disk_is_one_sentence(folder):
         mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={megabytes}m", "tmpfs", disk],
                                  stderr=subprocess.DEVNULL)
         if mounted.returncode:
-            print("mount is not allowed: no small disk to fill")
-            return
+            raise NotHere("mount is not allowed: no small disk to fill")
         try:
             if scratch_elsewhere:
                 with open(os.path.join(disk, "filler"), "wb") as file:

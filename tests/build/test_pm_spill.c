@@ -21,6 +21,7 @@ static void set_vertex(struct test_mesh *mesh, uint32_t v, uint32_t x, uint32_t 
     mesh->normal[v][0] = (uint16_t)test_below(&random, 1024);
     mesh->normal[v][1] = (uint16_t)(500 + x);
     if (coloured) {
+        mesh->texcoord[v] = x << 4 | (65535 - y) << 16;
         mesh->colour[v] = 0xff000000u | test_below(&random, 3) * 0x3355u;
         mesh->palette_index[v] = (uint16_t)(x > SIDE / 2);
     }
@@ -33,6 +34,7 @@ static struct test_mesh grid(bool coloured, bool apart, strl_arena *arena)
     struct test_mesh mesh = test_mesh_make(vertices, triangles, arena);
     mesh.palette_count = coloured ? 3 : 1;
     mesh.colour = coloured ? strl_arena_alloc(arena, vertices, sizeof *mesh.colour) : NULL;
+    mesh.texcoord = coloured ? strl_arena_alloc(arena, vertices, sizeof *mesh.texcoord) : NULL;
     mesh.palette_index = coloured ? strl_arena_alloc(arena, vertices, sizeof *mesh.palette_index) : NULL;
     for (uint32_t t = 0; t < triangles; t++) {
         static const uint32_t corner[2][3][2] = {{{0, 0}, {1, 0}, {1, 1}}, {{0, 0}, {1, 1}, {0, 1}}};
@@ -75,6 +77,7 @@ static void assert_same_mesh(const strl_pm *a, const strl_pm *b)
     assert_same(a, b, position, a->vertex_count);
     assert_same(a, b, normal, a->vertex_count);
     assert_same(a, b, colour, a->vertex_count);
+    assert_same(a, b, texcoord, a->vertex_count);
     assert_same(a, b, palette_index, a->vertex_count);
     assert_same(a, b, parent, a->vertex_count);
     assert_same(a, b, triangle, a->triangle_count);

@@ -16,7 +16,8 @@ import tempfile
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
-from view_window import Display, Viewer, differing_share, write_png
+from png import write_png
+from view_window import Display, Viewer, differing_share, pixels
 from x11_drop import X11
 
 SKIPPED = 77
@@ -159,6 +160,37 @@ class Session:
         return found
 
 
+def check_rest(session):
+    """Nothing is drawn while nothing moves."""
+    viewer = session.viewer
+    viewer.point(*PARK)
+    time.sleep(1)  # the panels say once that nothing moves
+    viewer.point(PARK[0] + 4, PARK[1])
+    before = viewer.events()[viewer.events_seen - 1]["frames"]
+    time.sleep(10)  # the visitor reads; one frame each half second would be twenty
+    viewer.point(*PARK)
+    frames = viewer.events()[viewer.events_seen - 1]["frames"] - before
+    assert frames < 18, f"{frames} frames in ten seconds of rest and one move of the cursor"
+
+
+def check_resize(session):
+    """Panels come back to their places after the window was too small for them."""
+    viewer = session.viewer
+    def edge():
+        row = session.display.shoot(0, 60, 600, 61)[0]
+        return max(x for x in range(600) if row[3 * x:3 * x + 3] != bytearray(BACKGROUND))
+
+    viewer.point(*PARK)
+    wide = edge()
+    assert 290 < wide < 310, wide
+    viewer.tool("windowsize", "--sync", viewer.window, "2", "2")
+    viewer.rest()
+    viewer.tool("windowsize", "--sync", viewer.window, *map(str, SIZE))
+    viewer.rest()
+    viewer.point(PARK[0] + 4, PARK[1])
+    assert edge() == wide, f"the panel reaches to {wide}, and to {edge()} after the window was small"
+
+
 def check_picks(session):
     seen = {}
     for x, y in [(640, 390), (660, 440), (620, 362), (780, 370), (440, 460), (640, 560), (800, 530), (540, 500)]:
@@ -202,6 +234,11 @@ def check_list(session):
     viewer.tool("type", "CHIMNEY")
     session.view()
     viewer.press(1120, 166)  # below site and house
+    viewer.point(1120, 166)
+    viewer.tool("click", "3")  # its menu, which Escape closes, and not the window
+    viewer.rest()
+    viewer.key("Escape")
+    viewer.rest()
     viewer.key("i")
     assert viewer.event("hidden")["count"] == len(session.boxes) - 1
     viewer.key("v")
@@ -214,8 +251,23 @@ def check_list(session):
     viewer.press(1100, 50)
     viewer.key("ctrl+a", "BackSpace")
     viewer.press(640, 760)
+    viewer.key("r", "f")
+    here = session.view()
+    viewer.press(1100, 50)
+    viewer.tool("type", "wow")  # a key that flies
+    session.view()
+    viewer.key("ctrl+a", "BackSpace")
+    viewer.tool("mousemove", "640", "200", "sleep", "0.2", "click", "1")
+    viewer.event("pick")
+    assert session.view() == here, "what is typed moves the camera"
     viewer.key("t", "r")
     assert differing_share(whole, session.view()) < 1e-4, "the list leaves something behind"
+    session.check_pick(640, 390)
+    viewer.key("t")
+    viewer.press(1120, 192)  # the list is open at the roof: the chimney stands before it
+    viewer.key("i")
+    assert viewer.event("hidden")["count"] == len(session.boxes) - 1, "the list does not show what is selected"
+    viewer.key("t", "r")
 
 
 def check_section(session):
@@ -265,6 +317,22 @@ def check_bookmarks(session):
     assert session.view() == first, "a bookmark forgets its projection"
 
 
+def check_recording_goes_on(session):
+    """Other ways to move the camera belong to the path, and a reset saves it."""
+    viewer = session.viewer
+    for last in ("m", "r"):
+        viewer.drag(1, 700, 600, 760, 580)
+        viewer.rest()
+        viewer.key("m")
+        viewer.event("said")
+        viewer.key("h")
+        viewer.event("arrived")
+        viewer.key(last)
+        path = viewer.event("path")
+        assert path["frames"] > 10, f"{path}: half a second is fifteen cameras"
+        pathlib.Path(path["file"]).unlink()
+
+
 def check_path(session, stroll, container):
     viewer = session.viewer
     viewer.key("m")
@@ -284,6 +352,7 @@ def check_path(session, stroll, container):
     assert differing_share(there, session.view()) < 0.002, "a replay ends elsewhere than the path"
     frames = json.loads(pathlib.Path(path["file"]).read_text())["frames"]
     assert len(frames) == path["frames"] and math.dist(frames[0]["eye"], session.home.eye) < 1e-3
+    check_recording_goes_on(session)
     # what was recorded in the window is what `render` reads
     shot = viewer.folder / "rendered.png"
     last = viewer.folder / "last.json"
@@ -333,13 +402,16 @@ def check_look(session):
 
 def check_drop(session, display, folder):
     viewer = session.viewer
-    mesh, broken = folder / "dropped tower.obj", folder / "broken.ply"
+    mesh, broken = folder / "dropped tower.obj", folder / f"{'a long name for something ' * 6}broken.ply"
     write_obj(mesh, {"tower": ("brick", (0, 0, 0), (4, 4, 30)), "flag": ("leaf", (1, 1, 30), (2, 2, 33))})
     broken.write_text("ply\nformat ascii 1.0\nelement vertex many\n")
     with X11(display.environment["DISPLAY"]) as hand:
         hand.drop(int(viewer.window), 600, 400, broken)
         viewer.event("build")
         assert "broken.ply" in viewer.event("said")["text"]
+        viewer.point(*PARK)
+        beyond = display.shoot(SIZE[0] - 100, SIZE[1] - 30, SIZE[0], SIZE[1] - 10)
+        assert set(pixels(beyond)) == {bytes(BACKGROUND)}, "a long sentence is not broken into lines"
         assert session.check_pick(640, 420), "the model is gone after a file that could not be built"
         hand.drop(int(viewer.window), 600, 400, mesh)
         opened = viewer.event("opened")
@@ -359,6 +431,64 @@ def check_memory(stroll, display, container, folder):
         viewer.rest()
         viewer.key("n")
         assert viewer.event("said")["text"] == "view 1", "the bookmark is forgotten"
+        viewer.quit()
+    finally:
+        viewer.end()
+
+
+def newest_bookmark(display):
+    """The eye of it; of the model that was written last."""
+    text = (pathlib.Path(display.environment["XDG_CONFIG_HOME"]) / "stroll/viewer.json").read_text()
+    return list(json.loads(text)["bookmarks"].values())[-1][-1]["eye"]
+
+
+def check_roof(stroll, display, folder):
+    """Who walks off the floor under a roof stays below it."""
+    folder.mkdir()
+    mesh, container = folder / "porch.obj", folder / "porch.stroll"
+    write_obj(mesh, {"floor": ("wood", (0, -5, -0.2), (10, 5, 0)), "roof": ("tile", (-10, -5, 2.5), (-0.5, 5, 2.7))})
+    subprocess.run([stroll, "build", mesh, "-o", container, "--up", "z", "--unit", "m", "--quiet"], check=True,
+                   stdout=subprocess.DEVNULL)
+    viewer = Viewer(stroll, display, container, folder, size=SIZE)
+    try:
+        viewer.event("opened")
+        viewer.rest()
+        assert viewer.click(640, 440)["part"] == "floor"
+        viewer.key("g")
+        start = viewer.event("arrived")["eye"]
+        assert abs(start[2] - 1.7) < 1e-3 and start[0] < 8, start
+        eye = start
+        while eye[0] > -1:  # a slow machine makes small steps
+            viewer.tool("keydown", "w")
+            time.sleep(1)
+            viewer.tool("keyup", "w")
+            viewer.key("b")
+            viewer.event("said")
+            viewer.rest()  # it is written by then
+            eye = newest_bookmark(display)
+        assert eye[0] > -10 and abs(eye[2] - 1.7) < 0.01, f"{eye}: the walker was lifted onto the roof"
+        viewer.quit()
+    finally:
+        viewer.end()
+
+
+def check_replaced(stroll, display, container, folder):
+    """A new budget opens the file anew: another model that is there by now does not get the names of the first."""
+    folder.mkdir()
+    mesh, other, mine = folder / "other.obj", folder / "other.stroll", folder / "mine.stroll"
+    write_obj(mesh, {"cube": ("wood", (0, 0, 0), (1, 1, 1))})
+    subprocess.run([stroll, "build", mesh, "-o", other, "--quiet"], check=True, stdout=subprocess.DEVNULL)
+    shutil.copy(container, mine)
+    viewer = Viewer(stroll, display, mine, folder, size=SIZE)
+    try:
+        viewer.event("opened")
+        viewer.rest()
+        other.replace(mine)
+        viewer.press(100, 340)  # budgets
+        viewer.point(150, 363)
+        viewer.tool("mousedown", "1", "mousemove", "200", "363", "mouseup", "1")
+        assert "another model" in viewer.event("said")["text"]
+        assert viewer.click(640, 440)["part"] == "site/house/walls"
         viewer.quit()
     finally:
         viewer.end()
@@ -424,6 +554,8 @@ def run_session(stroll, display, container, boxes, folder, pictures, *options):
         opened = viewer.event("opened")
         assert opened["parts"] == len(boxes) and opened["triangles"] == 12 * len(boxes), opened
         viewer.rest()
+        check_rest(session)
+        check_resize(session)
         check_picks(session)
         check_parts(session)
         check_list(session)
@@ -456,6 +588,8 @@ def main():
         with Display((SIZE[0] + 40, SIZE[1] + 40)) as display:
             run_session(stroll, display, container, boxes, folder / "auto", pictures)
             check_memory(stroll, display, container, folder / "again")
+            check_roof(stroll, display, folder / "roof")
+            check_replaced(stroll, display, container, folder / "replaced")
             check_scale(stroll, display, container, folder / "scale")
         with Display((SIZE[0] + 40, SIZE[1] + 40)) as display:
             run_session(stroll, display, container, boxes, folder / "gl3", None, "--backend", "gl3")

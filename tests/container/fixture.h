@@ -49,6 +49,7 @@ static inline void fixture_mesh(const strl_node *node, uint32_t id, strl_arena *
                     NULL,
                     NULL,
                     NULL,
+                    NULL,
                     NULL};
     pm->position = strl_arena_alloc_zero(arena, vertices, sizeof *pm->position);
     pm->normal = strl_arena_alloc_zero(arena, vertices, sizeof *pm->normal);

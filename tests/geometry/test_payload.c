@@ -20,6 +20,7 @@ static uint64_t vertex_hash(const strl_pm *pm, uint32_t v)
         hash = strl__mix64(hash ^ (uint32_t)pm->position[v][k]) + k;
     hash = strl__mix64(hash ^ (uint64_t)pm->normal[v][0] << 16 ^ pm->normal[v][1]);
     hash = strl__mix64(hash ^ (pm->colour ? pm->colour[v] : 0xffffffffu));
+    hash = strl__mix64(hash ^ (pm->texcoord ? pm->texcoord[v] : 0));
     return strl__mix64(hash ^ (pm->palette_index ? pm->palette_index[v] : 0u));
 }
 
@@ -71,6 +72,7 @@ static void assert_same_states(const strl_pm *a, const strl_pm *b)
     assert_int_equal(a->palette_count, b->palette_count);
     assert_memory_equal(a->palette, b->palette, a->palette_count * sizeof *a->palette);
     assert_int_equal(a->colour != NULL, b->colour != NULL);
+    assert_int_equal(a->texcoord != NULL, b->texcoord != NULL);
     assert_int_equal(a->palette_index != NULL, b->palette_index != NULL);
     uint64_t *hash_a = vertex_hashes(a), *hash_b = vertex_hashes(b), unused = 0;
     for (uint32_t s = 0; s <= a->step_count; s++) {
@@ -186,6 +188,7 @@ static struct test_mesh seams(strl_arena *arena)
     assert_non_null(number);
     memset(number, 0xff, plain.vertex_count * 4 * sizeof *number);
     mesh.colour = strl_arena_alloc(arena, mesh.vertex_count, 4);
+    mesh.texcoord = strl_arena_alloc(arena, mesh.vertex_count, 4);
     mesh.palette_index = strl_arena_alloc(arena, mesh.vertex_count, 2);
     mesh.palette_count = 5;
     for (uint32_t t = 0; t < plain.triangle_count; t++) {
@@ -198,6 +201,7 @@ static struct test_mesh seams(strl_arena *arena)
                 mesh.normal[*n][0] = (uint16_t)(plain.normal[v][0] / 2 + 200 * side);
                 mesh.normal[*n][1] = plain.normal[v][1];
                 mesh.colour[*n] = 0xff000000u + 0x203040u * side + v;
+                mesh.texcoord[*n] = v % 70 ? (v * 300 & 0xffff) | (0xffff - v) << 16 : v % 140 ? 0xffffffffu : 0;
                 mesh.palette_index[*n] = (uint16_t)(side + (v % 50 == 0));
             }
             mesh.triangle[t][k] = (uint16_t)*n;
@@ -341,6 +345,8 @@ static void the_smallest_meshes_come_back(void **state)
     pm.step_count = 1;
     assert_round_trip(&pm); /* a step with no triangle */
     pm.colour = colour;
+    assert_round_trip(&pm);
+    pm.texcoord = (uint32_t[4]){0xffff0000u, 0, 0xffffffffu, 0x80007fffu};
     assert_round_trip(&pm);
     pm.vertex_count = pm.triangle_count = pm.step_count = 0;
     vertex_end[0] = triangle_end[0] = 0;
@@ -569,7 +575,7 @@ static void random_streams_are_refused_or_give_a_sound_mesh(void **state)
             for (unsigned i = 0; i < 100; i++)
                 strl__push(&out, id, test_below(&random, 1 + test_below(&random, id < 6 ? 6 : id >= STRL__STREAM_SELECT ? 3 : 12)));
         strl_error err = {0};
-        assert_int_equal(strl__streams_write(&out, 0, vertices + triangles + 1, &writer, &err), STRL_OK);
+        assert_int_equal(strl__streams_write(&out, strl__stream_count(false), 0, vertices + triangles + 1, &writer, &err), STRL_OK);
         decode_and_check(writer.data, writer.size, round % 2 ? &reference : NULL);
         strl__streams_deinit(&out);
         strl__free(writer.data);

@@ -20,6 +20,7 @@ struct test_mesh {
     int32_t (*position)[3];
     uint16_t (*normal)[2];
     uint32_t *colour;        /* or NULL */
+    uint32_t *texcoord;      /* or NULL */
     uint16_t *palette_index; /* or NULL */
     uint16_t (*triangle)[3];
     uint32_t palette_count;
@@ -295,10 +296,13 @@ static inline void test_fill_attributes(const struct test_mesh *mesh, const uint
     pm->position = strl_arena_alloc(arena, pm->vertex_count, 12);
     pm->normal = strl_arena_alloc(arena, pm->vertex_count, 4);
     pm->colour = mesh->colour ? strl_arena_alloc(arena, pm->vertex_count, 4) : NULL;
+    pm->texcoord = mesh->texcoord ? strl_arena_alloc(arena, pm->vertex_count, 4) : NULL;
     pm->palette_index = mesh->palette_index ? strl_arena_alloc(arena, pm->vertex_count, 2) : NULL;
     for (uint32_t v = 0; v < pm->vertex_count; v++) {
         memcpy(pm->position[v], mesh->position[old_vertex[v]], 12);
         memcpy(pm->normal[v], mesh->normal[old_vertex[v]], 4);
+        if (pm->texcoord)
+            pm->texcoord[v] = mesh->texcoord[old_vertex[v]];
         if (pm->colour)
             pm->colour[v] = mesh->colour[old_vertex[v]];
         if (pm->palette_index)

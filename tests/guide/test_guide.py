@@ -8,11 +8,12 @@ import json
 import math
 import pathlib
 import re
-import struct
 import subprocess
 import sys
 import tempfile
-import zlib
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
+from png import read_png
 
 GUIDE = pathlib.Path(__file__).resolve().parents[2] / "docs/guide"
 BLOCK = re.compile(r"^<!-- (\w+\.[ch]): (\w+) -->\n```c\n(.*?)```$", re.M | re.S)
@@ -24,46 +25,10 @@ def regions_of(path):
     return dict(re.findall(r"/\* begin: (\w+) \*/\n(.*?)/\* end: \1 \*/\n", path.read_text(), re.S))
 
 
-def read_png(path):
-    """Rows of pixels as tuples; 8-bit RGB or RGBA without interlacing."""
-    data = path.read_bytes()
-    width, height, depth, kind = struct.unpack(">IIBB", data[16:26])
-    size = {2: 3, 6: 4}[kind]
-    assert depth == 8
-    packed, at = b"", 8
-    while at < len(data):
-        length, name = struct.unpack(">I4s", data[at:at + 8])
-        packed += data[at + 8:at + 8 + length] if name == b"IDAT" else b""
-        at += 12 + length
-    raw, rows, above = zlib.decompress(packed), [], bytearray(width * size)
-    for y in range(height):
-        start = y * (width * size + 1)
-        row = unfiltered(raw[start], bytearray(raw[start + 1:start + 1 + width * size]), above, size)
-        rows.append([tuple(row[x:x + 3]) for x in range(0, len(row), size)])
-        above = row
-    return rows
-
-
-def unfiltered(kind, row, above, size):
-    for x in range(len(row)):
-        left, up, corner = row[x - size] if x >= size else 0, above[x], above[x - size] if x >= size else 0
-        if kind == 1:
-            row[x] = row[x] + left & 255
-        elif kind == 2:
-            row[x] = row[x] + up & 255
-        elif kind == 3:
-            row[x] = row[x] + (left + up) // 2 & 255
-        elif kind == 4:
-            guess = left + up - corner
-            nearest = min((abs(guess - left), 0, left), (abs(guess - up), 1, up), (abs(guess - corner), 2, corner))[2]
-            row[x] = row[x] + nearest & 255
-    return row
-
-
 def covered(rows):
     """Which pixels are not the background, which the image's corner is of."""
-    ground = rows[0][0]
-    return [[pixel != ground for pixel in row] for row in rows]
+    ground = rows[0][:3]
+    return [[row[x:x + 3] != ground for x in range(0, len(row), 3)] for row in rows]
 
 
 class Test:
@@ -110,6 +75,15 @@ class Test:
         self.check("ten frames draw something", len(frames) == 10, out)
         errors = [float(e) for e in re.findall(r"wrong by at most ([\d.]+) pixels, part", out)]
         self.check("a settled front keeps the pixel error", errors and max(errors) <= 1, out)
+
+    def an_empty_model_is_walked_too(self):
+        lines, empty = self.folder / "lines.obj", self.folder / "lines.stroll"
+        lines.write_text("v 0 0 0\nv 1 0 0\nl 1 2\n")
+        self.run("stroll", "build", lines, "-o", empty, "--quiet")
+        out = self.run("guide_first_walk", empty)
+        frames = re.findall(r"^frame \d: \d nodes, 0 triangles, 0 nodes still", out, re.M)
+        self.check("a model without a triangle has ten frames without one, and no corner", len(frames) == 10 and
+                   "of level" not in out, out)
 
     def own_source_keeps_its_budget(self):
         pack = self.folder / "pack.bin"
@@ -169,6 +143,7 @@ class Test:
         self.blocks_are_the_code()
         self.makes_a_model()
         self.first_walk_walks()
+        self.an_empty_model_is_walked_too()
         self.own_source_keeps_its_budget()
         self.errors_are_sentences()
         self.builder_builds()

@@ -30,14 +30,17 @@ static uint64_t hash_number(uint64_t hash, double value)
 static json_t *show(const strl_triangle *t)
 {
     json_t *positions = json_array(), *normals = json_array(), *colours = json_array();
+    json_t *texcoords = json_array(); /* none where there are none */
     for (unsigned i = 0; i < 9; i++) {
         json_array_append_new(positions, json_real(t->position[i / 3][i % 3]));
         json_array_append_new(normals, json_real((double)t->normal[i / 3][i % 3]));
     }
     for (unsigned i = 0; i < 3; i++)
         json_array_append_new(colours, json_integer(t->colour[i]));
-    return json_pack("{s:o,s:o,s:o,s:I,s:I,s:I}", "positions", positions, "normals", normals,
-                     "colours", colours, "part", (json_int_t)t->part, "material",
+    for (unsigned i = 0; i < 6 && t->flags & STRL_TRIANGLE_HAS_TEXCOORD; i++)
+        json_array_append_new(texcoords, json_real((double)t->texcoord[i / 2][i % 2]));
+    return json_pack("{s:o,s:o,s:o,s:o,s:I,s:I,s:I}", "positions", positions, "normals", normals,
+                     "colours", colours, "texcoords", texcoords, "part", (json_int_t)t->part, "material",
                      (json_int_t)t->material, "flags", (json_int_t)t->flags);
 }
 
@@ -75,7 +78,7 @@ static json_t *describe(const strl_reader *reader, const pass_result *pass)
         json_array_append_new(materials, json_pack("[s,I]", name, (json_int_t)rgba));
     }
     snprintf(hash, sizeof hash, "%016" PRIx64, pass->hash);
-    return json_pack("{s:s,s:s,s:i,s:I,s:b,s:I,s:I,s:I,s:I,s:s,s:I,s:I,s:I,s:I,s:o,s:o,s:O}",
+    return json_pack("{s:s,s:s,s:i,s:I,s:b,s:I,s:I,s:I,s:I,s:s,s:I,s:I,s:I,s:I,s:o,s:o,s:O,s:I,s:s}",
                      "format", info.format, "unit", info.default_unit ? info.default_unit : "",
                      "up", (int)info.default_up, "hint", (json_int_t)info.triangles_hint, "exact",
                      (int)info.hint_is_exact, "bytes", (json_int_t)info.file_bytes, "bytes_done",
@@ -84,7 +87,9 @@ static json_t *describe(const strl_reader *reader, const pass_result *pass)
                      "hash", hash, "nonfinite", (json_int_t)pass->drops.nonfinite, "degenerate",
                      (json_int_t)pass->drops.degenerate_faces, "lines",
                      (json_int_t)pass->drops.lines, "points", (json_int_t)pass->drops.points,
-                     "parts", parts, "materials", materials, "triangles", pass->triangles);
+                     "parts", parts, "materials", materials, "triangles", pass->triangles,
+                     "missing_images", (json_int_t)strl_reader_missing_image_count(reader),
+                     "missing_image", strl_reader_missing_image(reader));
 }
 
 int main(int argc, char **argv)

@@ -93,6 +93,69 @@ static void a_failed_allocation_or_read_is_an_error(void **state)
     read_through_faults("fault.gltf", strl_file_fail_reads_after);
 }
 
+/* An image of the fuzzer's corpus beside the model. */
+static void copy_image(const char *name)
+{
+    char path[512];
+    static uint8_t bytes[65536];
+    snprintf(path, sizeof path, "%s/fuzz/corpus/image/%s", getenv("STRL_TEST_ROOT") ? getenv("STRL_TEST_ROOT") : ".", name);
+    FILE *file = fopen(path, "rb");
+    assert_non_null(file);
+    write_test_file(name, bytes, fread(bytes, 1, sizeof bytes, file));
+    fclose(file);
+}
+
+static void write_painted_triangle(const char *model, const char *buffer, const char *image)
+{
+    char text[1400];
+    strl_writer out = {0};
+    static const float numbers[15] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0.1f, 0.2f, 0.9f, 0.1f, 0.5f, 0.8f};
+    for (unsigned i = 0; i < 15; i++)
+        strl_writer_f32(&out, numbers[i]);
+    for (unsigned i = 0; i < 3; i++)
+        strl_writer_u16(&out, (uint16_t)i);
+    write_test_file(buffer, out.data, out.size);
+    strl__free(out.data);
+    snprintf(text, sizeof text,
+             "{\"asset\":{\"version\":\"2.0\"},\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],"
+             "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"TEXCOORD_0\":1},\"indices\":2,"
+             "\"material\":0}]}],\"materials\":[{\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0}}}],"
+             "\"textures\":[{\"source\":0}],\"images\":[{\"uri\":\"%s\"}],\"accessors\":[{\"bufferView\":0,"
+             "\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},{\"bufferView\":0,\"byteOffset\":36,"
+             "\"componentType\":5126,\"count\":3,\"type\":\"VEC2\"},{\"bufferView\":0,\"byteOffset\":60,"
+             "\"componentType\":5123,\"count\":3,\"type\":\"SCALAR\"}],\"bufferViews\":[{\"buffer\":0,"
+             "\"byteLength\":66}],\"buffers\":[{\"uri\":\"%s\",\"byteLength\":66}]}",
+             image, buffer);
+    write_test_text(model, text);
+}
+
+/* No failed allocation passes for an image that cannot be used: the next pass would give other colours. */
+static void a_failed_allocation_under_an_image_is_an_error(void **state)
+{
+    (void)state;
+    static const char *const images[] = {"rgba.png", "adam7.png", "halved.png", "baseline.jpg"};
+    for (unsigned i = 0; i < sizeof images / sizeof *images; i++) {
+        strl_reader *reader;
+        strl_error err;
+        read_result result;
+        char text[64];
+        copy_image(images[i]);
+        write_painted_triangle("painted.gltf", "painted.bin", images[i]);
+        read_through_faults("painted.gltf", strl__alloc_fail_after);
+        snprintf(text, sizeof text, "newmtl m\nmap_Kd %s\n", images[i]);
+        write_test_text("painted.mtl", text);
+        write_test_text("painted.obj", "mtllib painted.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.1 0.1\nvt 0.9 0.3\nvt 0 1\n"
+                                       "f 1/1 2/2 3/3\n");
+        read_through_faults("painted.obj", strl__alloc_fail_after);
+        assert_int_equal(open_test_file("painted.gltf", MEMORY_LEAST, &reader, &err), STRL_OK);
+        read_pass(reader, &result);
+        assert_int_equal(strl_reader_missing_image_count(reader), 0);
+        assert_int_equal(result.count, 1);
+        free_result(&result);
+        strl_reader_close(reader);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -100,6 +163,7 @@ int main(void)
         cmocka_unit_test(a_buffer_that_changes_is_refused_by_name),
         cmocka_unit_test(a_buffer_that_shrinks_while_it_is_read_is_refused),
         cmocka_unit_test(a_failed_allocation_or_read_is_an_error),
+        cmocka_unit_test(a_failed_allocation_under_an_image_is_an_error),
     };
     return cmocka_run_group_tests(tests, make_test_folder, remove_test_folder);
 }

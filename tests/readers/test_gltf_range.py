@@ -1,10 +1,12 @@
 #!/usr/bin/env python3
 """Reading glTF takes time and scratch in proportion to its triangles, whatever its accessors and instances count."""
 import json
+import random
 import resource
 import time
 
 import gltf_writer as w
+import image_writer as image
 from gltf_reading import expect, read, refuse, run_tests
 
 MANY = 4294967295  # elements of an accessor without a view take no byte of the file
@@ -76,6 +78,68 @@ def primitives_that_share_their_vertices_load_their_own(folder):
     assert seconds < 10, f"{seconds} s for {len(wanted)} triangles"  # each loads all: more than a minute
 
 
+def painted(points, places, order, stand_at=None, mode=4):
+    """A glTF under an image, placed twice. stand_at: the vertices' indices, all others are zero; None: one after the other."""
+    model = w.Model()
+
+    def accessor(rows):
+        if stand_at is None:
+            return model.accessor(rows, w.FLOAT)
+        return model.add("accessors", {"componentType": w.FLOAT, "type": w.TYPES[len(rows[0])], "count": MANY, "sparse": {
+            "count": len(rows),
+            "indices": {"bufferView": model.view(w.pack([(at,) for at in stand_at], w.U32)), "componentType": w.U32},
+            "values": {"bufferView": model.view(w.pack(rows, w.FLOAT))}}})
+    primitive = {"attributes": {"POSITION": accessor(points), "TEXCOORD_0": accessor(places)}, "mode": mode,
+                 "material": model.add("materials", {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})}
+    if order:
+        primitive["indices"] = model.accessor([stand_at[i] if stand_at else i for i in order], w.U32)
+    mesh = model.mesh(primitive)
+    model.add("textures", {"source": 0})
+    model.add("images", {"uri": "image.png"})
+    model.scene(model.node(mesh=mesh), model.node(mesh=mesh, translation=[0, 0, 9]))
+    return model
+
+
+def shown(model, path):
+    model.glb(path)
+    result = read(path)
+    assert "error" not in result and result["missing_images"] == 0, result
+    return [t["colours"] for t in result["triangles"]], [t["texcoords"] for t in result["triangles"]]
+
+
+def under_an_image_too_only_the_vertices_in_use_are_read(folder):
+    """Small triangles and a large one, so that what a vertex stands for differs: from a range that begins late the colours
+    are those of vertices that begin at 0."""
+    dice = random.Random(5)
+    w.save(f"{folder}/image.png", image.png([[tuple(dice.randrange(256) for _ in range(3)) for _ in range(64)]
+                                             for _ in range(64)]))
+    points = [(dice.random(), dice.random(), dice.random()) for _ in range(7)]
+    places = [(0.1, 0.1), (0.12, 0.1), (0.1, 0.13), (0.9, 0.2), (0.95, 0.8), (0.3, 0.7), (0.31, 0.72)]
+    for mode, order in ((4, [0, 1, 2, 2, 1, 3, 4, 5, 6, 6, 5, 0]), (5, [6, 0, 1, 2, 4, 5]), (6, [2, 0, 1, 3, 4, 6])):
+        plain = shown(painted(points, places, order, mode=mode), f"{folder}/plain.glb")
+        late = painted(points, places, order, [4000000000 + 9 * i for i in range(7)], mode)
+        with_little_scratch(lambda: check_same(plain, shown(late, f"{folder}/late.glb")))
+        assert len({colour for colours in plain[0] for colour in colours}) > 4, plain
+
+
+def check_same(wanted, got):
+    assert got == wanted, f"found {got}, expected {wanted}"
+
+
+def far_apart_under_an_image_all_corners_have_the_mean(folder):
+    """As they have where each triangle has corners of its own."""
+    dice = random.Random(6)
+    w.save(f"{folder}/image.png", image.png([[tuple(dice.randrange(256) for _ in range(3)) for _ in range(64)]
+                                             for _ in range(64)]))
+    places = [(0.1, 0.1), (0.2, 0.1), (0.1, 0.4), (0.9, 0.2), (0.95, 0.8)]
+    for mode, order in ((4, [0, 1, 2, 2, 3, 4]), (5, [0, 1, 2, 3, 4]), (6, [2, 0, 1, 3, 4])):
+        own = painted([FAR[i] for i in order], [places[i] for i in order], None, mode=mode)
+        wanted = shown(own, f"{folder}/own.glb")
+        far = painted(FAR, places, order, PLACES, mode)
+        with_little_scratch(lambda: check_same(wanted, shown(far, f"{folder}/far.glb")))
+        assert len({colour for colours in wanted[0] for colour in colours}) > 3, wanted
+
+
 def instances_without_triangles_are_passed_over(folder):
     model = w.Model()
     instancing = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": model.add(
@@ -100,5 +164,6 @@ def text_in_utf16_may_hold_its_buffers(folder):
 
 
 run_tests([vertices_that_nothing_uses_are_not_read, an_index_beyond_far_vertices_is_refused_with_its_triangle,
-           primitives_that_share_their_vertices_load_their_own, instances_without_triangles_are_passed_over,
+           primitives_that_share_their_vertices_load_their_own, under_an_image_too_only_the_vertices_in_use_are_read,
+           far_apart_under_an_image_all_corners_have_the_mean, instances_without_triangles_are_passed_over,
            text_in_utf16_may_hold_its_buffers])

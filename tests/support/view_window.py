@@ -4,60 +4,14 @@ import os
 import pathlib
 import struct
 import subprocess
+import sys
 import tempfile
 import time
-import zlib
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
+from png import read_png
 
 PATIENCE_S = 240  # a sanitized build on a busy machine
-
-
-def read_png(path):
-    """Rows of RGB8 bytes of a PNG as the viewer writes it: eight bits, three channels, not interlaced."""
-    data = path.read_bytes()
-    assert data[:8] == b"\x89PNG\r\n\x1a\n", f"{path} is no PNG"
-    at, packed, width, height = 8, b"", 0, 0
-    while at < len(data):
-        length, kind = struct.unpack(">I4s", data[at:at + 8])
-        body = data[at + 8:at + 8 + length]
-        if kind == b"IHDR":
-            width, height, depth, colour, _, _, interlaced = struct.unpack(">IIBBBBB", body)
-            assert (depth, colour, interlaced) == (8, 2, 0), f"{path} has an unexpected layout"
-        elif kind == b"IDAT":
-            packed += body
-        at += 12 + length
-    raw, rows, previous = zlib.decompress(packed), [], bytearray(3 * width)
-    for y in range(height):
-        start = y * (3 * width + 1)
-        previous = unfilter(raw[start], bytearray(raw[start + 1:start + 1 + 3 * width]), previous)
-        rows.append(previous)
-    return rows
-
-
-def write_png(path, rows):
-    """Rows of RGB8 bytes."""
-    def chunk(kind, body):
-        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
-    head = struct.pack(">IIBBBBB", len(rows[0]) // 3, len(rows), 8, 2, 0, 0, 0)
-    body = zlib.compress(b"".join(b"\0" + bytes(row) for row in rows), 9)
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", body) + chunk(b"IEND", b""))
-
-
-def unfilter(kind, row, above):
-    for i in range(len(row)):
-        left, up, corner = (row[i - 3], above[i], above[i - 3]) if i >= 3 else (0, above[i], 0)
-        if kind == 1:
-            guess = left
-        elif kind == 2:
-            guess = up
-        elif kind == 3:
-            guess = (left + up) // 2
-        elif kind == 4:
-            guess = min((abs(up - corner), 0, left), (abs(left - corner), 1, up),
-                        (abs(left + up - 2 * corner), 2, corner))[2]
-        else:
-            guess = 0
-        row[i] = (row[i] + guess) & 255
-    return row
 
 
 def pixels(rows):

@@ -31,6 +31,9 @@ static void compare_meshes(const strl_pm *a, const strl__vmesh *b)
     assert_int_equal(a->palette_index != NULL, b->palette_index != NULL);
     if (a->colour)
         assert_same(a->colour, b->colour, v * sizeof *a->colour);
+    assert_int_equal(a->texcoord != NULL, b->texcoord != NULL);
+    for (uint32_t i = 0; a->texcoord && i < v; i++)
+        assert_true(a->texcoord[i] == ((uint32_t)b->texcoord[i][0] | (uint32_t)b->texcoord[i][1] << 16));
     if (a->palette_index)
         assert_same(a->palette_index, b->palette_index, v * sizeof *a->palette_index);
     for (uint32_t i = 0; i < a->palette_count; i++) {
@@ -45,6 +48,7 @@ static void paint(strl_pm *mesh, strl_arena *arena, uint32_t seed)
     mesh->colour = strl_arena_alloc(arena, mesh->vertex_count, sizeof *mesh->colour);
     mesh->palette_index = strl_arena_alloc(arena, mesh->vertex_count, sizeof *mesh->palette_index);
     mesh->palette = strl_arena_alloc(arena, 3, sizeof *mesh->palette);
+    mesh->texcoord = seed % 2 ? strl_arena_alloc(arena, mesh->vertex_count, sizeof *mesh->texcoord) : NULL;
     assert_non_null(mesh->colour);
     assert_non_null(mesh->palette_index);
     assert_non_null(mesh->palette);
@@ -54,6 +58,9 @@ static void paint(strl_pm *mesh, strl_arena *arena, uint32_t seed)
     for (uint32_t v = 0; v < mesh->vertex_count; v++) {
         mesh->colour[v] = (uint32_t)(mesh->position[v][0] >> 4) * 0x010203u ^
                           (v % 97 ? 0xff000000u : (uint32_t)strl__mix64(v + seed));
+        if (mesh->texcoord)
+            mesh->texcoord[v] = v % 61 ? (uint32_t)(mesh->position[v][0] & 0xffff) | (uint32_t)mesh->position[v][1] << 16
+                                       : (uint32_t)strl__mix64(v);
         mesh->palette_index[v] = (uint16_t)(v % 50 ? 1 : v % 3);
     }
 }

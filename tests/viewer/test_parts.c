@@ -191,6 +191,39 @@ static void many_parts_stay_quick(void **state)
     strl_parts_deinit(&parts);
 }
 
+/* Names share beginnings in a file, which can hold far more of them than memory should. */
+static strl_status name_deep(void *context, uint32_t part, char *name, size_t size, strl_error *err)
+{
+    (void)context, (void)err;
+    int used = snprintf(name, size, "%05u", part);
+    while ((size_t)used + 3 < size && used < 405) {
+        memcpy(name + used, "/x", 3);
+        used += 2;
+    }
+    return STRL_OK;
+}
+
+static void names_and_nodes_keep_to_their_bytes(void **state)
+{
+    (void)state;
+    enum { MANY = 10000, BYTES = 4 << 20, LEAST = 60 };
+    strl_part_tree tree;
+    assert_int_equal(strl_part_tree_init(&tree, MANY, BYTES, name_deep, NULL, NULL), STRL_OK);
+    assert_true(tree.text_bytes + tree.node_count * sizeof *tree.nodes <= BYTES + (size_t)LEAST * MANY);
+    assert_true(tree.text_bytes > BYTES / 3 && tree.node_count * sizeof *tree.nodes > BYTES / 3);
+    uint32_t own = 0;
+    for (uint32_t n = 0; n < tree.node_count; n++)
+        own += tree.nodes[n].is_part;
+    assert_int_equal(own, MANY);
+    assert_int_equal(strlen(strl_part_tree_name(&tree, 0)), 405);
+    assert_string_equal(strl_part_tree_name(&tree, MANY - 1), "");
+    for (uint32_t part = 0; part < MANY; part += 999) { /* with a name or without, split or not */
+        uint32_t row = strl_part_tree_reveal(&tree, part);
+        assert_true(row < tree.row_count && tree.order[tree.nodes[tree.rows[row]].first_part] == part);
+    }
+    strl_part_tree_deinit(&tree);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -199,6 +232,7 @@ int main(void)
         cmocka_unit_test(styles_follow_what_is_hidden_and_selected),
         cmocka_unit_test(a_failure_leaves_nothing),
         cmocka_unit_test(many_parts_stay_quick),
+        cmocka_unit_test(names_and_nodes_keep_to_their_bytes),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

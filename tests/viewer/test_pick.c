@@ -96,7 +96,7 @@ static void hidden_parts_and_what_is_cut_off_are_not_picked(void **state)
     items[1].origin[2] += 4; /* above */
     for (uint32_t part = 0; part < 2; part++) {
         for (int v = 0; v < PATCH_VERTICES; v++)
-            labels[part][v] = (strl_vertex_label){part, 7 + part};
+            labels[part][v] = (strl_vertex_label){.part = part, .material = 7 + part};
         items[part].labels = labels[part];
     }
     const strl_draw_list list = {.items = items, .count = 2};

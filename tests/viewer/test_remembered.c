@@ -10,6 +10,7 @@
 
 #include "platform/file.h"
 #include "support/folder.h"
+#include "viewer/journal.h"
 #include "viewer/recorder.h"
 #include "viewer/settings.h"
 
@@ -77,6 +78,39 @@ static void settings_and_bookmarks_come_back(void **state)
     strl_path_remove(path, NULL);
 }
 
+/* Two windows, a model each: the one that is closed last forgets nothing of the other's. */
+static void what_another_window_wrote_is_kept(void **state)
+{
+    (void)state;
+    static strl_bookmarks bookmarks, found;
+    static const uint8_t ids[2][16] = {{1}, {2}};
+    const char *path = strl_test_path("viewer.json");
+    strl_navigator navigator;
+    strl_navigator_init(&navigator, bounds, 2, 1);
+    assert_true(strl_bookmarks_add(&bookmarks, "", &navigator));
+    strl_settings windows[2] = {load(path), load(path)};
+    windows[0].error_px = 0.25;
+    for (int w = 0; w < 2; w++) {
+        if (w == 1)
+            strl_settings_renew(&windows[w]);
+        strl_settings_set_bookmarks(&windows[w], ids[w], &bookmarks);
+        assert_int_equal(strl_settings_save(&windows[w], NULL), STRL_OK);
+    }
+    strl_settings settings = load(path);
+    assert_true(settings.error_px == 0.25);
+    for (int w = 0; w < 2; w++) {
+        strl_settings_get_bookmarks(&settings, ids[w], &found);
+        assert_int_equal(found.count, 1);
+        strl_settings_deinit(&windows[w]);
+    }
+    write_file(path, "oops"); /* what is known stays */
+    strl_settings_renew(&settings);
+    strl_settings_get_bookmarks(&settings, ids[1], &found);
+    assert_int_equal(found.count, 1);
+    strl_settings_deinit(&settings);
+    strl_path_remove(path, NULL);
+}
+
 static void what_is_not_understood_stays(void **state)
 {
     (void)state;
@@ -138,6 +172,35 @@ static void folders_are_made_and_nothing_is_written_without_a_name(void **state)
     assert_int_equal(strl_path_remove_directory(above, NULL), STRL_OK);
 }
 
+/* ---- the log */
+
+static void the_log_tells_of_files_whose_names_are_not_utf8(void **state)
+{
+    (void)state;
+    FILE *journal;
+    char line[200] = "";
+    const char *path = strl_test_path("log.jsonl");
+    assert_int_equal(strl_journal_open(path, &journal, NULL), STRL_OK);
+    strl_journal_write(journal, "opened",
+                       json_pack("{s:o}", "file",
+                                 strl_journal_text("br\xfc"
+                                                   "cke.obj")));
+    strl_journal_write(journal, "opened",
+                       json_pack("{s:o}", "file",
+                                 strl_journal_text("br\xc3\xbc"
+                                                   "cke.obj")));
+    strl_journal_close(journal);
+    journal = fopen(path, "r");
+    assert_non_null(journal);
+    assert_non_null(fgets(line, sizeof line, journal));
+    assert_string_equal(line, "{\"file\":\"br?cke.obj\",\"event\":\"opened\"}\n");
+    assert_non_null(fgets(line, sizeof line, journal));
+    assert_string_equal(line, "{\"file\":\"br\xc3\xbc"
+                              "cke.obj\",\"event\":\"opened\"}\n");
+    fclose(journal);
+    strl_path_remove(path, NULL);
+}
+
 /* ---- paths */
 
 static strl_camera camera_at(double x)
@@ -195,9 +258,11 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(settings_and_bookmarks_come_back),
+        cmocka_unit_test(what_another_window_wrote_is_kept),
         cmocka_unit_test(what_is_not_understood_stays),
         cmocka_unit_test(a_broken_file_is_told_and_not_overwritten),
         cmocka_unit_test(folders_are_made_and_nothing_is_written_without_a_name),
+        cmocka_unit_test(the_log_tells_of_files_whose_names_are_not_utf8),
         cmocka_unit_test(a_path_is_recorded_in_equal_times_and_replayed),
     };
     return cmocka_run_group_tests(tests, strl_test_folder_make, strl_test_folder_remove);

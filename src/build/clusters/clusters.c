@@ -94,6 +94,8 @@ static strl_status write_names(const strl_ingest *ingest, strl_container_writer 
         status = strl_container_writer_add_part(writer, ingest->parts.items[i], err);
     for (size_t i = 0; i < ingest->materials.count && !status; i++)
         status = strl_container_writer_add_material(writer, ingest->materials.items[i], ingest->materials.rgba[i], err);
+    for (size_t i = 0; ingest->materials.images && i < ingest->materials.count && !status; i++)
+        status = strl_container_writer_add_image(writer, &ingest->materials.images[i], err);
     return status;
 }
 

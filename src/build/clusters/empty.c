@@ -8,7 +8,7 @@
 static strl_status encode_nothing(strl_arena *arena, strl_writer *payload, strl_error *err)
 {
     strl_pm pm = {.palette_count = 1};
-    if (!strl_pm_create(&pm, false, false, arena))
+    if (!strl_pm_create(&pm, false, false, false, arena))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
     pm.vertex_end[0] = pm.triangle_end[0] = 0;
     pm.geometric_error[0] = pm.appearance_error[0] = 0;

@@ -187,7 +187,8 @@ static strl_status weld(const strl_hierarchy *hierarchy, const strl_soup_triangl
             for (int k = 0; k < 3; k++)
                 soup.mesh.position[at][k] = (int32_t)((int64_t)corner->position[k] - soup.anchor[k]);
             soup.mesh.wedge[at] = (strl_wedge){.point = at, .normal = {corner->normal[0], corner->normal[1]},
-                                               .colour = corner->colour, .palette = triangles[t].palette};
+                                               .colour = corner->colour, .texcoord = corner->texcoord,
+                                               .palette = triangles[t].palette};
             soup.mesh.triangle[t][c] = at;
         }
         soup.mesh.drift[t] = (strl_drift){0};

@@ -14,6 +14,7 @@ typedef struct models {
     strl_pack_model vertex, point, palette, corner[3], drift_repeats, drift[6], share_count, share;
     strl_pack_steps normal[2];
     strl_pack_rgba colour;
+    strl_pack_steps texcoord[2];
     strl_pack_same deviation, shift;
 } models;
 
@@ -101,12 +102,18 @@ static bool read_points(strl_mesh *mesh, const strl_pm *payload, models *m, strl
 static void write_wedges(const strl_mesh *mesh, models *m, strl_packer *packer)
 {
     strl_wedge last = {.point = UINT32_MAX};
+    bool has_texcoords = false;
+    for (uint32_t w = 0; w < mesh->wedge_count && !has_texcoords; w++)
+        has_texcoords = mesh->wedge[w].texcoord != 0;
+    strl__pack_bits(packer, 1, has_texcoords);
     for (uint32_t w = 0; w < mesh->wedge_count; w++) {
         const strl_wedge *wedge = &mesh->wedge[w];
         strl_pack(packer, &m->point, strl_pack_zigzag(wedge->point - last.point - 1));
         for (int k = 0; k < 2; k++)
             strl_pack_step(packer, &m->normal[k], wedge->normal[k], last.normal[k]);
         strl_pack_colour(packer, &m->colour, wedge->colour, last.colour);
+        for (unsigned k = 0; k < 2 && has_texcoords; k++)
+            strl_pack_step(packer, &m->texcoord[k], wedge->texcoord >> 16 * k & 0xffff, last.texcoord >> 16 * k & 0xffff);
         strl_pack(packer, &m->palette, strl_pack_zigzag(wedge->palette - last.palette));
         last = *wedge;
     }
@@ -115,12 +122,16 @@ static void write_wedges(const strl_mesh *mesh, models *m, strl_packer *packer)
 static bool read_wedges(strl_mesh *mesh, models *m, strl_unpacker *unpacker)
 {
     strl_wedge last = {.point = UINT32_MAX};
-    bool good = true;
+    bool good = true, has_texcoords = strl__unpack_bits(unpacker, 1);
     for (uint32_t w = 0; w < mesh->wedge_count; w++) {
         last.point += 1 + strl_unpack_zigzag(strl_unpack(unpacker, &m->point));
         for (int k = 0; k < 2; k++)
             last.normal[k] = (uint16_t)strl_unpack_step(unpacker, &m->normal[k], last.normal[k]);
         last.colour = strl_unpack_colour(unpacker, &m->colour, last.colour);
+        uint32_t texcoord = 0;
+        for (unsigned k = 0; k < 2 && has_texcoords; k++)
+            texcoord |= (strl_unpack_step(unpacker, &m->texcoord[k], last.texcoord >> 16 * k & 0xffff) & 0xffff) << 16 * k;
+        last.texcoord = texcoord;
         last.palette += strl_unpack_zigzag(strl_unpack(unpacker, &m->palette));
         good &= last.point < mesh->point_count;
         mesh->wedge[w] = last;

@@ -14,6 +14,7 @@
 
 #define HAS_COLOURS 1u
 #define HAS_PALETTE 2u
+#define HAS_TEXCOORDS 4u
 
 typedef struct models {
     strl_pack_points base;
@@ -21,6 +22,7 @@ typedef struct models {
     strl_pack_model base_corner[3], is_new[3], new_corner[3], old_corner[3], part, material;
     strl_pack_steps normal[2];
     strl_pack_rgba colour;
+    strl_pack_steps texcoord[2];
     strl_pack_same palette, geometric_error, appearance_error;
 } models;
 
@@ -83,6 +85,9 @@ static void write_attributes(const strl_pm *pm, models *m, strl_packer *packer)
             strl_pack_step(packer, &m->normal[k], pm->normal[v][k], v ? pm->normal[guide][k] : 0);
         if (pm->colour)
             strl_pack_colour(packer, &m->colour, pm->colour[v], v ? pm->colour[guide] : 0);
+        for (unsigned k = 0; k < 2 && pm->texcoord; k++)
+            strl_pack_step(packer, &m->texcoord[k], pm->texcoord[v] >> 16 * k & 0xffff,
+                           v ? pm->texcoord[guide] >> 16 * k & 0xffff : 0);
         if (pm->palette_index)
             strl_pack_beside(packer, &m->palette, pm->palette_index[v], v ? pm->palette_index[guide] : 0);
     }
@@ -133,7 +138,7 @@ static void write_packed(const strl_pm *pm, strl_writer *writer)
     strl_writer_u32(writer, pm->palette_count);
     strl_writer_u32(writer, pm->vertex_end[0]);
     strl_writer_u32(writer, pm->triangle_end[0]);
-    strl_writer_u32(writer, (pm->colour ? HAS_COLOURS : 0) | (pm->palette_index ? HAS_PALETTE : 0));
+    strl_writer_u32(writer, (pm->colour ? HAS_COLOURS : 0) | (pm->palette_index ? HAS_PALETTE : 0) | (pm->texcoord ? HAS_TEXCOORDS : 0));
     write_ends(pm, &m, &packer);
     write_errors(pm, &m, &packer);
     write_parents(pm, &m, &packer);
@@ -215,6 +220,11 @@ static void read_attributes(strl_pm *pm, models *m, strl_unpacker *unpacker)
                 (uint16_t)strl_unpack_step(unpacker, &m->normal[k], v ? pm->normal[guide][k] : 0);
         if (pm->colour)
             pm->colour[v] = strl_unpack_colour(unpacker, &m->colour, v ? pm->colour[guide] : 0);
+        if (pm->texcoord)
+            pm->texcoord[v] = 0;
+        for (unsigned k = 0; k < 2 && pm->texcoord; k++)
+            pm->texcoord[v] |= (strl_unpack_step(unpacker, &m->texcoord[k], v ? pm->texcoord[guide] >> 16 * k & 0xffff : 0) &
+                                0xffff) << 16 * k;
         if (pm->palette_index)
             pm->palette_index[v] =
                 (uint16_t)strl_unpack_beside(unpacker, &m->palette, v ? pm->palette_index[guide] : 0);
@@ -288,7 +298,7 @@ strl_status strl_pm_spill_read(const void *data, size_t size, strl_arena *arena,
         pm->palette_count == 0 || pm->palette_count > STRL_PM_MAX_PALETTE || vertices > pm->vertex_count ||
         triangles > pm->triangle_count || pm->step_count > pm->vertex_count - vertices)
         return strl__fail(err, STRL_ERR_INTERNAL, "a node's progressive mesh in scratch is damaged");
-    if (!strl_pm_create(pm, flags & HAS_COLOURS, flags & HAS_PALETTE, arena))
+    if (!strl_pm_create(pm, flags & HAS_COLOURS, flags & HAS_PALETTE, flags & HAS_TEXCOORDS, arena))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", pm->triangle_count);
     pm->vertex_end[0] = vertices;
     pm->triangle_end[0] = triangles;

@@ -150,14 +150,30 @@ static bool palette_id(palette_table *table, strl_ingest *ingest, uint32_t part,
     return true;
 }
 
-/* False where two corners fall into one lattice cell. */
-static bool to_lattice(const strl_ingest *ingest, const strl_triangle *in, strl_soup_triangle *out, bool *lacks_normals)
+/* Over the range that the survey has found for the material. */
+static uint32_t texcoord_code(const strl_reader_image *image, const float texcoord[2])
 {
+    uint32_t code[2];
+    for (int k = 0; k < 2; k++) {
+        double extent = (double)(image->texcoord_max[k] - image->texcoord_min[k]);
+        double at = extent > 0 ? ((double)texcoord[k] - (double)image->texcoord_min[k]) / extent * STRL_TEXCOORD_MOST : 0;
+        code[k] = (uint32_t)nearbyint(fmin(fmax(at, 0), STRL_TEXCOORD_MOST));
+    }
+    return code[0] | code[1] << 16;
+}
+
+/* False where two corners fall into one lattice cell. */
+static bool to_lattice(const strl_ingest *ingest, const strl_reader *reader, const strl_triangle *in,
+                       strl_soup_triangle *out, bool *lacks_normals)
+{
+    strl_reader_image image;
+    bool has_texcoord = (in->flags & STRL_TRIANGLE_HAS_TEXCOORD) && strl_reader_material_image(reader, in->material, &image);
     for (int c = 0; c < 3; c++) {
         strl_soup_corner *corner = &out->corner[c];
         const float *n = in->normal[c];
         quantise(ingest, in->position[c], corner->position);
         corner->colour = in->flags & STRL_TRIANGLE_HAS_COLOUR ? in->colour[c] : 0xffffffffu;
+        corner->texcoord = has_texcoord ? texcoord_code(&image, in->texcoord[c]) : 0;
         corner->normal[0] = corner->normal[1] = STRL_NORMAL_MISSING;
         float length2 = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
         if ((in->flags & STRL_TRIANGLE_HAS_NORMAL) && length2 > 0 && length2 < INFINITY)
@@ -183,6 +199,7 @@ typedef struct distribution {
     strl_ingest *ingest;
     bucket_set *buckets;
     palette_table table;
+    const strl_reader *reader; /* whose batches come */
     uint32_t part_base, material_base;
     size_t record_bytes;
     distributed *slots; /* [window of the pass] */
@@ -211,7 +228,7 @@ static strl_status place_batch(void *user, const strl_triangle_batch *batch, uns
     for (size_t i = 0; i < batch->count; i++) {
         strl_soup_triangle triangle = {.palette = 0};
         out->bucket[i] = COLLAPSED;
-        if (!to_lattice(ingest, &batch->triangle[i], &triangle, &out->lacks_normals)) {
+        if (!to_lattice(ingest, d->reader, &batch->triangle[i], &triangle, &out->lacks_normals)) {
             out->longest2 = fmax(out->longest2, longest_edge2(&batch->triangle[i]));
             continue;
         }
@@ -251,6 +268,34 @@ static strl_status put_batch(void *user, const strl_triangle_batch *batch, unsig
                   : strl__build_report(d->context, ingest->triangle_count, d->context->result->triangles_in, err);
 }
 
+bool strl__ingest_add_image(strl_names *materials, size_t material, const strl_material_image *image)
+{
+    const size_t before = materials->image_capacity;
+    if (!strl__grow(&materials->images, &materials->image_capacity, material + 1, sizeof *materials->images))
+        return false;
+    if (materials->image_capacity > before)
+        memset(materials->images + before, 0, (materials->image_capacity - before) * sizeof *materials->images);
+    strl_material_image *added = &materials->images[material];
+    *added = *image;
+    for (int k = 0; k < 2 && !(image->texcoord_extent[k] >= 0); k++) /* no triangle has any */
+        added->texcoord_min[0] = added->texcoord_min[1] = added->texcoord_extent[0] = added->texcoord_extent[1] = 0;
+    added->reference = strl__strdup(image->reference);
+    return added->reference != NULL;
+}
+
+/* Materials after the last one with an image have no place among the images. */
+bool strl__ingest_fill_images(strl_names *materials)
+{
+    const size_t before = materials->image_capacity;
+    if (!materials->images)
+        return true;
+    if (!strl__grow(&materials->images, &materials->image_capacity, materials->count, sizeof *materials->images))
+        return false;
+    if (materials->image_capacity > before)
+        memset(materials->images + before, 0, (materials->image_capacity - before) * sizeof *materials->images);
+    return true;
+}
+
 static bool add_name(strl_names *names, const char *prefix, const char *name, uint32_t rgba, bool material)
 {
     if (!strl__grow(&names->items, &names->capacity, names->count + 1, sizeof *names->items) ||
@@ -279,6 +324,13 @@ static strl_status add_names(distribution *d, const strl_reader *reader, uint32_
         uint32_t rgba;
         const char *name = strl_reader_material(reader, i, &rgba);
         good = add_name(&d->ingest->materials, "", name, rgba, true);
+        strl_reader_image image;
+        if (good && strl_reader_material_image(reader, i, &image))
+            good = strl__ingest_add_image(&d->ingest->materials, d->ingest->materials.count - 1, &(strl_material_image){
+                .reference = image.reference, .wrap = {(strl_wrap)image.wrap[0], (strl_wrap)image.wrap[1]},
+                .texcoord_min = {image.texcoord_min[0], image.texcoord_min[1]},
+                .texcoord_extent = {image.texcoord_max[0] - image.texcoord_min[0],
+                                    image.texcoord_max[1] - image.texcoord_min[1]}});
     }
     return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for the names of %s", desc->inputs[input]);
 }
@@ -309,6 +361,7 @@ static strl_status distribute_inputs(distribution *d, strl_reader *const *reader
     for (uint32_t i = 0; i < d->context->desc->input_count && !status; i++) {
         d->part_base = (uint32_t)d->ingest->parts.count;
         d->material_base = (uint32_t)d->ingest->materials.count;
+        d->reader = readers[i];
         status = strl_reader_rewind(readers[i], err);
         if (!status)
             status = strl__batch_pass_run(&pass, readers[i], err);
@@ -333,6 +386,8 @@ strl_status strl__distribute(strl_build_context *context, strl_reader *const *re
     strl_status status = open_buckets(context, survey, ingest, buckets, err);
     if (!status)
         status = distribute_inputs(&d, readers, err);
+    if (!status && !strl__ingest_fill_images(&ingest->materials))
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the images of %zu materials", ingest->materials.count);
     for (size_t i = 0; i < ingest->palette_count && !status; i++)
         ingest->palette[i].rgba = ingest->materials.rgba[ingest->palette[i].material];
     if (!status && ingest->triangle_count == 0)

@@ -101,14 +101,17 @@ static void note_drops(strl_build_context *context, strl_reader *const *readers)
 
 /* Scratch of a build, most of it spilled triangles and base meshes. */
 #define SCRATCH_BYTES_OF_TRIANGLE 80u
+/* More of it where there are texture coordinates, which is known after the survey. */
+#define SCRATCH_BYTES_OF_TEXCOORDS 24u
 
 /* Of one input, for sums that do not overflow; no disk holds their scratch. */
 #define MOST_TRIANGLES ((uint64_t)1 << 48)
 
 /* Before anything is written: a build that cannot end should not begin. */
-static strl_status check_disk(const strl_build_context *context, uint64_t triangles, strl_error *err)
+static strl_status check_disk(const strl_build_context *context, uint64_t triangles, bool has_texcoords, strl_error *err)
 {
-    uint64_t free_bytes, needed = triangles * SCRATCH_BYTES_OF_TRIANGLE;
+    uint64_t free_bytes,
+        needed = triangles * (SCRATCH_BYTES_OF_TRIANGLE + (has_texcoords ? SCRATCH_BYTES_OF_TEXCOORDS : 0));
     strl_status status = strl_path_free_bytes(context->scratch_dir, &free_bytes, err);
     if (!status && free_bytes < needed)
         status = strl__fail(err, STRL_ERR_DISK_FULL, "%s has %" PRIu64 " bytes free, expected %" PRIu64 " for the scratch of %" PRIu64
@@ -156,7 +159,7 @@ static strl_status tell_estimate(strl_build_context *context, strl_reader *const
     strl_status status = strl_path_free_bytes(context->scratch_dir, &estimate.scratch_free_bytes, err);
     if (!status && context->desc->estimate)
         context->desc->estimate(context->desc->context, &estimate);
-    return status ? status : check_disk(context, certain, err);
+    return status ? status : check_disk(context, certain, false, err);
 }
 
 strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, strl_error *err)
@@ -186,13 +189,14 @@ strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, st
         context->keep = false;
         goto done;
     }
-    status = check_disk(context, survey.triangles, err);
+    status = check_disk(context, survey.triangles, survey.any_texcoord, err);
     if (!status)
         status = strl__ingest_check_memory(context, survey.triangles, err);
     if (status)
         goto done;
     ingest->has_normals = survey.any_normal;
     ingest->has_colours = survey.any_colour;
+    ingest->has_texcoords = survey.any_texcoord;
     status = strl__survey_choose_lattice(context, &survey, ingest, err);
     if (status)
         goto done;
@@ -234,9 +238,13 @@ strl_status strl_ingest_drop(strl_spill **stream, strl_error *err)
 
 static void names_deinit(strl_names *names)
 {
-    for (size_t i = 0; i < names->count; i++)
+    for (size_t i = 0; i < names->count; i++) {
         strl__free(names->items[i]);
+        if (names->images)
+            strl__free((char *)names->images[i].reference);
+    }
     strl__free(names->items);
+    strl__free(names->images);
     strl__free(names->rgba);
     *names = (strl_names){0};
 }

@@ -10,6 +10,7 @@
 #define STRL_BUILD_INGEST_INGEST_H
 
 #include "build/context.h"
+#include "container/writer.h"
 
 /* No normal was given: it is computed where all triangles round the vertex are at hand. */
 #define STRL_NORMAL_MISSING 0xffffu
@@ -19,6 +20,7 @@ typedef struct strl_soup_corner {
     uint32_t position[3]; /* lattice cells from the tree's origin, below 2^31 */
     uint16_t normal[2];   /* octahedral, or STRL_NORMAL_MISSING */
     uint32_t colour;      /* sRGB-encoded RGBA8 */
+    uint32_t texcoord;    /* two codes of 16 bits over the range of the material's image, u lowest; 0 where it has none */
 } strl_soup_corner;
 
 typedef struct strl_soup_triangle {
@@ -40,7 +42,8 @@ typedef struct strl_cell_edge {
 typedef struct strl_names {
     char **items; /* owned */
     uint32_t *rgba; /* of materials; NULL for parts */
-    size_t count, capacity, rgba_capacity;
+    strl_material_image *images; /* of materials, references owned; NULL where no material has one */
+    size_t count, capacity, rgba_capacity, image_capacity;
 } strl_names;
 
 typedef struct strl_ingest {
@@ -52,7 +55,7 @@ typedef struct strl_ingest {
     float leaf_error;         /* lattice units: what quantisation moves a point at most */
     strl_axis up;
     char unit[16];            /* "" = unknown */
-    bool has_normals, has_colours;
+    bool has_normals, has_colours, has_texcoords;
     bool lacks_normals;       /* some corner has none */
     uint64_t triangle_count;  /* kept */
     strl_spill *soup;         /* triangle_count records, packed (see soup.h) */

@@ -11,6 +11,7 @@
 #define CELL_BYTES 4u
 #define PALETTE_BYTES 8u
 #define NUMBER_BYTES 116u /* what write_numbers writes */
+#define IMAGE_BYTES 28u
 #define MOST_CURVE_SHIFT 31u
 
 /* ---- writing ---- */
@@ -23,7 +24,7 @@ static void write_numbers(const strl_ingest *ingest, strl_writer *writer)
     strl_writer_f32(writer, ingest->leaf_error);
     strl_writer_u8(writer, (uint8_t)ingest->up);
     strl_writer_bytes(writer, ingest->unit, sizeof ingest->unit);
-    strl_writer_u8(writer, (uint8_t)(ingest->has_normals | ingest->has_colours << 1 | ingest->lacks_normals << 2));
+    strl_writer_u8(writer, (uint8_t)(ingest->has_normals | ingest->has_colours << 1 | ingest->lacks_normals << 2 | ingest->has_texcoords << 3));
     strl_writer_u64(writer, ingest->triangle_count);
     strl_writer_u32(writer, ingest->cell_count);
     strl_writer_u64(writer, ingest->palette_count);
@@ -44,6 +45,27 @@ static strl_status write_names(const strl_names *names, strl_saved_writer *saved
     return status;
 }
 
+/* Each with its material. */
+static strl_status write_images(const strl_names *materials, strl_saved_writer *saved, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    for (size_t i = 0; materials->images && i < materials->count && !status; i++) {
+        const strl_material_image *image = &materials->images[i];
+        if (!image->reference)
+            continue;
+        strl_writer_u32(&saved->bytes, (uint32_t)i);
+        strl_writer_u32(&saved->bytes, (uint32_t)image->wrap[0] | (uint32_t)image->wrap[1] << 8);
+        for (int k = 0; k < 2; k++) {
+            strl_writer_f32(&saved->bytes, image->texcoord_min[k]);
+            strl_writer_f32(&saved->bytes, image->texcoord_extent[k]);
+        }
+        strl_writer_u32(&saved->bytes, (uint32_t)strlen(image->reference));
+        strl_writer_bytes(&saved->bytes, image->reference, strlen(image->reference));
+        status = strl_saved_put(saved, err);
+    }
+    return status;
+}
+
 static strl_status write_ingest(const strl_ingest *ingest, strl_saved_writer *saved, strl_error *err)
 {
     strl_status status = STRL_OK;
@@ -59,7 +81,9 @@ static strl_status write_ingest(const strl_ingest *ingest, strl_saved_writer *sa
     }
     if (!status)
         status = write_names(&ingest->parts, saved, err);
-    return status ? status : write_names(&ingest->materials, saved, err);
+    if (!status)
+        status = write_names(&ingest->materials, saved, err);
+    return status ? status : write_images(&ingest->materials, saved, err);
 }
 
 static strl_status write_edges(const strl_ingest *ingest, strl_saved_writer *saved, strl_error *err)
@@ -105,13 +129,14 @@ static bool read_numbers(strl_cursor *cursor, strl_ingest *ingest)
     ingest->has_normals = flags & 1;
     ingest->has_colours = flags >> 1 & 1;
     ingest->lacks_normals = flags >> 2 & 1;
+    ingest->has_texcoords = flags >> 3 & 1;
     ingest->triangle_count = strl_cursor_u64(cursor);
     ingest->cell_count = strl_cursor_u32(cursor);
     ingest->palette_count = (size_t)strl_cursor_u64(cursor);
     ingest->parts.count = ingest->materials.count = 0; /* grow with the names */
     bool finite = isfinite(ingest->origin[0]) && isfinite(ingest->origin[1]) && isfinite(ingest->origin[2]);
     return finite && ingest->step > 0 && isfinite(ingest->step) && ingest->leaf_error > 0 &&
-           isfinite(ingest->leaf_error) && ingest->curve_shift <= MOST_CURVE_SHIFT && up < 3 && flags < 8;
+           isfinite(ingest->leaf_error) && ingest->curve_shift <= MOST_CURVE_SHIFT && up < 3 && flags < 16;
 }
 
 static strl_status read_cells(strl_saved_reader *saved, strl_ingest *ingest, strl_error *err)
@@ -193,6 +218,34 @@ static strl_status read_names(strl_saved_reader *saved, strl_ingest *ingest, uin
     return status;
 }
 
+static strl_status read_image(strl_saved_reader *saved, strl_names *materials, strl_error *err)
+{
+    strl_material_image image = {0};
+    char reference[1024];
+    strl_status status = strl_saved_get(saved, IMAGE_BYTES, err);
+    if (status)
+        return status;
+    uint32_t material = strl_cursor_u32(&saved->cursor), wrap = strl_cursor_u32(&saved->cursor);
+    for (int k = 0; k < 2; k++) {
+        image.wrap[k] = (strl_wrap)(wrap >> 8 * k & 255);
+        image.texcoord_min[k] = strl_cursor_f32(&saved->cursor);
+        image.texcoord_extent[k] = strl_cursor_f32(&saved->cursor);
+    }
+    uint32_t length = strl_cursor_u32(&saved->cursor);
+    if (material >= materials->count || length >= sizeof reference || (wrap & 0xff) > STRL_WRAP_MIRROR ||
+        wrap >> 8 > STRL_WRAP_MIRROR || (materials->images && material < materials->image_capacity && materials->images[material].reference))
+        return strl_saved_fail("the image of a material", err);
+    status = strl_saved_get(saved, length, err);
+    if (status)
+        return status;
+    memcpy(reference, strl_cursor_take(&saved->cursor, length), length);
+    reference[length] = 0;
+    image.reference = reference;
+    return strl__ingest_add_image(materials, material, &image)
+               ? STRL_OK
+               : strl__fail(err, STRL_ERR_MEMORY, "no memory for the images of the materials");
+}
+
 static strl_status read_ingest(strl_saved_reader *saved, strl_ingest *ingest, strl_error *err)
 {
     strl_status status = strl_saved_get(saved, NUMBER_BYTES, err);
@@ -206,7 +259,11 @@ static strl_status read_ingest(strl_saved_reader *saved, strl_ingest *ingest, st
         status = read_palette(saved, ingest, err);
     if (!status)
         status = read_names(saved, ingest, parts, materials, err);
-    return status || !strl_saved_left(saved) ? status : strl_saved_fail("the length of a stage", err);
+    while (!status && strl_saved_left(saved))
+        status = read_image(saved, &ingest->materials, err);
+    if (!status && !strl__ingest_fill_images(&ingest->materials))
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the images of the materials");
+    return status;
 }
 
 static strl_status read_edges(strl_saved_reader *saved, strl_ingest *ingest, strl_error *err)

@@ -10,7 +10,7 @@
 typedef struct model_survey {
     double min[3], max[3];
     uint64_t triangles;            /* as the readers gave them */
-    bool any_normal, any_colour;
+    bool any_normal, any_colour, any_texcoord;
     uint64_t *edge_histogram;      /* [EDGE_BINS] of squared edge lengths */
     double (*sample)[3];           /* [SAMPLE_CAPACITY] centroids, one of sample_stride triangles */
     uint32_t sample_count;
@@ -37,6 +37,11 @@ strl_status strl__ingest_refuse_collapsed(const strl_build_context *context, con
                                           uint64_t collapsed, strl_error *err);
 /* Tells and counts what is built although something is amiss. */
 void strl__ingest_warn(strl_build_context *context, strl_reader *const *readers, const strl_ingest *ingest);
+
+/* The image of a material, in order of the materials; a copy is taken. Then, when all materials are there, images has a
+ * place for each. False without memory. */
+bool strl__ingest_add_image(strl_names *materials, size_t material, const strl_material_image *image);
+bool strl__ingest_fill_images(strl_names *materials);
 
 /* Position on the curve of a lattice point. */
 uint64_t strl__curve_key(const strl_ingest *ingest, const uint32_t position[3]);

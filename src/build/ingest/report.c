@@ -135,10 +135,30 @@ strl_status strl__ingest_check_empty(strl_build_context *context, strl_reader *c
     return STRL_OK;
 }
 
+/* One sentence for them all, of the first. */
+static void warn_of_images(strl_build_context *context, strl_reader *const *readers)
+{
+    uint64_t count = 0;
+    uint32_t first = 0;
+    for (uint32_t i = context->desc->input_count; i-- > 0;) {
+        const uint32_t here = strl_reader_missing_image_count(readers[i]);
+        first = here ? i : first;
+        count += here;
+    }
+    context->result->missing_images = count;
+    if (count == 1)
+        warn(context, "%s: %s; its material has its colour alone", context->desc->inputs[first],
+             strl_reader_missing_image(readers[first]));
+    else if (count)
+        warn(context, "%s: %s, and %" PRIu64 " more image%s cannot be used; their materials have their colours alone",
+             context->desc->inputs[first], strl_reader_missing_image(readers[first]), count - 1, count == 2 ? "" : "s");
+}
+
 void strl__ingest_warn(strl_build_context *context, strl_reader *const *readers, const strl_ingest *ingest)
 {
     warn_of_missing(context, readers);
     warn_of_unread(context, readers);
+    warn_of_images(context, readers);
     if (!ingest->is_coarse)
         return;
     char inputs[STRL_INPUTS_NAME_BYTES];

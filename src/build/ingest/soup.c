@@ -5,10 +5,10 @@
 #include "base/fail.h"
 #include "build/ingest/internal.h"
 
-/* Positions 36 bytes, normals 8, colours 12, the palette last: the sorted soup goes without it where there is but one. */
+/* Positions 36 bytes, normals 8, colours 12, texture coordinates 12, the palette last: the sorted soup goes without it where there is but one. */
 size_t strl__soup_bucket_bytes(const strl_ingest *ingest)
 {
-    return 40u + (ingest->has_normals ? 8u : 0) + (ingest->has_colours ? 12u : 0);
+    return 40u + (ingest->has_normals ? 8u : 0) + (ingest->has_colours ? 12u : 0) + (ingest->has_texcoords ? 12u : 0);
 }
 
 size_t strl_soup_bytes(const strl_ingest *ingest)
@@ -47,6 +47,8 @@ void strl__soup_pack(const strl_ingest *ingest, const strl_soup_triangle *triang
     }
     for (int c = 0; c < 3 && ingest->has_colours; c++, bytes += 4)
         memcpy(bytes, &triangle->corner[c].colour, 4);
+    for (int c = 0; c < 3 && ingest->has_texcoords; c++, bytes += 4)
+        memcpy(bytes, &triangle->corner[c].texcoord, 4);
     memcpy(bytes, &triangle->palette, 4);
 }
 
@@ -70,6 +72,13 @@ static const uint8_t *unpack_corners(const strl_ingest *ingest, const uint8_t *b
         triangle->corner[c].colour = 0xffffffffu;
         if (ingest->has_colours) {
             memcpy(&triangle->corner[c].colour, bytes, 4);
+            bytes += 4;
+        }
+    }
+    for (int c = 0; c < 3; c++) {
+        triangle->corner[c].texcoord = 0;
+        if (ingest->has_texcoords) {
+            memcpy(&triangle->corner[c].texcoord, bytes, 4);
             bytes += 4;
         }
     }

@@ -22,7 +22,7 @@
 /* What one worker has seen: no order in it. */
 typedef struct tally {
     double min[3], max[3];
-    bool any_normal, any_colour;
+    bool any_normal, any_colour, any_texcoord;
     uint64_t *edge_histogram; /* [EDGE_BINS] */
 } tally;
 
@@ -72,6 +72,7 @@ static void look_at(tally *s, const strl_triangle *triangle)
         }
     s->any_normal |= (triangle->flags & STRL_TRIANGLE_HAS_NORMAL) != 0;
     s->any_colour |= (triangle->flags & STRL_TRIANGLE_HAS_COLOUR) != 0;
+    s->any_texcoord |= (triangle->flags & STRL_TRIANGLE_HAS_TEXCOORD) != 0;
     count_edges(s->edge_histogram, triangle);
 }
 
@@ -123,6 +124,7 @@ static void gather_tallies(const surveying *s, unsigned workers)
         }
         survey->any_normal |= one->any_normal;
         survey->any_colour |= one->any_colour;
+        survey->any_texcoord |= one->any_texcoord;
         for (uint32_t i = 0; i < EDGE_BINS; i++)
             survey->edge_histogram[i] += one->edge_histogram[i];
     }
