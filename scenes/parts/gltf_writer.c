@@ -25,6 +25,10 @@ enum {
     UNSIGNED_INT = 5125
 };
 
+/* In the first bytes of each file. */
+#define GENERATOR "\"generator\":\"stroll scene\""
+enum { OWN_HEAD_BYTES = 256 };
+
 /* JSON arrays that are written beside each other. */
 enum { NODES, MESHES, ACCESSORS, VIEWS, BUFFERS, ROOTS, ARRAYS };
 
@@ -47,6 +51,7 @@ typedef struct open_node {
 typedef struct gltf_writer {
     strl__parts_writer base;
     strl__parts_desc desc;
+    bool replaces_own; /* an older model of this writer's has the name */
     strl_output *gltf;
     strl_output **bins; /* owned; the last one is being written */
     size_t bin_capacity, bin_count;
@@ -352,11 +357,10 @@ static strl_status append_array(gltf_writer *self, const char *head, int array, 
 static strl_status write_head(gltf_writer *self, strl_error *err)
 {
     strl__stream *text = &self->bin;
-    strl_status status =
-        strl__json_print(text, err,
-                         "{\"asset\":{\"version\":\"2.0\",\"generator\":\"stroll scene\"},\"scene\":0,\"scenes\":"
-                         "[{\"nodes\":[%" PRIu64 "]}],\n\"materials\":[",
-                         self->counts[NODES]);
+    strl_status status = strl__json_print(text, err,
+                                          "{\"asset\":{\"version\":\"2.0\"," GENERATOR "},\"scene\":0,\"scenes\":"
+                                          "[{\"nodes\":[%" PRIu64 "]}],\n\"materials\":[",
+                                          self->counts[NODES]);
     for (unsigned i = 0; status == STRL_OK && i < self->desc.material_count; i++) {
         status = strl__json_print(text, err, "%s\n", i ? "," : "");
         if (status == STRL_OK)
@@ -387,6 +391,34 @@ static strl_status write_gltf(gltf_writer *self, strl_output_report report, void
     return status == STRL_OK ? strl__stream_flush(&self->bin, err) : status;
 }
 
+/* Whether a file of this name is there that this program has made: then the buffers beside it are its own, too. */
+static bool is_own_model(const char *path)
+{
+    char head[OWN_HEAD_BYTES] = "";
+    strl_file *file = NULL;
+    size_t got = 0;
+    const bool read = strl_file_open(path, &file, NULL) == STRL_OK &&
+                      strl_file_read_some(file, 0, head, sizeof head, &got, NULL) == STRL_OK;
+    strl_file_close(file, NULL);
+    return read && memmem(head, got, GENERATOR, strlen(GENERATOR)) != NULL;
+}
+
+/* Of an older model that had more buffers than the new one. */
+static strl_status remove_older_bins(const gltf_writer *self, strl_error *err)
+{
+    bool there = self->replaces_own;
+    strl_status status = STRL_OK;
+    for (uint64_t number = self->bin_count; there && status == STRL_OK; number++) {
+        char *path = bin_path(self, number);
+        if (!path)
+            return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", self->desc.path);
+        there = strl_path_exists(path);
+        status = there ? strl_path_remove(path, err) : STRL_OK;
+        strl__free(path);
+    }
+    return status;
+}
+
 /* The .gltf gets its name last: who sees it finds its buffers. */
 static strl_status finish(strl__parts_writer *base, strl_output_report report, void *context, strl_error *err)
 {
@@ -402,7 +434,9 @@ static strl_status finish(strl__parts_writer *base, strl_output_report report, v
         base->bytes += strl_file_bytes(strl_output_file(self->bins[i]));
     for (size_t i = 0; status == STRL_OK && i < self->bin_count; i++)
         status = strl_output_finish(self->bins[i], false, err);
-    return status == STRL_OK ? strl_output_finish(self->gltf, false, err) : status;
+    if (status == STRL_OK)
+        status = strl_output_finish(self->gltf, false, err);
+    return status == STRL_OK ? remove_older_bins(self, err) : status;
 }
 
 static void destroy(strl__parts_writer *base)
@@ -445,6 +479,7 @@ strl_status strl__gltf_writer_create(const strl__parts_desc *desc, strl__parts_w
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for the writer", desc->path);
     self->base = (strl__parts_writer){open_group, put_part, close_group, finish, destroy, 0, 0, 0, 0};
     self->desc = *desc;
+    self->replaces_own = is_own_model(desc->path);
     strl_status status = open_files(self, err);
     if (status != STRL_OK) {
         destroy(&self->base);

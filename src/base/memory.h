@@ -19,7 +19,7 @@ char *strl__strdup(const char *text);
 /* Test hook: the n-th allocation from now (1 = next) and all after it fail; 0 switches the hook off. Process-wide. */
 void strl__alloc_fail_after(uint64_t n);
 
-/* Makes room for `need` items in a growing array: *items with capacity *capacity of item_size bytes. Doubles. */
+/* Makes room for `need` items in a growing array: *items with capacity *capacity of item_size bytes. Grows by half. */
 bool strl__grow(void *items_pointer, size_t *capacity, size_t need, size_t item_size);
 
 /* Arena: bump allocation, released as a whole. Not thread-safe; one per job. */

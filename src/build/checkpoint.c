@@ -12,7 +12,7 @@
 
 /* The file: magic, format, checksum of the rest, then the rest. */
 static const char MAGIC[8] = {'s', 't', 'r', 'l', 's', 't', 'o', 'p'};
-#define FORMAT 6u /* changes with whatever any builder saves */
+#define FORMAT 7u /* changes with whatever any builder saves */
 #define HEAD_BYTES 20u
 #define MOST_BYTES (UINT64_C(1) << 32)
 
@@ -59,7 +59,7 @@ strl_status strl__checkpoint_write(strl_build_context *context, const strl_write
     strl_writer_bytes(&file, MAGIC, sizeof MAGIC);
     strl_writer_u32(&file, FORMAT);
     strl_writer_u64(&file, 0); /* its checksum */
-    strl_status status = strl__request_write(context->desc, &file, err);
+    strl_status status = strl__request_write(context, &file, err);
     write_counters(context, &file);
     strl_writer_u32(&file, (uint32_t)words->size);
     strl_writer_bytes(&file, words->data, words->size);
@@ -175,7 +175,7 @@ static strl_status read_all(strl_build_context *context, const char *path, strl_
     if (!status)
         status = check_head(path, &cursor, err);
     if (!status)
-        status = strl__request_compare(context->desc, &cursor, err);
+        status = strl__request_compare(context, &cursor, err);
     if (!status)
         status = read_counters(context, &cursor, err);
     if (!status)

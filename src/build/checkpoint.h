@@ -22,8 +22,10 @@ strl_status strl__checkpoint_read(strl_build_context *context, strl_error *err);
 
 /* ---- the request (request.c) ---- */
 /* All that the output's bytes depend on, but for the memory. */
-strl_status strl__request_write(const strl_build_desc *desc, strl_writer *writer, strl_error *err);
-/* Refuses a request that differs from the saved one, with what does. */
-strl_status strl__request_compare(const strl_build_desc *desc, strl_cursor *saved, strl_error *err);
+strl_status strl__request_write(const strl_build_context *context, strl_writer *writer, strl_error *err);
+/* Refuses a request that differs from the saved one, with what does. Takes over the files that the inputs name. */
+strl_status strl__request_compare(strl_build_context *context, strl_cursor *saved, strl_error *err);
+/* Adds the files beside an input that were read for it to what a request tells. */
+strl_status strl__request_note_beside(strl_build_context *context, const strl_reader *reader, strl_error *err);
 
 #endif

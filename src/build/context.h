@@ -21,6 +21,9 @@ typedef struct strl_build_context {
     bool keep;             /* checkpoints are made (checkpoint.h); settled when the survey is done */
     bool has_checkpoint;   /* there is one in the scratch folder */
     strl_writer resumed;   /* the builder's words in the checkpoint to go on with; empty = from the beginning */
+    uint64_t spool_bytes;  /* of scratch that readers hold now */
+    strl_writer beside;    /* files that inputs name and that were read, as in a checkpoint; empty = none */
+    uint32_t beside_count;
     strl_build_progress progress;
     strl_estimate estimate;
     uint64_t stage_ns, stage_cpu_ns; /* when the stage under way began, by the clock and by the processor */
@@ -35,6 +38,9 @@ void strl__build_expect(strl_build_context *context, uint64_t triangles);
 
 /* A stream that a checkpoint needs: one that is kept where checkpoints are made. */
 strl_status strl__build_open_stream(strl_build_context *context, const char *name, strl_spill **spill, strl_error *err);
+
+/* So much scratch was taken at once until now, what readers hold included. */
+void strl__build_note_scratch(strl_build_context *context);
 
 /* The stages of the builder `clusters`. */
 strl_status strl__clusters_run(strl_build_context *context, strl_error *err);

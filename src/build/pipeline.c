@@ -195,6 +195,13 @@ static strl_status tell_way_on(const strl_build_context *context, bool resumes, 
     return strl__fail(err, status, "%s", sentence);
 }
 
+void strl__build_note_scratch(strl_build_context *context)
+{
+    uint64_t taken = context->spool_bytes + strl_spill_set_peak_bytes(context->spills);
+    if (taken > context->result->scratch_bytes)
+        context->result->scratch_bytes = taken;
+}
+
 static strl_status run_in_scratch(strl_build_context *context, strl_scratch *scratch, strl_error *err)
 {
     const strl_build_desc *desc = context->desc;
@@ -207,10 +214,11 @@ static strl_status run_in_scratch(strl_build_context *context, strl_scratch *scr
         status = strl__clusters_run(context, err);
     end_stage(context);
     if (context->spills)
-        context->result->scratch_bytes += strl_spill_set_peak_bytes(context->spills);
+        strl__build_note_scratch(context);
     strl_spill_set_destroy(context->spills);
     strl_pool_destroy(context->pool);
     strl__free(context->resumed.data);
+    strl__free(context->beside.data);
     return status;
 }
 

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/memory.h"
 #include "build/checkpoint.h"
 #include "platform/file.h"
 #include "stroll/version.h"
@@ -14,8 +15,16 @@ static void write_text(strl_writer *writer, const char *text)
     strl_writer_bytes(writer, text, length);
 }
 
-strl_status strl__request_write(const strl_build_desc *desc, strl_writer *writer, strl_error *err)
+static void write_file(strl_writer *writer, const char *path, const strl_file_info *info)
 {
+    write_text(writer, path);
+    strl_writer_u64(writer, info->bytes);
+    strl_writer_u64(writer, info->modified_ns);
+}
+
+strl_status strl__request_write(const strl_build_context *context, strl_writer *writer, strl_error *err)
+{
+    const strl_build_desc *desc = context->desc;
     write_text(writer, STRL_VERSION);
     strl_writer_f64(writer, desc->grid);
     strl_writer_u8(writer, desc->compact);
@@ -29,11 +38,24 @@ strl_status strl__request_write(const strl_build_desc *desc, strl_writer *writer
         strl_status status = strl_path_stat(desc->inputs[i], &info, err);
         if (status)
             return status;
-        write_text(writer, desc->inputs[i]);
-        strl_writer_u64(writer, info.bytes);
-        strl_writer_u64(writer, info.modified_ns);
+        write_file(writer, desc->inputs[i], &info);
     }
+    strl_writer_u32(writer, context->beside_count);
+    strl_writer_bytes(writer, context->beside.data, context->beside.size);
     return STRL_OK; /* the writer's failure is its owner's to see */
+}
+
+strl_status strl__request_note_beside(strl_build_context *context, const strl_reader *reader, strl_error *err)
+{
+    const uint32_t count = strl_reader_beside_count(reader);
+    for (uint32_t i = 0; i < count; i++) {
+        strl_file_info info;
+        const char *path = strl_reader_beside(reader, i, &info);
+        write_file(&context->beside, path, &info);
+        context->beside_count++;
+    }
+    return context->beside.failed ? strl__fail(err, STRL_ERR_MEMORY, "no memory for the names of %u files", count)
+                                  : STRL_OK;
 }
 
 /* A saved text, not terminated. */
@@ -99,14 +121,11 @@ static strl_status compare_options(const strl_build_desc *desc, strl_cursor *sav
     return status;
 }
 
-static strl_status compare_input(const char *path, strl_cursor *saved, strl_error *err)
+/* A file's facts, against those that are saved next. */
+static strl_status compare_file(const char *path, strl_cursor *saved, strl_error *err)
 {
-    saved_text name = read_text(saved);
     uint64_t bytes = strl_cursor_u64(saved), modified_ns = strl_cursor_u64(saved);
     strl_file_info info;
-    if (!is_same(name, path))
-        return strl__fail(err, STRL_ERR_ARGUMENT, "an input is %.120s, in the build to be resumed it was %.*s", path,
-                          shown(name), name.text);
     strl_status status = strl_path_stat(path, &info, err);
     if (status)
         return status;
@@ -119,8 +138,48 @@ static strl_status compare_input(const char *path, strl_cursor *saved, strl_erro
     return STRL_OK;
 }
 
-strl_status strl__request_compare(const strl_build_desc *desc, strl_cursor *saved, strl_error *err)
+static strl_status compare_input(const char *path, strl_cursor *saved, strl_error *err)
 {
+    saved_text name = read_text(saved);
+    if (!is_same(name, path))
+        return strl__fail(err, STRL_ERR_ARGUMENT, "an input is %.120s, in the build to be resumed it was %.*s", path,
+                          shown(name), name.text);
+    return compare_file(path, saved, err);
+}
+
+/* No option names these: an input does. */
+static strl_status compare_beside(strl_cursor *saved, strl_error *err)
+{
+    saved_text name = read_text(saved);
+    char *path = strl__alloc((size_t)name.length + 1, 1);
+    if (!path)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
+    memcpy(path, name.text, name.length);
+    path[name.length] = 0;
+    strl_status status = compare_file(path, saved, err);
+    strl__free(path);
+    return status;
+}
+
+static strl_status compare_all_beside(strl_build_context *context, strl_cursor *saved, strl_error *err)
+{
+    const uint32_t count = strl_cursor_u32(saved);
+    const size_t left = strl_cursor_left(saved);
+    const uint8_t *start = saved->data + (saved->size - left);
+    strl_status status = STRL_OK;
+    for (uint32_t i = 0; i < count && !status; i++)
+        status = compare_beside(saved, err);
+    if (status)
+        return status;
+    strl_writer_bytes(&context->beside, start, left - strl_cursor_left(saved));
+    context->beside_count = count;
+    return context->beside.failed ? strl__fail(err, STRL_ERR_MEMORY, "no memory for the names of %u files", count)
+                                  : STRL_OK;
+}
+
+strl_status strl__request_compare(strl_build_context *context, strl_cursor *saved, strl_error *err)
+{
+    const strl_build_desc *desc = context->desc;
     saved_text version = read_text(saved);
     if (!is_same(version, STRL_VERSION))
         return strl__fail(err, STRL_ERR_FORMAT, "this is version %s, the build to be resumed was made by version %.*s",
@@ -132,5 +191,5 @@ strl_status strl__request_compare(const strl_build_desc *desc, strl_cursor *save
                           desc->input_count, count);
     for (uint32_t i = 0; i < count && !status; i++)
         status = compare_input(desc->inputs[i], saved, err);
-    return status;
+    return status ? status : compare_all_beside(context, saved, err);
 }

@@ -133,6 +133,18 @@ static void add_up(strl__gltf *gltf)
     reader->listed_vertices = gltf->vertices;
 }
 
+/* Images have what tables leave of the half, a quarter of all at most. */
+static void share_out(strl__gltf *gltf)
+{
+    strl__textures *textures = &gltf->reader->textures;
+    gltf->table_bytes += textures->capacity * sizeof *textures->items;
+    gltf->table_bytes += textures->picture_capacity * sizeof *textures->pictures;
+    const uint64_t half = gltf->reader->memory_bytes / 2, held = gltf->table_bytes + gltf->arena.total_bytes;
+    const uint64_t left = held < half ? half - held : 0;
+    if (textures->limit_bytes > left)
+        textures->limit_bytes = left;
+}
+
 static strl_status open_json(strl_reader *reader, strl_error *err)
 {
     strl__gltf *gltf = strl__gltf_of(reader);
@@ -144,6 +156,7 @@ static strl_status open_json(strl_reader *reader, strl_error *err)
         status = strl__gltf_link(gltf, err);
     if (!status)
         status = strl__gltf_link_maps(gltf, err);
+    share_out(gltf);
     if (!status)
         status = strl__gltf_check_scene(gltf, err);
     if (!status)
@@ -156,9 +169,8 @@ static void init(strl_reader *reader)
     strl__gltf *gltf = strl__gltf_of(reader);
     gltf->reader = reader;
     gltf->scene = STRL__NO_ITEM;
-    gltf->table_limit = reader->memory_bytes / 4;
-    reader->parts.limit_bytes = (size_t)(reader->memory_bytes / 8); /* they are whole paths */
-    strl_arena_init(&gltf->arena, (size_t)(reader->memory_bytes / 8));
+    gltf->table_limit = reader->memory_bytes / 16 * 7;
+    strl_arena_init(&gltf->arena, (size_t)gltf->table_limit);
     strl__textures_init(&reader->textures, reader->memory_bytes / 4);
     reader->textures.open = strl__gltf_open_picture;
     reader->textures.context = gltf;
@@ -233,6 +245,13 @@ static void count_drops(strl__gltf *gltf, const strl__gltf_primitive *primitive,
         drops->degenerate_faces += times; /* corners are left that make no face */
 }
 
+/* Those without any are passed over at once: they may have as many instances as a file cares to say. */
+static bool has_triangles(const strl__gltf *gltf, const strl__gltf_primitive *primitive)
+{
+    return primitive->position != STRL__NO_ITEM &&
+           strl__gltf_triangle_count(primitive->mode, strl__gltf_element_count(gltf, primitive)) > 0;
+}
+
 /* To the next primitive of triangles, node by node, and in each instance by instance. NULL: the
  * end. */
 static const strl__gltf_primitive *find_placement(strl__gltf *gltf)
@@ -247,8 +266,7 @@ static const strl__gltf_primitive *find_placement(strl__gltf *gltf)
                 &gltf->primitives[mesh->first_primitive + pass->primitive];
             if (pass->instance == 0)
                 count_drops(gltf, primitive, instance_count(node));
-            if (pass->instance < instance_count(node) && primitive->mode >= 4 &&
-                primitive->position != STRL__NO_ITEM)
+            if (pass->instance < instance_count(node) && has_triangles(gltf, primitive))
                 return primitive;
             pass->instance = 0;
         }

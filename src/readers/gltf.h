@@ -7,9 +7,10 @@
  * to placement; of the buffers only windows are in memory. Poses of skins and morph targets are not
  * applied.
  *
- * Of the reader's budget at most a quarter is for tables, half less those for what is decompressed
- * and for images, which take a quarter at most, an eighth for buffers that stand in the JSON as
- * text, an eighth for the vertices of a primitive; a 16th for measuring these under an image. */
+ * Of the reader's budget at most seven sixteenths are for tables, half less those for what is
+ * decompressed and for images, which take a quarter at most, an eighth for buffers that stand in
+ * the JSON as text, an eighth for the vertices of a primitive; a 16th for measuring these under an
+ * image. */
 #ifndef STRL_READERS_GLTF_H
 #define STRL_READERS_GLTF_H
 
@@ -27,7 +28,7 @@
 typedef struct strl__gltf_column {
     uint64_t offset; /* bytes from the view's start */
     uint32_t view;   /* STRL__NO_ITEM: all zeros */
-    strl__scalar type;
+    uint8_t type;    /* strl__scalar; a file may have millions of these */
     uint8_t components;
     bool normalized; /* integers stand for 0..1 or -1..1 */
 } strl__gltf_column;
@@ -71,7 +72,8 @@ typedef struct strl__gltf_view {
     uint32_t buffer;
     uint32_t stride;             /* 0: elements follow each other closely */
     strl__gltf_meshopt *meshopt; /* in the arena; NULL: the bytes are as they are */
-    bool is_checked;
+    bool is_checked, is_stored;
+    uint64_t stored_at; /* where it is decompressed in the file of stored views */
 } strl__gltf_view;
 
 typedef struct strl__gltf_buffer {
@@ -94,10 +96,12 @@ typedef struct strl__gltf_draco_use {
 } strl__gltf_draco_use;
 
 typedef struct strl__gltf_primitive {
-    uint8_t mode; /* as in the file: 0 points, 1..3 lines, 4 triangles, 5 strip, 6 fan */
+    uint8_t mode;   /* as in the file: 0 points, 1..3 lines, 4 triangles, 5 strip, 6 fan */
+    bool has_range; /* lowest and highest are known */
     uint32_t indices, material;        /* or STRL__NO_ITEM, as all below */
     uint32_t position, normal, colour, texcoord[STRL__GLTF_SETS]; /* accessors */
     strl__gltf_draco_use *draco;       /* in the arena; NULL: not compressed */
+    uint32_t lowest, highest;          /* of its indices; beyond its vertices perhaps */
 } strl__gltf_primitive;
 
 typedef struct strl__gltf_mesh {
@@ -178,6 +182,8 @@ typedef struct strl__gltf_pass {
     uint64_t instance;
     uint64_t triangle, triangle_count;
     uint64_t vertex_count;
+    uint64_t first_loaded, loaded_count; /* vertices that are in the reader's table, where there are indices */
+    bool is_scattered;                   /* none are: each corner is looked up by itself */
     uint64_t done; /* triangles, of all placements so far */
     uint32_t part, material;
     strl__gltf_matrix placement;
@@ -191,7 +197,8 @@ typedef struct strl__gltf_paint {
     uint32_t texture, draco_id;
     uint32_t texcoord; /* an accessor, or STRL__NO_ITEM: there is no image */
     uint32_t measured; /* the primitive to which what follows belongs, or STRL__NO_ITEM */
-    strl__footprint *footprints; /* owned; of its vertices; NULL: all have the same */
+    uint64_t first, count; /* vertices that were loaded when it was measured */
+    strl__footprint *footprints; /* owned; of these; NULL: all have the same */
     double footprint;
 } strl__gltf_paint;
 
@@ -201,6 +208,8 @@ typedef struct strl__gltf {
     strl_reader *reader;
     strl_arena arena; /* names and rare things */
     uint64_t table_bytes, table_limit;
+    bool is_counting; /* the tables are full: what follows is counted, for a sentence */
+    uint64_t counted_bytes;
     strl__gltf_accessor *accessors;
     strl__gltf_view *views;
     strl__gltf_buffer *buffers;
@@ -227,6 +236,8 @@ typedef struct strl__gltf {
     uint64_t text_bytes; /* of buffers that are in memory */
     strl__gltf_decoded decoded[STRL__GLTF_DECODED_MAX];
     uint64_t decoded_bytes, clock;
+    strl_file *stored; /* scratch; decompressed views that had to make room; owned, may be NULL */
+    uint64_t stored_bytes;
     strl__draco *draco; /* the primitive decompressed last; owned */
     uint32_t draco_primitive;
     uint64_t draco_bytes;
@@ -258,12 +269,16 @@ static inline size_t strl__gltf_table_bytes(const strl_reader *reader)
     return (size_t)(reader->memory_bytes / 8);
 }
 
-/* ---- gltf_parse.c, gltf_material.c: the JSON's elements into tables */
-strl_status strl__gltf_parse(strl__gltf *gltf, strl_error *err);
+/* ---- gltf_tables.c: memory for what the JSON describes */
 /* Room for one more item in a table; counts against the tables' share. */
 strl_status strl__gltf_add(strl__gltf *gltf, void *items_pointer, size_t *count, size_t *capacity,
                            size_t item_bytes, strl_error *err);
 void *strl__gltf_keep(strl__gltf *gltf, size_t bytes, strl_error *err); /* zeroed, in the arena */
+/* Once all is counted that did not fit: how much memory would do. */
+strl_status strl__gltf_refuse_tables(const strl__gltf *gltf, strl_error *err);
+
+/* ---- gltf_parse.c, gltf_material.c: the JSON's elements into tables */
+strl_status strl__gltf_parse(strl__gltf *gltf, strl_error *err);
 strl_status strl__gltf_parse_material(strl__gltf *gltf, strl__fields *fields, const json_t *value);
 char *strl__gltf_keep_text(strl__gltf *gltf, strl__fields *fields, const json_t *value,
                            const char *key); /* in the arena; NULL where absent */
@@ -312,6 +327,8 @@ strl_status strl__gltf_decode_view(strl__gltf *gltf, uint32_t view, const uint8_
 /* Makes room for so many decompressed bytes, or fails. */
 strl_status strl__gltf_make_room(strl__gltf *gltf, uint64_t bytes, const char *what,
                                  strl_error *err);
+/* Gives up all decompressed views, and tells how many bytes a Draco mesh may take. */
+uint64_t strl__gltf_room(strl__gltf *gltf);
 void strl__gltf_close_decoded(strl__gltf *gltf);
 
 /* ---- gltf_accessor.c: elements */
@@ -332,7 +349,18 @@ strl_status strl__gltf_check_scene(strl__gltf *gltf, strl_error *err);
 uint64_t strl__gltf_element_count(const strl__gltf *gltf, const strl__gltf_primitive *primitive);
 uint64_t strl__gltf_triangle_count(unsigned mode, uint64_t elements);
 
+/* ---- gltf_range.c */
+/* Which of its vertices the placement that begins has to load: those from its lowest to its highest
+ * index, unless that is far more than it has corners. So the work is in proportion to triangles,
+ * whatever the accessor counts: many exporters give all primitives the vertices of the model. */
+strl_status strl__gltf_find_range(strl__gltf *gltf, strl__gltf_primitive *primitive,
+                                  uint64_t elements, strl_error *err);
+
 /* ---- gltf_primitive.c: triangles */
+/* Indices of the primitive's vertices, of a Draco mesh from `first`, a multiple of 3, as many. */
+strl_status strl__gltf_read_elements(strl__gltf *gltf, const strl__gltf_primitive *primitive,
+                                     uint64_t first, size_t count, uint32_t *elements,
+                                     strl_error *err);
 /* The reader's table of vertices, with its layout but no vertex. */
 void strl__gltf_empty_table(strl_reader *reader);
 /* Begins the placement that pass stands at. */

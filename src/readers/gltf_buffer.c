@@ -101,6 +101,8 @@ static strl_status open_file(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32
                             "%s, buffers[%u]: expected %" PRIu64 " bytes, found %" PRIu64 " in %s",
                             gltf->reader->path, index, buffer->bytes, buffer->opened.bytes,
                             strl_file_path(buffer->file));
+    if (!status)
+        status = strl__reader_note_beside(gltf->reader, strl_file_path(buffer->file), &buffer->opened, err);
     if (!status && buffer->is_loose)
         buffer->bytes = buffer->opened.bytes;
     strl__free(path);
@@ -131,6 +133,7 @@ typedef struct data_text {
     strl__gltf *gltf;
     strl__gltf_buffer *buffer;
     uint32_t index;
+    strl_file *file;  /* the model's, or its text in UTF-8; borrowed */
     uint64_t at, end; /* in the file */
     uint64_t decoded; /* bytes so far */
     uint32_t bits, bit_count;
@@ -201,7 +204,7 @@ static strl_status pass_header(data_text *text, strl_error *err)
     char header[HEADER_BYTES_MAX + 1];
     size_t size =
         text->end - text->at < HEADER_BYTES_MAX ? (size_t)(text->end - text->at) : HEADER_BYTES_MAX;
-    strl_status status = strl_file_read(text->gltf->reader->file, text->at, header, size, err);
+    strl_status status = strl_file_read(text->file, text->at, header, size, err);
     if (status)
         return status;
     header[size] = 0;
@@ -223,7 +226,7 @@ static strl_status decode_text(data_text *text, strl_error *err)
     while (!status && text->at < text->end) {
         const uint64_t begin = text->at, left = text->end - begin;
         size_t size = left < sizeof chars ? (size_t)left : sizeof chars;
-        status = strl_file_read(text->gltf->reader->file, begin, chars, size, err);
+        status = strl_file_read(text->file, begin, chars, size, err);
         if (!status)
             status = decode_base64(text, chars, size, err);
         if (text->at != begin + size)
@@ -270,7 +273,7 @@ static strl_status make_place(strl__gltf *gltf, strl__gltf_buffer *buffer, uint3
 static strl_status open_text(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32_t index,
                              strl_error *err)
 {
-    data_text text = {.gltf = gltf, .buffer = buffer, .index = index};
+    data_text text = {.gltf = gltf, .buffer = buffer, .index = index, .file = gltf->reader->input.file};
     uint64_t bytes;
     if (sscanf(buffer->uri, "data:@%" SCNu64 "+%" SCNu64, &text.at, &bytes) != 2)
         return strl__fail(err, STRL_ERR_INTERNAL, "%s, %s[%u]: '%.80s' is no place in it",
@@ -354,6 +357,8 @@ strl_status strl__gltf_read_view(strl__gltf *gltf, uint32_t index, uint64_t offs
     const uint8_t *bytes;
     if (!view->meshopt)
         return strl__gltf_read_buffer(gltf, view->buffer, view->offset + offset, data, size, err);
+    if (view->is_stored)
+        return strl_file_read(gltf->stored, view->stored_at + offset, data, size, err);
     strl_status status = strl__gltf_decode_view(gltf, index, &bytes, err);
     if (!status)
         memcpy(data, bytes + offset, size);

@@ -7,6 +7,8 @@
 #include <new>
 
 #include <draco/compression/decode.h>
+#include <draco/compression/mesh/mesh_edgebreaker_decoder.h>
+#include <draco/compression/mesh/mesh_sequential_decoder.h>
 
 struct strl__draco {
     std::unique_ptr<draco::Mesh> mesh;
@@ -81,11 +83,66 @@ void skip_all_metadata(start &in)
     in.skip_metadata(0);
 }
 
+/* What libdraco takes, about: it allocates by itself, so that its wants must be known before. Of a
+ * face the corner table and the way through it, for each attribute with seams of its own a table
+ * more. Of a point its place in each attribute, and of a component its symbol, its integer and
+ * itself. */
+constexpr uint64_t face_bytes = 160, seam_bytes = 48, mapping_bytes = 16, component_bytes = 8;
+
+uint64_t add_product(uint64_t sum, uint64_t a, uint64_t b)
+{
+    uint64_t product;
+    if (__builtin_mul_overflow(a, b, &product) || __builtin_add_overflow(sum, product, &sum))
+        return UINT64_MAX;
+    return sum;
+}
+
+/* Stops where the attributes, which are known before their values are decoded, take too much. */
+template <class Decoder> class bounded : public Decoder
+{
+  public:
+    explicit bounded(uint64_t most) : most_(most) {}
+    uint64_t wanted = 0; /* bytes of attributes */
+
+  protected:
+    bool DecodeAllAttributes() override
+    {
+        const draco::PointCloud *cloud = this->point_cloud();
+        for (int i = 0; i < cloud->num_attributes(); i++) {
+            const draco::PointAttribute *attribute = cloud->attribute(i);
+            const uint64_t size = static_cast<uint64_t>(draco::DataTypeLength(attribute->data_type()));
+            const uint64_t components = static_cast<uint64_t>(attribute->num_components());
+            wanted = add_product(wanted, cloud->num_points(), mapping_bytes + components * (component_bytes + size));
+        }
+        return wanted <= most_ && Decoder::DecodeAllAttributes();
+    }
+
+  private:
+    uint64_t most_;
+};
+
+template <class Decoder>
+std::unique_ptr<draco::Mesh> decode_bounded(const uint8_t *data, size_t size, strl__draco_room *room, char why[120])
+{
+    draco::DecoderBuffer buffer;
+    draco::DecoderOptions options;
+    bounded<Decoder> decoder(room->bytes);
+    std::unique_ptr<draco::Mesh> mesh(new draco::Mesh);
+    buffer.Init(reinterpret_cast<const char *>(data), size);
+    const draco::Status status = decoder.Decode(options, &buffer, mesh.get());
+    room->wanted = decoder.wanted;
+    if (status.ok())
+        return mesh;
+    std::snprintf(why, 120, "%s", status.error_msg());
+    return nullptr;
+}
+
 } // namespace
 
-int strl__draco_announced(const uint8_t *data, size_t size, uint64_t *faces, uint64_t *points)
+int strl__draco_announced(const uint8_t *data, size_t size, strl__draco_facts *facts)
 {
     start in{data, data + size};
+    *facts = strl__draco_facts{};
     if (size < 11 || std::memcmp(data, "DRACO", 5) != 0)
         return -1;
     in.skip(5);
@@ -94,36 +151,35 @@ int strl__draco_announced(const uint8_t *data, size_t size, uint64_t *faces, uin
     const unsigned type = static_cast<unsigned>(in.bytes(1));
     const unsigned method = static_cast<unsigned>(in.bytes(1));
     const unsigned flags = static_cast<unsigned>(in.bytes(2));
-    if (major != 2 || minor < 2 || type != triangular_mesh)
+    if (major != 2 || minor < 2 || type != triangular_mesh || method > edgebreaker)
         return -1;
     if (flags & metadata_flag)
         skip_all_metadata(in);
+    uint64_t seams = 0;
     if (method == edgebreaker) {
         in.skip(1); /* the way of traversal */
-        *points = in.varint();
-        *faces = in.varint();
+        facts->points = in.varint();
+        facts->faces = in.varint();
+        seams = in.bytes(1);
     } else {
-        *faces = in.varint();
-        *points = in.varint();
+        facts->faces = in.varint();
+        facts->points = in.varint();
     }
+    facts->is_edgebreaker = method == edgebreaker;
+    facts->connectivity_bytes = add_product(size, facts->faces, face_bytes + seams * seam_bytes);
     return in.failed ? -1 : 0;
 }
 
-strl__draco *strl__draco_decode(const uint8_t *data, size_t size, char why[120])
+strl__draco *strl__draco_decode(const uint8_t *data, size_t size, const strl__draco_facts *facts,
+                                strl__draco_room *room, char why[120])
 {
+    room->wanted = 0;
     std::snprintf(why, 120, "no memory");
     try {
-        draco::DecoderBuffer buffer;
-        draco::Decoder decoder;
-        buffer.Init(reinterpret_cast<const char *>(data), size);
-        auto decoded = decoder.DecodeMeshFromBuffer(&buffer);
-        if (!decoded.ok()) {
-            std::snprintf(why, 120, "%s", decoded.status().error_msg());
-            return nullptr;
-        }
         std::unique_ptr<strl__draco> mesh(new strl__draco);
-        mesh->mesh = std::move(decoded).value();
-        return mesh.release();
+        mesh->mesh = facts->is_edgebreaker ? decode_bounded<draco::MeshEdgebreakerDecoder>(data, size, room, why)
+                                           : decode_bounded<draco::MeshSequentialDecoder>(data, size, room, why);
+        return mesh->mesh ? mesh.release() : nullptr;
     } catch (const std::exception &) {
         return nullptr;
     }

@@ -53,10 +53,7 @@ static void keep(splitter *s, char byte)
     if (s->muted || s->status)
         return;
     if (s->length >= s->sink->most_bytes)
-        s->status = strl__fail(s->err, STRL_ERR_LIMIT,
-                               "%s, byte %" PRIu64 ": this part of its JSON is longer than the %zu "
-                               "bytes that the memory budget allows: more --memory may help",
-                               s->path, s->begun_at, s->sink->most_bytes);
+        s->length++; /* so that a sentence can tell how long it is */
     else if (!strl__grow(&s->text, &s->capacity, s->length + 1, 1))
         s->status = strl__fail(s->err, STRL_ERR_MEMORY, "%s: no memory for %zu bytes of JSON",
                                s->path, s->length);
@@ -97,7 +94,7 @@ static int peek_token(splitter *s)
 static bool ends_with(const splitter *s, size_t from, const char *text)
 {
     size_t length = strlen(text);
-    return !s->muted && s->length >= from && s->length - from == length &&
+    return !s->muted && s->length <= s->sink->most_bytes && s->length >= from && s->length - from == length &&
            memcmp(s->text + from, text, length) == 0;
 }
 
@@ -200,6 +197,10 @@ static void give(splitter *s, const char *member, uint64_t index)
     json_error_t wrong;
     if (s->status)
         return;
+    if (s->length > s->sink->most_bytes) {
+        s->status = s->sink->refuse(s->sink->context, s->begun_at, s->length, s->err);
+        return;
+    }
     make_utf8(s);
     json_t *value = json_loadb(s->text, s->length, JSON_DECODE_ANY | JSON_ALLOW_NUL, &wrong);
     if (!value) {

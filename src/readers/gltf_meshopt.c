@@ -1,6 +1,9 @@
 /* EXT_meshopt_compression. The library's decoders work on whole views and end the process where
  * strides or counts are not theirs: all that is checked before each call. What they give may hold
- * any number; whoever reads indices checks them. */
+ * any number; whoever reads indices checks them.
+ *
+ * A view is decompressed once: one that has to make room for another goes to scratch. Two views of
+ * one primitive that do not fit together would otherwise be decompressed again for each window. */
 #include <inttypes.h>
 #include <string.h>
 
@@ -17,11 +20,30 @@ static uint64_t limit_of(const strl__gltf *gltf)
     return held < half ? half - held : 0;
 }
 
+/* Once images have made room for so many bytes. One that a placement shows stays. */
+static uint64_t limit_for(strl__gltf *gltf, uint64_t bytes)
+{
+    if (bytes + gltf->decoded_bytes + gltf->draco_bytes > limit_of(gltf)) {
+        if (gltf->paint.image)
+            strl__textures_shed(&gltf->reader->textures);
+        else
+            strl__textures_rest(&gltf->reader->textures);
+    }
+    return limit_of(gltf);
+}
+
 static void drop(strl__gltf *gltf, strl__gltf_decoded *decoded)
 {
     gltf->decoded_bytes -= decoded->size;
     strl__free(decoded->bytes);
     *decoded = (strl__gltf_decoded){0};
+}
+
+uint64_t strl__gltf_room(strl__gltf *gltf)
+{
+    for (unsigned i = 0; i < STRL__GLTF_DECODED_MAX; i++)
+        drop(gltf, &gltf->decoded[i]);
+    return limit_of(gltf);
 }
 
 void strl__gltf_close_decoded(strl__gltf *gltf)
@@ -31,6 +53,8 @@ void strl__gltf_close_decoded(strl__gltf *gltf)
     strl__draco_close(gltf->draco);
     gltf->draco = NULL;
     gltf->draco_bytes = 0;
+    strl_file_close(gltf->stored, NULL); /* scratch */
+    gltf->stored = NULL;
 }
 
 /* The view that was used longest ago; NULL where there is none. */
@@ -47,19 +71,22 @@ strl_status strl__gltf_make_room(strl__gltf *gltf, uint64_t bytes, const char *w
                                  strl_error *err)
 {
     strl__gltf_decoded *oldest;
-    if (bytes + gltf->decoded_bytes + gltf->draco_bytes > limit_of(gltf))
-        strl__textures_shed(&gltf->reader->textures);
-    const uint64_t limit = limit_of(gltf);
+    const uint64_t limit = limit_for(gltf, bytes);
     while (bytes + gltf->decoded_bytes + gltf->draco_bytes > limit &&
            (oldest = find_oldest(gltf)) != NULL)
         drop(gltf, oldest);
     if (bytes <= limit && bytes + gltf->draco_bytes <= limit)
         return STRL_OK;
+    char advice[STRL__ADVICE_BYTES];
+    const uint64_t half = gltf->reader->memory_bytes / 2;
+    const strl__image *image = gltf->paint.image;
+    const uint64_t others = gltf->table_bytes + gltf->arena.total_bytes + bytes;
+    /* A halved image is larger where there is more memory: half of the half, which is its most. */
+    const uint64_t needed = others + (image && image->halvings ? others : gltf->reader->textures.held_bytes);
+    strl__reader_advise(gltf->reader, needed, half, advice);
     return strl__fail(err, STRL_ERR_LIMIT,
-                      "%s: %s takes %" PRIu64
-                      " bytes decompressed, the memory budget allows %" PRIu64
-                      ": more --memory may help",
-                      gltf->reader->path, what, bytes, limit);
+                      "%s: %s takes %" PRIu64 " bytes decompressed, the memory budget allows %" PRIu64 ": %s",
+                      gltf->reader->path, what, bytes, limit, advice);
 }
 
 static bool is_sound(const strl__gltf_meshopt *meshopt)
@@ -146,21 +173,46 @@ static strl_status decompress(strl__gltf *gltf, uint32_t index, uint8_t *bytes, 
     return status;
 }
 
+/* Makes room for another view. Without scratch, or a place in it, this one is decompressed again. */
+static strl_status store_away(strl__gltf *gltf, strl__gltf_decoded *decoded, strl_error *err)
+{
+    strl__gltf_view *view = &gltf->views[decoded->view];
+    const char *folder = gltf->reader->scratch_dir;
+    strl_status status = STRL_OK;
+    if (folder && !view->is_stored) {
+        if (!gltf->stored)
+            status = strl_file_create_nameless(folder, &gltf->stored, err);
+        if (!status)
+            status = strl_file_write(gltf->stored, gltf->stored_bytes, decoded->bytes, (size_t)decoded->size, err);
+        view->is_stored = !status;
+        view->stored_at = gltf->stored_bytes;
+        gltf->stored_bytes += status ? 0 : decoded->size;
+    }
+    drop(gltf, decoded);
+    return status;
+}
+
 static strl_status add_decoded(strl__gltf *gltf, uint32_t index, strl__gltf_decoded **added,
                                strl_error *err)
 {
     const strl__gltf_meshopt *meshopt = gltf->views[index].meshopt;
-    const uint64_t size = meshopt->count * meshopt->stride;
-    strl_status status =
-        strl__gltf_make_room(gltf, size + meshopt->bytes, "a compressed buffer view", err);
-    strl__gltf_decoded *place = NULL;
+    const uint64_t size = meshopt->count * meshopt->stride, limit = limit_for(gltf, size + meshopt->bytes);
+    strl_status status = STRL_OK;
+    strl__gltf_decoded *place = NULL, *oldest;
+    while (!status && size + meshopt->bytes + gltf->decoded_bytes + gltf->draco_bytes > limit &&
+           (oldest = find_oldest(gltf)) != NULL)
+        status = store_away(gltf, oldest, err);
+    if (!status)
+        status = strl__gltf_make_room(gltf, size + meshopt->bytes, "a compressed buffer view", err);
     for (unsigned i = 0; i < STRL__GLTF_DECODED_MAX && !place; i++)
         place = gltf->decoded[i].bytes ? NULL : &gltf->decoded[i];
     if (status)
         return status;
     if (!place) {
         place = find_oldest(gltf);
-        drop(gltf, place);
+        status = store_away(gltf, place, err);
+        if (status)
+            return status;
     }
     uint8_t *bytes = strl__alloc((size_t)size, 1);
     status =

@@ -12,8 +12,8 @@
 typedef struct measure {
     strl__gltf *gltf;
     const strl__gltf_primitive *primitive;
-    double (*places)[2]; /* owned; of its vertices, in texels */
-    uint64_t vertices;
+    double (*places)[2]; /* owned; of the vertices that are loaded, in texels; NULL: those are read one by one */
+    uint64_t first, count; /* these vertices */
     double log_sum; /* where corners are no one's but their triangle's */
     uint64_t log_count;
 } measure;
@@ -31,40 +31,52 @@ static strl_status read_places(strl__gltf *gltf, uint64_t first, size_t count, d
     return status;
 }
 
-static strl_status read_all_places(measure *self, strl_error *err)
+static strl_status read_texels(measure *self, uint64_t first, size_t count, double (*texels)[2],
+                               strl_error *err)
 {
-    strl__gltf *gltf = self->gltf;
-    const strl__image *image = gltf->paint.image;
-    strl_status status = STRL_OK;
-    for (uint64_t first = 0; first < self->vertices && !status; first += STRL__GLTF_CHUNK) {
-        const uint64_t left = self->vertices - first;
-        const size_t count = left < STRL__GLTF_CHUNK ? (size_t)left : STRL__GLTF_CHUNK;
-        status = read_places(gltf, first, count, self->places + first, err);
-        for (size_t i = 0; i < count && !status; i++) {
-            self->places[first + i][0] *= image->width;
-            self->places[first + i][1] *= image->height;
-        }
+    const strl__image *image = self->gltf->paint.image;
+    strl_status status = read_places(self->gltf, first, count, texels, err);
+    for (size_t i = 0; i < count && !status; i++) {
+        texels[i][0] *= image->width;
+        texels[i][1] *= image->height;
     }
     return status;
 }
 
-static void add_triangle(measure *self, const uint32_t corners[3])
+static strl_status read_all_places(measure *self, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    for (uint64_t at = 0; at < self->count && !status; at += STRL__GLTF_CHUNK) {
+        const uint64_t left = self->count - at;
+        const size_t count = left < STRL__GLTF_CHUNK ? (size_t)left : STRL__GLTF_CHUNK;
+        status = read_texels(self, self->first + at, count, self->places + at, err);
+    }
+    return status;
+}
+
+static strl_status add_triangle(measure *self, const uint32_t corners[3], strl_error *err)
 {
     double places[3][2];
+    strl_status status = STRL_OK;
     for (unsigned i = 0; i < 3; i++) {
-        if (corners[i] >= self->vertices)
-            return; /* refused when it is read */
-        places[i][0] = self->places[corners[i]][0];
-        places[i][1] = self->places[corners[i]][1];
+        if (corners[i] < self->first || corners[i] - self->first >= self->count)
+            return STRL_OK; /* refused when it is read */
+        if (self->places)
+            memcpy(places[i], self->places[corners[i] - self->first], sizeof places[i]);
+        else
+            status = read_texels(self, corners[i], 1, &places[i], err);
+        if (status)
+            return status;
     }
     const double side = strl__footprint_of((const double(*)[2])places, 3);
     if (!self->gltf->paint.footprints) {
         self->log_sum += side > 1 ? log2(side) : 0;
         self->log_count++;
-        return;
+        return STRL_OK;
     }
     for (unsigned i = 0; i < 3; i++)
-        strl__footprint_add(&self->gltf->paint.footprints[corners[i]], side);
+        strl__footprint_add(&self->gltf->paint.footprints[corners[i] - self->first], side);
+    return STRL_OK;
 }
 
 static strl_status add_triangles(measure *self, strl_error *err)
@@ -94,7 +106,7 @@ static strl_status add_triangles(measure *self, strl_error *err)
                 slots[k] = slots[k] == STRL__GLTF_FAN_CENTRE ? centre
                            : is_indexed                      ? gltf->elements[slots[k]]
                                                              : (uint32_t)(begin + slots[k]);
-            add_triangle(self, slots);
+            status = add_triangle(self, slots, err);
         }
     }
     return status;
@@ -107,35 +119,52 @@ static void forget_measure(strl__gltf_paint *paint)
     paint->measured = STRL__NO_ITEM;
 }
 
+/* Of vertices that lie far apart one place is read after the other, as their corners are later, and
+ * all have the mean; of the others those that are loaded. */
+static strl_status measure_vertices(measure *self, strl_error *err)
+{
+    strl__gltf_paint *paint = &self->gltf->paint;
+    const bool is_scattered = self->gltf->pass.is_scattered;
+    const bool is_shared = self->primitive->indices != STRL__NO_ITEM && !is_scattered;
+    strl_status status = STRL_OK;
+    if (!is_scattered)
+        self->places = strl__alloc((size_t)self->count, sizeof *self->places);
+    if (is_shared)
+        paint->footprints = strl__alloc_zero((size_t)self->count, sizeof *paint->footprints);
+    if ((!is_scattered && !self->places) || (is_shared && !paint->footprints))
+        status = strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for texture coordinates",
+                            self->gltf->reader->path);
+    if (!status && !is_scattered)
+        status = read_all_places(self, err);
+    if (!status)
+        status = add_triangles(self, err);
+    if (self->log_count)
+        paint->footprint = exp2(self->log_sum / (double)self->log_count);
+    strl__free(self->places);
+    return status;
+}
+
 /* What the vertices of the primitive stand for, unless that is known from the placement before. */
 static strl_status measure_primitive(strl__gltf *gltf, const strl__gltf_primitive *primitive,
                                      strl_error *err)
 {
     strl__gltf_paint *paint = &gltf->paint;
+    const strl__gltf_pass *pass = &gltf->pass;
     const uint32_t index = (uint32_t)(primitive - gltf->primitives);
-    measure self = {.gltf = gltf, .primitive = primitive, .vertices = gltf->pass.vertex_count};
-    const uint64_t each = sizeof *self.places + sizeof *paint->footprints;
+    const uint64_t each = sizeof(double[2]) + sizeof *paint->footprints;
+    measure self = {.gltf = gltf,
+                    .primitive = primitive,
+                    .first = pass->is_scattered ? 0 : pass->first_loaded,
+                    .count = pass->is_scattered ? pass->vertex_count : pass->loaded_count};
     strl_status status = STRL_OK;
-    if (paint->measured == index)
+    if (paint->measured == index && paint->first == pass->first_loaded && paint->count == pass->loaded_count)
         return STRL_OK;
     forget_measure(paint);
-    paint->footprint = strl__footprint_guess(paint->image, self.vertices);
-    if (self.vertices > gltf->reader->memory_bytes / MEASURE_SHARE / each)
-        goto done;
-    self.places = strl__alloc((size_t)self.vertices, sizeof *self.places);
-    if (primitive->indices != STRL__NO_ITEM)
-        paint->footprints = strl__alloc_zero((size_t)self.vertices, sizeof *paint->footprints);
-    if (!self.places || (primitive->indices != STRL__NO_ITEM && !paint->footprints))
-        status = strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for texture coordinates",
-                            gltf->reader->path);
-    if (!status)
-        status = read_all_places(&self, err);
-    if (!status)
-        status = add_triangles(&self, err);
-    if (self.log_count)
-        paint->footprint = exp2(self.log_sum / (double)self.log_count);
-    strl__free(self.places);
-done:
+    paint->first = pass->first_loaded;
+    paint->count = pass->loaded_count;
+    paint->footprint = strl__footprint_guess(paint->image, self.count);
+    if (pass->is_scattered || self.count <= gltf->reader->memory_bytes / MEASURE_SHARE / each)
+        status = measure_vertices(&self, err);
     if (status)
         forget_measure(paint);
     else
@@ -187,7 +216,7 @@ strl_status strl__gltf_paint_corners(strl__gltf *gltf, const strl__gltf_primitiv
         double texel[4];
         spot.u = places[i][0];
         spot.v = places[i][1];
-        spot.footprint = paint->footprints ? strl__footprint_side(paint->footprints[first + i])
+        spot.footprint = paint->footprints ? strl__footprint_side(paint->footprints[first - paint->first + i])
                                            : paint->footprint;
         strl__image_sample(paint->image, srgb, &spot, texel);
         corners[i].colour =

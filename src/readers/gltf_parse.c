@@ -8,37 +8,11 @@
 #include "readers/gltf.h"
 #include "readers/gltf_json.h"
 
+/* Of the reader's budget the text of an element has such a part; as a tree it takes up to 18 times
+ * as much. */
+#define ELEMENT_SHARE 64u
+
 typedef strl_status (*parse_element)(strl__gltf *gltf, strl__fields *fields, const json_t *value);
-
-strl_status strl__gltf_add(strl__gltf *gltf, void *items_pointer, size_t *count, size_t *capacity,
-                           size_t item_bytes, strl_error *err)
-{
-    const size_t before = *capacity;
-    uint64_t held = gltf->table_bytes + gltf->arena.total_bytes;
-    if (*count >= UINT32_MAX - 1 ||
-        (*count == before && held + before / 2 * item_bytes > gltf->table_limit))
-        return strl__fail(err, STRL_ERR_LIMIT,
-                          "%s: what its JSON describes takes more than the %" PRIu64 " bytes that "
-                          "the memory budget allows: more --memory may help",
-                          gltf->reader->path, gltf->table_limit);
-    if (!strl__grow(items_pointer, capacity, *count + 1, item_bytes))
-        return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for %zu items of its JSON",
-                          gltf->reader->path, *count);
-    gltf->table_bytes += (*capacity - before) * item_bytes;
-    ++*count;
-    return STRL_OK;
-}
-
-void *strl__gltf_keep(strl__gltf *gltf, size_t bytes, strl_error *err)
-{
-    void *block = strl_arena_alloc_zero(&gltf->arena, 1, bytes);
-    if (!block)
-        strl__fail(err, STRL_ERR_MEMORY,
-                   "%s: no memory for what its JSON describes, of which %" PRIu64
-                   " bytes may be held: more --memory may help",
-                   gltf->reader->path, gltf->table_limit);
-    return block;
-}
 
 static void *keep(strl__gltf *gltf, strl__fields *fields, size_t bytes)
 {
@@ -458,21 +432,41 @@ static const struct {
     bool is_list;
     parse_element parse;
     bool is_optional; /* what is no list is passed over */
+    size_t bytes;     /* of one in its table */
+    const char *list; /* of each what is in tables of its own; may be NULL */
+    size_t list_bytes;
 } members[] = {
-    {"asset", false, parse_asset, false},
-    {"scene", false, parse_default_scene, false},
-    {"extensionsRequired", true, parse_required, false},
-    {"scenes", true, parse_scene, false},
-    {"nodes", true, parse_node, false},
-    {"meshes", true, parse_mesh, false},
-    {"accessors", true, parse_accessor, false},
-    {"bufferViews", true, parse_view, false},
-    {"buffers", true, parse_buffer, false},
-    {"materials", true, strl__gltf_parse_material, false},
-    {"textures", true, strl__gltf_parse_map, true},
-    {"samplers", true, strl__gltf_parse_sampler, true},
-    {"images", true, strl__gltf_parse_image, true},
+    {"asset", false, parse_asset, false, 0, NULL, 0},
+    {"scene", false, parse_default_scene, false, 0, NULL, 0},
+    {"extensionsRequired", true, parse_required, false, 0, NULL, 0},
+    {"scenes", true, parse_scene, false, sizeof(strl__gltf_scene), "nodes", sizeof(uint32_t)},
+    {"nodes", true, parse_node, false, sizeof(strl__gltf_node), "children", sizeof(uint32_t)},
+    {"meshes", true, parse_mesh, false, sizeof(strl__gltf_mesh), "primitives",
+     sizeof(strl__gltf_primitive) + sizeof(strl__gltf_draco_use)},
+    {"accessors", true, parse_accessor, false, sizeof(strl__gltf_accessor), NULL, 0},
+    {"bufferViews", true, parse_view, false, sizeof(strl__gltf_view), NULL, 0},
+    {"buffers", true, parse_buffer, false, sizeof(strl__gltf_buffer), NULL, 0},
+    {"materials", true, strl__gltf_parse_material, false, sizeof(strl__gltf_material), NULL, 0},
+    {"textures", true, strl__gltf_parse_map, true, sizeof(strl__gltf_map), NULL, 0},
+    {"samplers", true, strl__gltf_parse_sampler, true, sizeof(strl__gltf_sampler), NULL, 0},
+    {"images", true, strl__gltf_parse_image, true, sizeof(strl__gltf_image), NULL, 0},
 };
+
+/* About what an element takes in the tables and the arena. */
+static uint64_t element_bytes(size_t which, const json_t *value)
+{
+    static const char *const texts[] = {"name", "uri"};
+    uint64_t bytes = members[which].bytes;
+    if (!json_is_object(value))
+        return bytes;
+    if (members[which].list)
+        bytes += json_array_size(json_object_get(value, members[which].list)) * members[which].list_bytes;
+    for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
+        bytes += json_string_length(json_object_get(value, texts[i])) + 16;
+    if (json_object_get(value, "extensions") || json_object_get(value, "sparse"))
+        bytes += sizeof(strl__gltf_sparse) + sizeof(strl__gltf_meshopt);
+    return bytes;
+}
 
 static size_t member_index(const char *name)
 {
@@ -513,17 +507,36 @@ static strl_status take(void *context, const char *member, uint64_t index, const
             return strl__fail(err, STRL_ERR_FORMAT, "%s: its %s stand in it twice", path, member);
         gltf->seen |= (uint64_t)1 << which;
     }
-    return members[which].parse(gltf, &fields, value);
+    strl_status status = gltf->is_counting ? STRL_OK : members[which].parse(gltf, &fields, value);
+    if (!gltf->is_counting)
+        return status;
+    gltf->counted_bytes += element_bytes(which, value);
+    return STRL_OK;
+}
+
+static strl_status refuse(void *context, uint64_t at, size_t bytes, strl_error *err)
+{
+    const strl__gltf *gltf = context;
+    const uint64_t most = gltf->reader->memory_bytes / ELEMENT_SHARE;
+    char advice[STRL__ADVICE_BYTES];
+    strl__reader_advise(gltf->reader, bytes, most, advice);
+    return strl__fail(err, STRL_ERR_LIMIT,
+                      "%s, byte %" PRIu64 ": this part of its JSON is %zu bytes long, the memory "
+                      "budget allows %" PRIu64 ": %s",
+                      gltf->reader->path, at, bytes, most, advice);
 }
 
 strl_status strl__gltf_parse(strl__gltf *gltf, strl_error *err)
 {
     strl_reader *reader = gltf->reader;
     const strl__json_sink sink = {.context = gltf,
-                                  .most_bytes = (size_t)(reader->memory_bytes / 64),
+                                  .most_bytes = (size_t)(reader->memory_bytes / ELEMENT_SHARE),
                                   .wants = wants,
-                                  .take = take};
+                                  .take = take,
+                                  .refuse = refuse};
     strl_status status = strl__json_split(&reader->input, reader->path, &sink, err);
+    if (!status && gltf->is_counting)
+        return strl__gltf_refuse_tables(gltf, err);
     if (!status && !gltf->has_asset)
         status = strl__fail(err, STRL_ERR_FORMAT,
                             "%s: expected an asset of version 2.0 in its JSON, found none",

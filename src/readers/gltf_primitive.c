@@ -9,28 +9,23 @@
 
 /* ---- Draco */
 
-#define DRACO_FACE_BYTES 160u /* about what decoding takes for one */
-
-static strl_status check_announced(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                   const uint8_t *packed, size_t size, strl_error *err)
+static strl_status check_announced(strl__gltf *gltf, const strl__gltf_primitive *primitive, const uint8_t *packed,
+                                   size_t size, strl__draco_facts *facts, strl_error *err)
 {
-    const uint64_t faces_most = gltf->accessors[primitive->indices].count / 3;
-    uint64_t faces, points;
-    if (strl__draco_announced(packed, size, &faces, &points))
+    /* Of a strip the accessor counts the corners of the strip. */
+    const uint64_t faces_most = strl__gltf_triangle_count(primitive->mode, gltf->accessors[primitive->indices].count);
+    if (strl__draco_announced(packed, size, facts))
         return strl__fail(err, STRL_ERR_FORMAT,
                           "%s, bufferViews[%u]: expected a Draco mesh of version 2.2",
                           gltf->reader->path, primitive->draco->view);
-    if (faces > faces_most || points > gltf->accessors[primitive->position].count)
+    if (facts->faces > faces_most || facts->points > gltf->accessors[primitive->position].count)
         return strl__fail(err, STRL_ERR_FORMAT,
-                          "%s, bufferViews[%u]: expected a Draco mesh of at most %" PRIu64
-                          " faces and %" PRIu64 " points, found %" PRIu64 " and %" PRIu64,
+                          "%s, bufferViews[%u]: expected a Draco mesh of at most %" PRIu64 " faces and %" PRIu64
+                          " points, found %" PRIu64 " and %" PRIu64,
                           gltf->reader->path, primitive->draco->view, faces_most,
-                          gltf->accessors[primitive->position].count, faces, points);
+                          gltf->accessors[primitive->position].count, facts->faces, facts->points);
     gltf->draco_bytes = 0;
-    strl_status status =
-        strl__gltf_make_room(gltf, faces * DRACO_FACE_BYTES + size, "a Draco mesh", err);
-    gltf->draco_bytes = status ? 0 : faces * DRACO_FACE_BYTES + size;
-    return status;
+    return strl__gltf_make_room(gltf, facts->connectivity_bytes, "a Draco mesh's faces alone", err);
 }
 
 static strl_status check_decoded(const strl__gltf *gltf, const strl__gltf_primitive *primitive,
@@ -57,11 +52,32 @@ static strl_status check_decoded(const strl__gltf *gltf, const strl__gltf_primit
     return STRL_OK;
 }
 
+static strl_status decode_announced(strl__gltf *gltf, const strl__gltf_primitive *primitive, const uint8_t *packed,
+                                    const strl__draco_facts *facts, strl_error *err)
+{
+    const size_t size = (size_t)gltf->views[primitive->draco->view].bytes;
+    char why[120];
+    strl__draco_room room = {.bytes = strl__gltf_room(gltf) - facts->connectivity_bytes};
+    gltf->draco = strl__draco_decode(packed, size, facts, &room, why);
+    if (room.wanted > room.bytes && gltf->reader->textures.held_bytes) {
+        strl__textures_rest(&gltf->reader->textures); /* as if none had come before */
+        room.bytes = strl__gltf_room(gltf) - facts->connectivity_bytes;
+        gltf->draco = strl__draco_decode(packed, size, facts, &room, why);
+    }
+    if (room.wanted > room.bytes)
+        return strl__gltf_make_room(gltf, facts->connectivity_bytes + room.wanted, "a Draco mesh", err);
+    if (!gltf->draco)
+        return strl__fail(err, STRL_ERR_FORMAT, "%s, bufferViews[%u]: its Draco mesh is damaged: %s",
+                          gltf->reader->path, primitive->draco->view, why);
+    gltf->draco_bytes = facts->connectivity_bytes + room.wanted;
+    return STRL_OK;
+}
+
 static strl_status decode_draco(strl__gltf *gltf, const strl__gltf_primitive *primitive,
                                 strl_error *err)
 {
     const strl__gltf_view *view = &gltf->views[primitive->draco->view];
-    char why[120];
+    strl__draco_facts facts;
     strl_status status =
         strl__gltf_make_room(gltf, view->bytes, "a Draco mesh's compressed form", err);
     uint8_t *packed = status ? NULL : strl__alloc((size_t)view->bytes, 1);
@@ -72,14 +88,11 @@ static strl_status decode_draco(strl__gltf *gltf, const strl__gltf_primitive *pr
         status =
             strl__gltf_read_view(gltf, primitive->draco->view, 0, packed, (size_t)view->bytes, err);
     if (!status)
-        status = check_announced(gltf, primitive, packed, (size_t)view->bytes, err);
-    if (!status) {
-        gltf->draco = strl__draco_decode(packed, (size_t)view->bytes, why);
-        status = gltf->draco ? check_decoded(gltf, primitive, err)
-                             : strl__fail(err, STRL_ERR_FORMAT,
-                                          "%s, bufferViews[%u]: its Draco mesh is damaged: %s",
-                                          gltf->reader->path, primitive->draco->view, why);
-    }
+        status = check_announced(gltf, primitive, packed, (size_t)view->bytes, &facts, err);
+    if (!status)
+        status = decode_announced(gltf, primitive, packed, &facts, err);
+    if (!status)
+        status = check_decoded(gltf, primitive, err);
     strl__free(packed);
     return status;
 }
@@ -254,18 +267,18 @@ void strl__gltf_empty_table(strl_reader *reader)
                       strl__gltf_table_bytes(reader));
 }
 
-/* All of them, into the reader's table. */
+/* Those that its indices use, into the reader's table. */
 static strl_status load_vertices(strl__gltf *gltf, const strl__gltf_primitive *primitive,
                                  strl_error *err)
 {
     strl_reader *reader = gltf->reader;
-    const uint64_t total = gltf->pass.vertex_count;
+    const uint64_t total = gltf->pass.loaded_count, begin = gltf->pass.first_loaded;
     strl_status status = STRL_OK;
     strl__gltf_empty_table(reader);
     for (uint64_t first = 0; first < total && !status; first += STRL__GLTF_CHUNK) {
         size_t count =
             total - first < STRL__GLTF_CHUNK ? (size_t)(total - first) : STRL__GLTF_CHUNK;
-        status = read_corners(gltf, primitive, first, count, gltf->corners, err);
+        status = read_corners(gltf, primitive, begin + first, count, gltf->corners, err);
         for (size_t i = 0; i < count && !status; i++)
             status = strl__table_append(&reader->vertices, &gltf->corners[i], err);
     }
@@ -303,12 +316,28 @@ strl_status strl__gltf_read_elements(strl__gltf *gltf, const strl__gltf_primitiv
     return STRL_OK;
 }
 
+static strl_status index_fail(const strl__gltf *gltf, const strl__gltf_primitive *primitive, uint32_t found,
+                              uint64_t triangle, strl_error *err)
+{
+    return strl__fail(err, STRL_ERR_FORMAT,
+                      "%s, accessors[%u]: expected indices below %" PRIu64 ", found %u in triangle %" PRIu64,
+                      gltf->reader->path, primitive->indices, gltf->pass.vertex_count, found, triangle);
+}
+
 static strl_status read_first(strl__gltf *gltf, const strl__gltf_primitive *primitive,
                               strl_error *err)
 {
-    if (primitive->indices != STRL__NO_ITEM)
-        return strl__gltf_read_elements(gltf, primitive, 0, 1, &gltf->first_element, err);
-    return read_corners(gltf, primitive, 0, 1, &gltf->first_corner, err);
+    uint64_t vertex = 0;
+    strl_status status = STRL_OK;
+    if (primitive->indices != STRL__NO_ITEM) {
+        status = strl__gltf_read_elements(gltf, primitive, 0, 1, &gltf->first_element, err);
+        vertex = gltf->first_element;
+        if (status || !gltf->pass.is_scattered)
+            return status;
+        if (vertex >= gltf->pass.vertex_count)
+            return index_fail(gltf, primitive, gltf->first_element, 0, err);
+    }
+    return read_corners(gltf, primitive, vertex, 1, &gltf->first_corner, err);
 }
 
 /* Draco keeps triangles as a list, whatever they were. */
@@ -322,6 +351,7 @@ strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primit
 {
     strl__gltf_pass *pass = &gltf->pass;
     const strl__gltf_node *node = &gltf->nodes[pass->node];
+    gltf->paint.image = NULL; /* of the placement before: from now on it may be given up */
     pass->placement = *strl__gltf_world(gltf);
     strl_status status = node->instances ? place_instance(gltf, node->instances, err) : STRL_OK;
     if (!status)
@@ -334,10 +364,16 @@ strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primit
     pass->vertex_count = gltf->draco ? strl__draco_point_count(gltf->draco)
                                      : gltf->accessors[primitive->position].count;
     pass->triangle = 0;
+    pass->is_scattered = false;
+    pass->first_loaded = 0;
+    pass->loaded_count = pass->vertex_count;
     pass->triangle_count = strl__gltf_triangle_count(strl__gltf_mode_of(primitive), elements);
     if (pass->triangle_count == 0)
         return STRL_OK;
-    status = strl__gltf_begin_paint(gltf, primitive, err);
+    if (primitive->indices != STRL__NO_ITEM)
+        status = strl__gltf_find_range(gltf, &gltf->primitives[primitive - gltf->primitives], elements, err);
+    if (!status)
+        status = strl__gltf_begin_paint(gltf, primitive, err);
     if (status)
         return status;
     gltf->reader->batch.has_corner_colour =
@@ -373,25 +409,18 @@ void strl__gltf_corners_of(unsigned mode, uint64_t triangle, size_t in_chunk, ui
     }
 }
 
-static strl_status index_fail(const strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                              uint32_t found, uint64_t triangle, strl_error *err)
-{
-    return strl__fail(
-        err, STRL_ERR_FORMAT,
-        "%s, accessors[%u]: expected indices below %" PRIu64 ", found %u in triangle %" PRIu64,
-        gltf->reader->path, primitive->indices, gltf->pass.vertex_count, found, triangle);
-}
-
 static strl_status add_indexed(strl__gltf *gltf, const strl__gltf_primitive *primitive,
                                const uint32_t slots[3], uint64_t triangle, strl_error *err)
 {
+    const strl__gltf_pass *pass = &gltf->pass;
     strl__batch *batch = &gltf->reader->batch;
     for (unsigned i = 0; i < 3; i++) {
-        uint32_t index = slots[i] == STRL__GLTF_FAN_CENTRE ? gltf->first_element
-                                                           : gltf->elements[slots[i]];
-        if (index >= gltf->pass.vertex_count)
+        uint32_t index = slots[i] == STRL__GLTF_FAN_CENTRE ? gltf->first_element : gltf->elements[slots[i]];
+        /* Below first_loaded: the file has changed since the range was found. */
+        if (index >= pass->vertex_count || index < pass->first_loaded ||
+            index - pass->first_loaded >= pass->loaded_count)
             return index_fail(gltf, primitive, index, triangle, err);
-        batch->vertex[batch->corner_count + i] = index;
+        batch->vertex[batch->corner_count + i] = index - pass->first_loaded;
     }
     return STRL_OK;
 }
@@ -406,6 +435,21 @@ static void add_corners(strl__gltf *gltf, const uint32_t slots[3])
     }
 }
 
+/* One corner after the other, where the vertices lie far apart; of triangles from `first` on. */
+static strl_status look_up(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t first, size_t count,
+                           strl_error *err)
+{
+    const unsigned mode = strl__gltf_mode_of(primitive), shared = mode == 4 ? 0 : mode == 5 ? 2 : 1;
+    strl_status status = STRL_OK;
+    for (size_t i = 0; i < count && !status; i++) {
+        uint32_t index = gltf->elements[i];
+        if (index >= gltf->pass.vertex_count)
+            return index_fail(gltf, primitive, index, first + (mode == 4 ? i / 3 : i > shared ? i - shared : 0), err);
+        status = read_corners(gltf, primitive, index, 1, &gltf->corners[i], err);
+    }
+    return status;
+}
+
 /* The elements of triangles first .. first + count - 1 into elements or corners. */
 static strl_status read_run(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t first,
                             size_t count, strl_error *err)
@@ -413,9 +457,12 @@ static strl_status read_run(strl__gltf *gltf, const strl__gltf_primitive *primit
     const unsigned mode = strl__gltf_mode_of(primitive);
     const uint64_t begin = mode == 4 ? 3 * first : mode == 5 ? first : first + 1;
     const size_t elements = mode == 4 ? 3 * count : mode == 5 ? count + 2 : count + 1;
-    if (primitive->indices != STRL__NO_ITEM)
-        return strl__gltf_read_elements(gltf, primitive, begin, elements, gltf->elements, err);
-    return read_corners(gltf, primitive, begin, elements, gltf->corners, err);
+    if (primitive->indices == STRL__NO_ITEM)
+        return read_corners(gltf, primitive, begin, elements, gltf->corners, err);
+    strl_status status = strl__gltf_read_elements(gltf, primitive, begin, elements, gltf->elements, err);
+    if (!status && gltf->pass.is_scattered)
+        status = look_up(gltf, primitive, first, elements, err);
+    return status;
 }
 
 static size_t run_length(const strl__gltf *gltf, unsigned mode)
@@ -450,7 +497,7 @@ strl_status strl__gltf_add_triangles(strl__gltf *gltf, const strl__gltf_primitiv
             strl__gltf_corners_of(mode, pass->triangle + i, i, slots);
             if (pass->flips)
                 turn(slots);
-            if (primitive->indices == STRL__NO_ITEM)
+            if (primitive->indices == STRL__NO_ITEM || pass->is_scattered)
                 add_corners(gltf, slots);
             else
                 status = add_indexed(gltf, primitive, slots, pass->triangle + i, err);

@@ -50,12 +50,19 @@ const char *strl__assimp_extension(const char *path);
 /* Whether a file begins as one of those formats; asked where the name says nothing. */
 bool strl__assimp_recognises(const strl__input *input);
 
+/* A file that was read for this one. */
+typedef struct strl__beside {
+    uint64_t key; /* hash of its path */
+    char *path;   /* owned */
+    strl_file_info info;
+} strl__beside;
+
 struct strl_reader {
     const strl__format *format;
     void *state;       /* of the format; owned */
     char *path;        /* owned */
     char *scratch_dir; /* owned; NULL where none was given */
-    uint64_t memory_bytes;
+    uint64_t memory_bytes, whole_bytes; /* whole: 0 = unknown */
     strl_reader_child child; /* borrowed, during open */
     strl_axis default_up;
     const char *default_unit; /* static; NULL = unknown */
@@ -73,6 +80,9 @@ struct strl_reader {
     strl__batch batch;
     strl__names parts, materials;
     strl__names missing; /* sentences: why files that this one names could not be read */
+    strl__beside *beside; /* owned */
+    size_t beside_count, beside_capacity;
+    uint64_t beside_bytes; /* of their paths */
     strl__textures textures; /* of formats that have any */
     strl_reader_drops drops;
     strl_reader_costs costs;
@@ -87,9 +97,20 @@ struct strl_reader {
 strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__format *format,
                                  strl_reader **reader, strl_error *err);
 
+#define STRL__ADVICE_BYTES 80u
+
+/* How much memory would do where `needed` bytes do not fit a part of the budget of which there are
+ * `limit` bytes now: by --memory, where the reader knows of what it is a share. */
+void strl__reader_advise(const strl_reader *reader, uint64_t needed, uint64_t limit,
+                         char advice[STRL__ADVICE_BYTES]);
+
 /* Fails where an open file is not as it was. */
 strl_status strl__reader_check_unchanged(strl_file *file, const strl_file_info *opened,
                                          strl_error *err);
+
+/* Lists a file beside this one, once, however often it is noted. info NULL: as it is now. */
+strl_status strl__reader_note_beside(strl_reader *reader, const char *path,
+                                     const strl_file_info *info, strl_error *err);
 
 /* Allocates the batch for the reader's tables, which must be complete. */
 strl_status strl__reader_init_batch(strl_reader *reader, bool indexed, strl_error *err);

@@ -169,6 +169,8 @@ static strl_status read_library(strl_reader *reader, const char *name, size_t le
     strl_status status =
         path ? strl__mtl_read(path, &obj->library, &reader->textures, why, err)
              : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", reader->path);
+    if (!status && !why->status)
+        status = strl__reader_note_beside(reader, path, NULL, err);
     strl__free(path);
     return status;
 }

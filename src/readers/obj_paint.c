@@ -38,19 +38,26 @@ static char *beside(const strl_reader *reader, const char *path)
 strl_status strl__obj_open_picture(void *context, const strl__picture *picture, const char *ending,
                                    strl__picture_place *found, strl_error *err)
 {
-    const strl_reader *reader = context;
+    strl_reader *reader = context;
     char *path = ending ? strl__texture_rename(picture->key, ending) : strl__strdup(picture->key);
     char *other = path ? beside(reader, path) : NULL;
     strl_file *file = NULL;
+    strl_file_info info;
     strl_status status;
     if (!path || !other)
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
     else
         status = strl_file_open(
             !strl_path_exists(path) && strl_path_exists(other) ? other : path, &file, err);
+    if (!status)
+        status = strl_file_stat(file, &info, err);
+    if (!status)
+        status = strl__reader_note_beside(reader, strl_file_path(file), &info, err);
     if (status && path && other)
         status = strl__fail_context(err, status, "cannot be read");
-    if (!status)
+    if (status)
+        close_file(file);
+    else
         *found = (strl__picture_place){
             .source = {.context = file, .read = read_file, .bytes = strl_file_bytes(file)},
             .close = close_file};

@@ -4,9 +4,12 @@
 #include "readers/reader.h"
 
 #include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/hash.h"
 #include "base/memory.h"
 #include "readers/internal.h"
 #include "readers/stranger.h"
@@ -140,6 +143,7 @@ strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__forma
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a reader", desc->path);
     reader->format = format;
     reader->memory_bytes = memory_bytes;
+    reader->whole_bytes = desc->whole_bytes;
     uint64_t names_bytes = desc->names_bytes ? desc->names_bytes : memory_bytes / 8;
     strl__names_init(&reader->parts, (size_t)names_bytes);
     strl__names_init(&reader->materials, (size_t)(names_bytes / 2));
@@ -180,6 +184,9 @@ void strl_reader_close(strl_reader *reader)
     strl__names_deinit(&reader->parts);
     strl__names_deinit(&reader->materials);
     strl__names_deinit(&reader->missing);
+    for (size_t i = 0; i < reader->beside_count; i++)
+        strl__free(reader->beside[i].path);
+    strl__free(reader->beside);
     strl__textures_deinit(&reader->textures);
     strl_file_close(reader->decoded, NULL); /* without a name: nothing of it is left */
     strl_file_close(reader->file, NULL);    /* only read from */
@@ -301,6 +308,15 @@ strl_status strl_reader_next(strl_reader *reader, strl_triangle *triangles, size
     return reader->failure.status;
 }
 
+void strl__reader_advise(const strl_reader *reader, uint64_t needed, uint64_t limit, char advice[STRL__ADVICE_BYTES])
+{
+    const uint64_t whole = reader->whole_bytes ? reader->whole_bytes : reader->memory_bytes;
+    const double megabytes = (double)whole / (double)limit * (double)needed / (1 << 20);
+    snprintf(advice, STRL__ADVICE_BYTES,
+             reader->whole_bytes ? "--memory %.0fM would do" : "reading it takes about %.0fM of memory",
+             ceil(megabytes));
+}
+
 strl_status strl__reader_check_unchanged(strl_file *file, const strl_file_info *opened,
                                          strl_error *err)
 {
@@ -364,6 +380,44 @@ uint32_t strl_reader_missing_count(const strl_reader *reader)
 const char *strl_reader_missing(const strl_reader *reader, uint32_t index)
 {
     return reader->missing.items[index].text;
+}
+
+/* An entry of its own and no limit of their number: each of them was opened. */
+strl_status strl__reader_note_beside(strl_reader *reader, const char *path, const strl_file_info *info, strl_error *err)
+{
+    strl__beside made = {.key = strl__checksum(path, strlen(path))};
+    for (size_t i = 0; i < reader->beside_count; i++)
+        if (reader->beside[i].key == made.key && strcmp(reader->beside[i].path, path) == 0)
+            return STRL_OK;
+    reader->beside_bytes += strlen(path) + sizeof made;
+    if (reader->beside_bytes > reader->memory_bytes / 64)
+        return strl__fail(err, STRL_ERR_LIMIT,
+                          "%s: the names of the files that it names take more than the %" PRIu64
+                          " bytes that the memory budget allows: more --memory may help",
+                          reader->path, reader->memory_bytes / 64);
+    strl_status status = info ? STRL_OK : strl_path_stat(path, &made.info, err);
+    if (status)
+        return status;
+    if (info)
+        made.info = *info;
+    made.path = strl__strdup(path);
+    if (!made.path || !strl__grow(&reader->beside, &reader->beside_capacity, reader->beside_count + 1, sizeof made)) {
+        strl__free(made.path);
+        return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", reader->path);
+    }
+    reader->beside[reader->beside_count++] = made;
+    return STRL_OK;
+}
+
+uint32_t strl_reader_beside_count(const strl_reader *reader)
+{
+    return (uint32_t)reader->beside_count;
+}
+
+const char *strl_reader_beside(const strl_reader *reader, uint32_t index, strl_file_info *info)
+{
+    *info = reader->beside[index].info;
+    return reader->beside[index].path;
 }
 
 bool strl_reader_material_image(const strl_reader *reader, uint32_t material,

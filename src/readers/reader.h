@@ -9,6 +9,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "platform/file.h"
 #include "readers/image.h"
 #include "stroll/error.h"
 
@@ -51,6 +52,7 @@ typedef struct strl_reader_desc {
     const char *path;         /* UTF-8; borrowed during the call of open */
     const char *scratch_dir;  /* an existing folder for spill files, which close removes; borrowed during open */
     uint64_t memory_bytes;    /* budget of all the reader holds but names; 0 = 256 MiB; the least is 8 MiB */
+    uint64_t whole_bytes;     /* --memory, of which memory_bytes is a share: what sentences advise; 0 = unknown */
     uint64_t names_bytes;     /* budget of the names of parts; those of materials have half as much; 0 = an eighth of memory_bytes */
     strl_reader_child child;  /* borrowed during open: the child has ended before open returns */
 } strl_reader_desc;
@@ -95,6 +97,10 @@ uint64_t strl_reader_vertex_count(const strl_reader *reader);
  * next: what they would bring is as if absent. index < count; why, a sentence that names the file; borrowed until close. */
 uint32_t strl_reader_missing_count(const strl_reader *reader);
 const char *strl_reader_missing(const strl_reader *reader, uint32_t index);
+/* Files beside this one that were read for it (glTF's buffers, OBJ's material libraries, images; not what an importer opens
+ * on its own), each once, with their facts of then; all of them after a whole pass. index < count; borrowed until close. */
+uint32_t strl_reader_beside_count(const strl_reader *reader);
+const char *strl_reader_beside(const strl_reader *reader, uint32_t index, strl_file_info *info);
 /* Images that materials name and triangles show, and that could not be used (missing, of a kind that is not read, damaged,
  * too large), each once, after a whole pass: their materials have their colours alone. Of the first a sentence that names it
  * and says why; borrowed until close. */

@@ -96,13 +96,13 @@ static uint64_t child_bytes(const strl__model *model)
 static strl_status read_input(reading *self, const char *path, strl_error *err)
 {
     strl__model *model = self->model;
-    const strl_reader_desc desc = {.path = path,
-                                   .scratch_dir = model->desc->scratch_dir,
-                                   .memory_bytes = model->memory_bytes / 4,
-                                   .child = {.importer = model->desc->importer,
-                                             .memory_bytes = child_bytes(model),
-                                             .go_on = go_on,
-                                             .context = model}};
+    const strl_reader_desc desc = {
+        .path = path,
+        .scratch_dir = model->desc->scratch_dir,
+        .memory_bytes = model->memory_bytes / 4,
+        .whole_bytes = model->memory_bytes,
+        .child = {
+            .importer = model->desc->importer, .memory_bytes = child_bytes(model), .go_on = go_on, .context = model}};
     strl_reader *reader = NULL;
     strl_status status = strl_reader_open(&desc, &reader, err);
     if (status == STRL_OK)

@@ -4,10 +4,14 @@ import json
 import os
 import signal
 import subprocess
+import sys
 from random import Random
 
 from building import NotHere, assert_refused, must, run, run_tests, sanitizers
 from resuming import Build, Scene, read
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "readers"))
+import image_writer  # noqa: E402
 
 # Under a sanitizer, where a build takes ten times as long, fewer kills of a smaller model.
 KILLS, KILLED = (2, "72K") if sanitizers() else (8, "300K")
@@ -151,6 +155,62 @@ def another_request_is_refused(folder):
     scene.resume("--memory", "2G")
 
 
+def hang_image(source, name):
+    """Gives the model an image in a file beside it, which some triangle shows."""
+    folder = os.path.dirname(source)
+    with open(os.path.join(folder, name), "wb") as file:
+        file.write(image_writer.png([[(200, 30, 60), (20, 90, 240)]] * 2))
+    if source.endswith(".obj"):
+        with open(source, "a", encoding="utf-8") as file:
+            file.write("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nusemtl shown\nf -3/-3 -2/-2 -1/-1\n")
+        with open(os.path.join(folder, "in.mtl"), "a", encoding="utf-8") as file:
+            file.write(f"newmtl shown\nmap_Kd {name}\n")
+        return
+    model = json.loads(read(source))
+    primitive = model["meshes"][0]["primitives"][0]
+    model["accessors"].append({"componentType": 5126, "type": "VEC2",
+                               "count": model["accessors"][primitive["attributes"]["POSITION"]]["count"]})
+    primitive["attributes"]["TEXCOORD_0"] = len(model["accessors"]) - 1
+    model["materials"][primitive["material"]]["pbrMetallicRoughness"]["baseColorTexture"] = {"index": 0}
+    model.update(textures=[{"source": 0}], images=[{"uri": name}])
+    with open(source, "w", encoding="utf-8") as file:
+        json.dump(model, file)
+
+
+def a_changed_file_beside_the_model_is_refused(folder):
+    """What a glTF or an OBJ names is as much of the input as it is itself."""
+    for ending, name in (("gltf", "in_000.bin"), ("obj", "in.mtl"), ("gltf", "image.png"), ("obj", "image.png")):
+        own = os.path.join(folder, ending + name)
+        os.mkdir(own)
+        source, beside, out = (os.path.join(own, part) for part in (f"in.{ending}", name, "out.stroll"))
+        must("scene", "plant", "--triangles", SMALL, "-o", source, "--quiet")
+        if name == "image.png":
+            hang_image(source, name)
+        said = None
+        for attempt in range(20):
+            build = Build(source, "-o", out)
+            build.wait_for(os.path.join(out + ".tmp", "nodes-01.spill"))
+            said = build.stop(signal.SIGKILL)
+            if said is not None:
+                break
+            os.remove(out)
+        assert said is not None, "no build could be stopped"
+        facts = os.stat(beside)
+        os.utime(beside, ns=(facts.st_atime_ns, facts.st_mtime_ns + 10**9))
+        assert_begins_anew(run("build", source, "-o", out, "--resume"), f"{name} was changed")
+        with open(beside, "ab") as file:
+            file.write(b"\n")
+        assert_begins_anew(run("build", source, "-o", out, "--resume"), f"{name} has")
+        os.rename(beside, beside + ".away")
+        assert_begins_anew(run("build", source, "-o", out, "--resume"), name, "No such file")
+        os.rename(beside + ".away", beside)
+        os.truncate(beside, facts.st_size)
+        os.utime(beside, ns=(facts.st_atime_ns, facts.st_mtime_ns))
+        done = must("build", source, "-o", out, "--resume", "--json")
+        result = json.loads(done.output)
+        assert result["resumed"] and result["warnings"]["missing_images"] == 0, result
+
+
 def scratch_elsewhere_is_found_again_and_removed(folder):
     scene = Scene(folder, SMALL)
     elsewhere = os.path.join(folder, "elsewhere")
@@ -215,4 +275,5 @@ if sanitizers():  # what reads scratch; the rest is the program's order of work,
 run_tests(killed_at_random_moments_it_resumes, killed_while_it_writes_it_resumes,
           interrupted_it_keeps_what_is_finished, with_nothing_to_resume_it_begins, of_a_small_model_nothing_is_kept, without_resume_it_begins_anew,
           what_was_not_saved_is_cut_off_or_removed, damage_is_found, another_request_is_refused,
+          a_changed_file_beside_the_model_is_refused,
           scratch_elsewhere_is_found_again_and_removed, on_a_full_disk_it_waits_for_room)

@@ -57,6 +57,24 @@ class Test:
         command = [str(word) for word in (program or self.program, *words)]
         return subprocess.run(command, capture_output=True, text=True, cwd=self.folder, env=environment, timeout=300)
 
+    def test_scratch(self, size=260):
+        """The spool is gone before the later stages want their scratch."""
+        points = [f"{i % size} {i // size} {i * i % 7 / 8}" for i in range(size * size)]
+        faces = [corners for y in range(size - 1) for x in range(size - 1) for at in [y * size + x]
+                 for corners in ((at, at + 1, at + size), (at + 1, at + size + 1, at + size))]
+        off, obj = self.folder / "sheet.off", self.folder / "sheet.obj"
+        off.write_text(f"OFF\n{len(points)} {len(faces)} 0\n" + "\n".join(points) + "\n" +
+                       "".join("3 %d %d %d\n" % face for face in faces))
+        obj.write_text("".join(f"v {point}\n" for point in points) +
+                       "".join("f %d %d %d\n" % tuple(corner + 1 for corner in face) for face in faces))
+        taken = {}
+        for path in (off, obj):
+            done = self.run("build", path, "-o", self.out, "--json", "--quiet")
+            taken[path] = json.loads(done.stdout)["scratch_bytes"] / len(faces)
+            self.out.unlink()
+        self.check("a spool adds less to the scratch taken at once than it holds",
+                   taken[obj] < taken[off] < taken[obj] + 10, taken)
+
     def script(self, lines):
         path = self.folder / "importer"
         path.write_text("#!/bin/sh\n" + lines + "\n")
@@ -178,6 +196,7 @@ def main():
             test.test_built()
             if not sanitizers():
                 test.test_memory()
+                test.test_scratch()
         else:
             print("skipped: stroll-import was not built, libassimp-dev is missing")
         if test.failures:

@@ -3,9 +3,10 @@
  *   pack_mesh attributes|triangles|indices COUNT STRIDE        raw elements
  *   pack_mesh octahedral|quaternion|exponential COUNT STRIDE   floats, 4 an element (exponential: STRIDE / 4),
  *                                                              filtered, then packed as attributes
- *   pack_mesh draco edgebreaker|sequential FACES COLOURS       corners: 3 floats of position, 3 of normal, and with
+ *   pack_mesh draco edgebreaker|sequential FACES COLOURS [EXTRA]   corners: 3 floats of position, 3 of normal, and with
  *                                                              COLOURS = 1 four bytes of colour; the number of points
- *                                                              goes to standard error */
+ *                                                              goes to standard error. EXTRA attributes of 16 shorts, all 0, are
+ *                                                              added */
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
@@ -68,7 +69,7 @@ static int pack_meshopt(const std::string &kind, size_t count, size_t stride)
     return write_all(packed.data(), packed.size());
 }
 
-static int pack_draco(const std::string &method, uint32_t faces, bool colours)
+static int pack_draco(const std::string &method, uint32_t faces, bool colours, int extra)
 {
     const std::vector<unsigned char> raw = read_all();
     const size_t corner = 24 + (colours ? 4 : 0);
@@ -79,11 +80,17 @@ static int pack_draco(const std::string &method, uint32_t faces, bool colours)
     const int position = builder.AddAttribute(draco::GeometryAttribute::POSITION, 3, draco::DT_FLOAT32);
     const int normal = builder.AddAttribute(draco::GeometryAttribute::NORMAL, 3, draco::DT_FLOAT32);
     const int colour = colours ? builder.AddAttribute(draco::GeometryAttribute::COLOR, 4, draco::DT_UINT8, true) : -1;
+    static const int16_t zeros[16] = {};
+    std::vector<int> extras;
+    for (int i = 0; i < extra; i++)
+        extras.push_back(builder.AddAttribute(draco::GeometryAttribute::GENERIC, 16, draco::DT_INT16));
     for (uint32_t face = 0; face < faces; face++) {
         const unsigned char *at = &raw[face * 3 * corner];
         const draco::FaceIndex index(face);
         builder.SetAttributeValuesForFace(position, index, at, at + corner, at + 2 * corner);
         builder.SetAttributeValuesForFace(normal, index, at + 12, at + corner + 12, at + 2 * corner + 12);
+        for (int id : extras)
+            builder.SetAttributeValuesForFace(id, index, zeros, zeros, zeros);
         if (colours)
             builder.SetAttributeValuesForFace(colour, index, at + 24, at + corner + 24, at + 2 * corner + 24);
     }
@@ -102,8 +109,9 @@ static int pack_draco(const std::string &method, uint32_t faces, bool colours)
 
 int main(int argc, char **argv)
 {
-    if (argc == 5 && strcmp(argv[1], "draco") == 0)
-        return pack_draco(argv[2], static_cast<uint32_t>(atoi(argv[3])), atoi(argv[4]) != 0);
+    if ((argc == 5 || argc == 6) && strcmp(argv[1], "draco") == 0)
+        return pack_draco(argv[2], static_cast<uint32_t>(atoi(argv[3])), atoi(argv[4]) != 0,
+                          argc == 6 ? atoi(argv[5]) : 0);
     if (argc == 4)
         return pack_meshopt(argv[1], static_cast<size_t>(atoi(argv[2])), static_cast<size_t>(atoi(argv[3])));
     fprintf(stderr, "pack_mesh: see its source for usage\n");

@@ -30,14 +30,17 @@ static uint64_t hash_number(uint64_t hash, double value)
 static json_t *show(const strl_triangle *t)
 {
     json_t *positions = json_array(), *normals = json_array(), *colours = json_array();
+    json_t *texcoords = json_array(); /* none where there are none */
     for (unsigned i = 0; i < 9; i++) {
         json_array_append_new(positions, json_real(t->position[i / 3][i % 3]));
         json_array_append_new(normals, json_real((double)t->normal[i / 3][i % 3]));
     }
     for (unsigned i = 0; i < 3; i++)
         json_array_append_new(colours, json_integer(t->colour[i]));
-    return json_pack("{s:o,s:o,s:o,s:I,s:I,s:I}", "positions", positions, "normals", normals,
-                     "colours", colours, "part", (json_int_t)t->part, "material",
+    for (unsigned i = 0; i < 6 && t->flags & STRL_TRIANGLE_HAS_TEXCOORD; i++)
+        json_array_append_new(texcoords, json_real((double)t->texcoord[i / 2][i % 2]));
+    return json_pack("{s:o,s:o,s:o,s:o,s:I,s:I,s:I}", "positions", positions, "normals", normals,
+                     "colours", colours, "texcoords", texcoords, "part", (json_int_t)t->part, "material",
                      (json_int_t)t->material, "flags", (json_int_t)t->flags);
 }
 

@@ -5,6 +5,7 @@ import copy
 import json
 import os
 import random
+import re
 import struct
 
 import gltf_writer as w
@@ -215,17 +216,25 @@ def bad_json_is_refused_with_its_place(folder):
         refuse(f"{folder}/bad.gltf", sentence)
 
 
+def the_memory_that_is_told_would_do(path, *parts):
+    """And not a third of it."""
+    sentence = refuse(path, "the memory budget allows", *parts)
+    told = int(re.search(r"reading it takes about (\d+)M of memory$", sentence).group(1)) << 20
+    assert LEAST < told < 40 * LEAST, sentence
+    refuse(path, *parts, memory=max(LEAST, told // 3))
+    assert read(path, told)["count"] == 2
+
+
 def json_beyond_the_budget_is_refused(folder):
     model = quad()
     model.json["nodes"] = [{"name": "n" * 40} for _ in range(30000)] + [{"mesh": 0}]
     model.json["scenes"] = [{"nodes": [30000]}]
     model.glb(f"{folder}/nodes.glb")
-    refuse(f"{folder}/nodes.glb", "JSON", "bytes", "more --memory may help")
-    assert read(f"{folder}/nodes.glb", 256 << 20)["count"] == 2
+    the_memory_that_is_told_would_do(f"{folder}/nodes.glb", "what its JSON describes")
     model = quad()
     model.json["nodes"][0]["name"] = "n" * 200000
     model.glb(f"{folder}/name.glb")
-    refuse(f"{folder}/name.glb", "longer than the", "--memory")
+    the_memory_that_is_told_would_do(f"{folder}/name.glb", "this part of its JSON is 2000")
     model.json["nodes"][0] = {"mesh": 0, "extras": {"text": "n" * 2000000}}
     model.glb(f"{folder}/extras.glb")
     assert read(f"{folder}/extras.glb")["count"] == 2
@@ -240,11 +249,18 @@ def compressed_views_that_lie_are_refused(folder):
     model.json["bufferViews"][0] = {"buffer": 0, "byteLength": 48, "extensions": {"EXT_meshopt_compression": good}}
     model.glb(f"{folder}/meshopt.glb")
     assert read(f"{folder}/meshopt.glb")["count"] == 2
+    large = copy.deepcopy(model)
+    zeros, _ = pack("attributes", 1 << 20, 12, data=bytes(12 << 20))
+    place = large.json["bufferViews"][large.view(zeros)]["byteOffset"]
+    large.json["bufferViews"][0]["extensions"]["EXT_meshopt_compression"].update(
+        count=1 << 20, byteLength=len(zeros), byteOffset=place)
+    large.glb(f"{folder}/large.glb")
+    the_memory_that_is_told_would_do(f"{folder}/large.glb", "a compressed buffer view takes")
     cases = [({"byteStride": 6}, "do not fit"), ({"byteStride": 260}, "1 to 256"), ({"byteStride": 0}, "1 to 256"),
              ({"mode": "TRIANGLES"}, "do not fit"), ({"mode": "INDICES", "byteStride": 12}, "do not fit"),
              ({"mode": "NOTHING"}, "EXT_meshopt_compression knows"), ({"filter": "OCTAHEDRAL"}, "do not fit"),
              ({"filter": "QUATERNION"}, "do not fit"), ({"count": 3}, "do not fit"), ({"count": 1 << 61}, "do not fit"),
-             ({"count": 1 << 31}, "decompressed", "--memory"), ({"byteLength": 1 << 40}, "end after the buffer"),
+             ({"count": 1 << 31}, "decompressed", "of memory"), ({"byteLength": 1 << 40}, "end after the buffer"),
              ({"byteLength": 9}, "damaged"), ({"byteLength": 0}, "damaged"), ({"byteOffset": 0}, "damaged"),
              ({"buffer": 5}, "found 5")]
     for change, *sentence in cases:
@@ -252,6 +268,36 @@ def compressed_views_that_lie_are_refused(folder):
         wrong.json["bufferViews"][0]["extensions"]["EXT_meshopt_compression"].update(change)
         wrong.glb(f"{folder}/wrong.glb")
         refuse(f"{folder}/wrong.glb", *sentence)
+
+
+def draco_attributes_beyond_the_budget_are_refused(folder):
+    """A thousand points of a hundred attributes that nobody asks for pack to next to nothing."""
+    points, faces = [(i % 40, i // 40, i % 3) for i in range(1600)], []
+    for i in range(39 * 39):
+        at = i // 39 * 40 + i % 39
+        faces += [at, at + 1, at + 40, at + 1, at + 41, at + 40]
+    corner = b"".join(struct.pack("<6f", *points[i], 0, 0, 1) for i in faces)
+    for method in ("sequential", "edgebreaker"):
+        for extra, refused in ((0, False), (100, True)):
+            packed, told = pack("draco", method, len(faces) // 3, 0, extra, data=corner)
+            model = w.Model()
+            model.json["accessors"] = [{"componentType": w.FLOAT, "type": "VEC3", "count": int(told)},
+                                       {"componentType": w.U32, "type": "SCALAR", "count": len(faces)}]
+            draco = {"bufferView": model.view(packed), "attributes": {"POSITION": 0}}
+            mesh = model.mesh({"attributes": {"POSITION": 0}, "indices": 1,
+                               "extensions": {"KHR_draco_mesh_compression": draco}})
+            model.scene(model.node(mesh=mesh))
+            path = f"{folder}/draco.glb"
+            model.glb(path)
+            if not refused:
+                assert read(path)["count"] == len(faces) // 3
+                continue
+            memory = LEAST
+            for _ in range(2):  # the faces may be too much before the attributes are known
+                if "error" in read(path, memory):
+                    sentence = refuse(path, "a Draco mesh", "the memory budget allows", memory=memory)
+                    memory = int(re.search(r"about (\d+)M of memory$", sentence).group(1)) << 20
+            assert memory > LEAST and read(path, memory)["count"] == len(faces) // 3
 
 
 def draco_meshes_that_lie_are_refused(folder):
@@ -309,4 +355,5 @@ run_tests([every_beginning_of_a_glb_is_refused, every_beginning_of_a_text_is_ref
            transforms_that_overflow_drop_their_triangles, sparse_elements_that_are_not_in_order_are_refused,
            buffers_that_are_not_there_are_refused, extensions_that_must_be_understood_are_refused_by_name,
            bad_json_is_refused_with_its_place, json_beyond_the_budget_is_refused, compressed_views_that_lie_are_refused,
-           draco_meshes_that_lie_are_refused, any_byte_of_a_model_may_be_another])
+           draco_meshes_that_lie_are_refused,
+           draco_attributes_beyond_the_budget_are_refused, any_byte_of_a_model_may_be_another])

@@ -6,6 +6,7 @@
 
 #include "base/fail.h"
 #include "base/memory.h"
+#include "build/checkpoint.h"
 #include "build/ingest/internal.h"
 #include "platform/file.h"
 #include "platform/thread.h"
@@ -57,7 +58,7 @@ static void note_costs(strl_build_context *context, const strl_reader *reader)
     strl_build_result *result = context->result;
     strl_reader_costs costs;
     strl_reader_costs_get(reader, &costs);
-    result->scratch_bytes += costs.scratch_bytes;
+    context->spool_bytes += costs.scratch_bytes;
     if (costs.child_rss_bytes > result->peak_rss_bytes)
         result->peak_rss_bytes = costs.child_rss_bytes;
 }
@@ -67,8 +68,10 @@ static strl_status open_readers(strl_build_context *context, strl_reader **reade
     strl_status status = STRL_OK;
     uint64_t share = context->memory_bytes / 4; /* one at a time is read */
     for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
-        strl_reader_desc desc = {.path = context->desc->inputs[i], .scratch_dir = context->scratch_dir,
+        strl_reader_desc desc = {.path = context->desc->inputs[i],
+                                 .scratch_dir = context->scratch_dir,
                                  .memory_bytes = share < LEAST_READER_BYTES ? LEAST_READER_BYTES : share,
+                                 .whole_bytes = context->memory_bytes,
                                  .names_bytes = context->memory_bytes / 6,
                                  .child = plan_child(context)};
         strl_reader_info info;
@@ -202,12 +205,16 @@ strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, st
     if (status)
         goto done;
     strl__ingest_warn(context, readers, ingest); /* not before: of a refused model only the refusal is told */
-    for (uint32_t i = 0; i < context->desc->input_count; i++) {
+    strl__build_note_scratch(context);
+    context->spool_bytes = 0;
+    for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
+        status = strl__request_note_beside(context, readers[i], err);
         strl_reader_close(readers[i]);
         readers[i] = NULL;
     }
     strl__build_stage(context, "sort");
-    status = strl__sort_buckets(context, ingest, &buckets, &pairs, err);
+    if (!status)
+        status = strl__sort_buckets(context, ingest, &buckets, &pairs, err);
     if (status)
         goto done;
     strl__build_stage(context, "connect");
