@@ -153,6 +153,19 @@ class Bench:
                                "-o", target, "--stats", stats, *options)
         return measure.read_lines(stats), outcome.seconds
 
+    def compare_pair(self, model, path, frames, options, limits, sheet=None):
+        """Container against the input as read, with the input's cameras: paths made from both differ by a lattice step."""
+        reference, ours = self.scratch / f"{model}_{path}_reference", self.scratch / f"{model}_{path}"
+        _, reference_seconds = self.render(self.reference_of(model), reference, path, "--frames", frames, "--full", *options)
+        stats, seconds = self.render(self.container_of(model), ours, reference / "path.json", *options)
+        outcome = self.program("compare", reference, ours, "--error", 1, "--json", *limits, allowed=(0, 1))
+        compared = outcome.json()
+        if sheet and frames > 1:
+            sheet.parent.mkdir(exist_ok=True)
+            sheets.side_by_side(reference / "contact.png", ours / "contact.png", frames, sheet)
+        self.drop(reference, ours)
+        return compared, stats, {"seconds": seconds, "reference_seconds": reference_seconds, "said": outcome.errors}
+
     def write_spiral(self, path, model, frames):
         write_spiral(path, self.program("info", self.container_of(model), "--json").json()["bounds"], frames)
 
@@ -178,27 +191,13 @@ def part_build(bench, model):
                   bytes_per_triangle=report["bytes_out"] / max(1, report["triangles_in"]))
 
 
-def compare_pair(bench, model, path, frames, options, limits, sheet=None):
-    """Container against the input as read, with the input's cameras: paths made from both differ by a lattice step."""
-    reference, ours = bench.scratch / f"{model}_{path}_reference", bench.scratch / f"{model}_{path}"
-    _, reference_seconds = bench.render(bench.reference_of(model), reference, path, "--frames", frames, "--full", *options)
-    stats, seconds = bench.render(bench.container_of(model), ours, reference / "path.json", *options)
-    outcome = bench.program("compare", reference, ours, "--error", 1, "--json", *limits, allowed=(0, 1))
-    compared = outcome.json()
-    if sheet and frames > 1:
-        sheet.parent.mkdir(exist_ok=True)
-        sheets.side_by_side(reference / "contact.png", ours / "contact.png", frames, sheet)
-    bench.drop(reference, ours)
-    return compared, stats, {"seconds": seconds, "reference_seconds": reference_seconds, "said": outcome.errors}
-
-
 def part_images(bench, model):
     settings = {"frames": bench.options.frames, "size": bench.options.size}
     for path in PATHS:
         if bench.kept(f"images_{path}", model, settings):
             continue
         sheet = bench.scratch / "sheets" / f"{model}_{path}.png"
-        compared, stats, times = compare_pair(bench, model, path, settings["frames"], ("--depth",), ("--psnr", 0), sheet)
+        compared, stats, times = bench.compare_pair(model, path, settings["frames"], ("--depth",), ("--psnr", 0), sheet)
         covered = [frame["triangles"] / frame["covered_pixels"] for frame in stats if frame["covered_pixels"]]
         claims = [frame["max_error_px"] for frame in stats if frame["max_error_px"] is not None]
         bench.log.add(f"images_{path}", model, settings, compare=compared, max_error_px=max(claims, default=None),
@@ -212,7 +211,7 @@ def part_psnr(bench, model):
         if bench.kept(f"psnr_{path}", model, settings):
             continue
         options = ("--depth", "--supersample", 4)
-        compared, _, times = compare_pair(bench, model, path, settings["frames"], options, ())
+        compared, _, times = bench.compare_pair(model, path, settings["frames"], options, ())
         bench.log.add(f"psnr_{path}", model, settings, compare=compared, **times)
 
 

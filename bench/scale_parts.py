@@ -58,15 +58,20 @@ def runs_of(bench, triangles):
     return bench.options.runs if triangles < ONE_RUN_FROM else 1
 
 
-def part_shapes(bench, models):
+def build_in_turn(bench, models, count):
     """Interleaved, so that a slow minute of the machine meets each model."""
+    runs = {model: [] for model in models}
+    for _ in range(count):
+        for model in models:
+            runs[model].append(build_once(bench, model)[1])
+    return runs
+
+
+def part_shapes(bench, models):
     settings = {"memory": MEMORY, "runs": bench.options.runs, "models": list(models)}
     if all([bench.kept("shapes", model, settings) for model in models]):
         return
-    runs = {model: [] for model in models}
-    for _ in range(settings["runs"]):
-        for model in models:
-            runs[model].append(build_once(bench, model)[1])
+    runs = build_in_turn(bench, models, settings["runs"])
     for model in models:
         bench.log.add("shapes", model, settings, memory_bytes=MEMORY_BYTES, **gathered(runs[model]))
     bench.forget_scenes(models)

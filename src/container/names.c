@@ -105,6 +105,10 @@ static strl_status find_name(strl_container *container, strl__table *table, uint
     strl_status status = strl__page_table_get(table, container->source, index, &item, &bytes, &first, err);
     if (status != STRL_OK)
         return status;
+    if (bytes < head_bytes)
+        return name_fault(table, index, bytes, err);
+    if (head_bytes)
+        memcpy(head, item, head_bytes);
     if (!table->last) {
         table->last = strl__alloc(1, sizeof *table->last);
         if (!table->last)
@@ -120,11 +124,6 @@ static strl_status find_name(strl_container *container, strl__table *table, uint
     }
     if (status != STRL_OK)
         table->last->first = UINT64_MAX;
-    else if (head_bytes) { /* where the name was there already, no item is at hand */
-        status = strl__page_table_get(table, container->source, index, &item, &bytes, &other, err);
-        if (status == STRL_OK)
-            memcpy(head, item, head_bytes);
-    }
     return status;
 }
 
