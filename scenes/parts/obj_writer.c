@@ -130,11 +130,8 @@ static strl_status put_vertices(obj_writer *self, const strl__part_mesh *mesh, c
 {
     strl_status status = STRL_OK;
     for (uint32_t i = 0; status == STRL_OK && i < mesh->vertex_count; i++) {
-        const float *from = mesh->vertices + (size_t)i * STRL__PART_VERTEX_FLOATS;
-        double position[3] = {from[0], from[1], from[2]}, normal[3] = {from[3], from[4], from[5]};
-        strl__affine_point(world, position, position);
-        strl__affine_vector(world, normal, normal);
-        strl__normalise(normal);
+        double position[3], normal[3];
+        strl__part_vertex_in_world(mesh, i, world, position, normal);
         status = put_triple(&self->text, "v", position, POSITION_DIGITS, err);
         if (status == STRL_OK && !self->desc.no_normals)
             status = put_triple(&self->text, "vn", normal, NORMAL_DIGITS, err);

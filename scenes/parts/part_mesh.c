@@ -169,3 +169,14 @@ void strl__part_prism(strl__part_mesh *mesh, const strl__outline *outline, doubl
     put_cap(mesh, outline, 0, false);
     put_cap(mesh, outline, length, true);
 }
+
+void strl__part_vertex_in_world(const strl__part_mesh *mesh, uint32_t vertex, const strl__affine *world, double position[3],
+                                double normal[3])
+{
+    const float *from = mesh->vertices + (size_t)vertex * STRL__PART_VERTEX_FLOATS;
+    for (int k = 0; k < 3; k++)
+        position[k] = (double)from[k], normal[k] = (double)from[3 + k];
+    strl__affine_point(world, position, position);
+    strl__affine_vector(world, normal, normal);
+    strl__normalise(normal);
+}

@@ -81,4 +81,8 @@ void strl__part_torus(strl__part_mesh *mesh, double ring, double radius, int sid
 /* A bolt on z from its head at `low` to its nut at `high`. */
 void strl__part_bolt(strl__part_mesh *mesh, double radius, double low, double high);
 
+/* A vertex in the world: its position, and its normal of length 1. */
+void strl__part_vertex_in_world(const strl__part_mesh *mesh, uint32_t vertex, const strl__affine *world, double position[3],
+                                double normal[3]);
+
 #endif

@@ -33,11 +33,8 @@ static strl_status put_vertices(plain_writer *self, const strl__part_mesh *mesh,
     float records[VERTEX_BATCH * STRL__PART_VERTEX_FLOATS], *to = records;
     strl_status status = STRL_OK;
     for (uint32_t i = 0; status == STRL_OK && i < mesh->vertex_count; i++) {
-        const float *from = mesh->vertices + (size_t)i * STRL__PART_VERTEX_FLOATS;
-        double position[3] = {from[0], from[1], from[2]}, normal[3] = {from[3], from[4], from[5]};
-        strl__affine_point(world, position, position);
-        strl__affine_vector(world, normal, normal);
-        strl__normalise(normal);
+        double position[3], normal[3];
+        strl__part_vertex_in_world(mesh, i, world, position, normal);
         for (int k = 0; k < 3; k++)
             *to++ = (float)position[k];
         for (int k = 0; k < 3 && !self->no_normals; k++)
