@@ -45,7 +45,7 @@ def a_million_triangles_fit_into_64_mib(folder):
 
 def many_threads_share_the_same_memory(folder):
     source = os.path.join(folder, "in.ply")
-    must("scene", "isosurface", "--triangles", "500K", "-o", source, "--quiet")
+    must("scene", "isosurface", "--triangles", "250K", "-o", source, "--quiet")
     build_within(source, folder, 128, 8)
 
 
@@ -72,7 +72,7 @@ def many_shaded_parts_fit(folder):
 
 def in_any_order_it_fits(folder):
     source = os.path.join(folder, "in.ply")
-    must("scene", "isosurface", "--triangles", "500K", "-o", source, "--quiet", "--shuffle")
+    must("scene", "isosurface", "--triangles", "300K", "-o", source, "--quiet", "--shuffle")
     build_within(source, folder, 64, 2)
 
 
