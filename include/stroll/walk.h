@@ -45,6 +45,7 @@ typedef struct strl_walk_desc {
 typedef struct strl_walk_stats {
     uint64_t frame;
     uint64_t triangles;        /* in visible items */
+    uint64_t splats;           /* beside them */
     uint32_t nodes;            /* visible items */
     uint32_t nodes_culled;     /* active, but outside the frustum */
     uint32_t missing_nodes;    /* nodes of the wanted front that are not drawn yet; where the records of their parents' children are

@@ -132,7 +132,10 @@ static strl_status descend(strl__descent *c, const strl__group *group, double px
         if (!want_child(c, child, px) || !strl__add_visit(&walk->below, child, ready))
             return strl__no_memory(c->err);
     }
-    return ready ? note_split(c, group) : stay(c, group, 0);
+    if (!ready)
+        return stay(c, group, 0);
+    strl_status status = c->tree->structure == STRL_STRUCTURE_SAMPLES ? stay(c, group, 0) : STRL_OK; /* drawn with what is below */
+    return status ? status : note_split(c, group);
 }
 
 static strl_status keep(strl__descent *c, const strl__group *group, bool complete, double px)

@@ -22,6 +22,7 @@
 
 #define STRL__REQUEST_NODES 32u /* most nodes that one page is read for at a time */
 #define STRL__MAX_REQUESTS 256u
+#define STRL__PLACEMENT_BITS 24u /* a load's number and a placement share a key; strl_walk_open refuses more placements */
 #define STRL__GIVE_UP_FAILURES 3u /* from then on strl_walk_settled does not wait for it; it is still retried */
 
 typedef enum strl__residency { STRL__ABSENT, STRL__PENDING, STRL__RESIDENT } strl__residency;
@@ -48,6 +49,8 @@ typedef struct strl__mesh {
     uint16_t *indices;                   /* [3 * triangle_count] */
     uint16_t (*finest)[3];               /* [triangle_count], corners of the finest state; NULL at leaves */
     strl_vertex_label *labels;           /* [vertex_count]; NULL where the walk keeps none */
+    strl_splat *splats;                  /* [splat_count]; of bricks */
+    uint32_t splat_count;
 } strl__mesh;
 
 typedef struct strl__node {
@@ -283,6 +286,9 @@ struct strl_walk {
     strl__front front;
     strl_draw_item *items;
     size_t item_capacity;
+    strl_vertex *points; /* splats of the frame */
+    size_t point_count, point_capacity;
+    uint16_t *numbers; /* 0, 1, 2, ...; NULL where there was no splat yet */
     strl_camera camera; /* of the last frame */
     strl_walk_stats stats;
 };
@@ -344,6 +350,13 @@ strl_status strl__budget_cut(strl_walk *walk, const strl_view *view, strl__cut *
 
 /* refine.c */
 void strl__refine_front(strl_walk *walk);
+
+/* brick.c: thread-safe. Vertices and labels are the caller's to fill in. */
+strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const strl_sample_head *head, bool labels,
+                               strl__mesh *mesh, strl_error *err);
+
+/* splats.c: behind the other items of the list. */
+strl_status strl__draw_splats(strl_walk *walk, strl_draw_list *list, strl_error *err);
 
 /* draw.c */
 strl_status strl__draw_list(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err);

@@ -232,6 +232,8 @@ void strl_walk_close(strl_walk *walk)
                            walk->prefetch.items,
                            walk->front.items,
                            walk->items,
+                           walk->points,
+                           walk->numbers,
                            walk};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         strl__free(owned[i]);
