@@ -73,17 +73,17 @@ static strl_status check_mesh(const strl_node *record, const strl_pm *mesh, strl
     return status;
 }
 
-strl_status strl_page_head(const strl_node *record, const void *page, size_t size, strl_arena *arena, strl_sample_head *head,
+strl_status strl_page_head(const strl_node *record, const void *page, size_t size, strl_arena *arena, strl_brick_head *head,
                            strl_error *err)
 {
     size_t bytes;
-    *head = (strl_sample_head){0};
+    *head = (strl_brick_head){0};
     if (record->payload_bytes == 0 || record->payload_offset > size || record->payload_bytes > size - record->payload_offset)
         return strl__fail(err, STRL_ERR_FORMAT, "its %" PRIu32 " bytes pass the end of a page of %zu bytes",
                           record->payload_bytes, size);
     const uint8_t *payload = (const uint8_t *)page + record->payload_offset;
     return payload[0] == STRL_BRICK_VERSION
-               ? strl_sample_head_read(payload, record->payload_bytes, record->triangle_count, arena, head, &bytes, err)
+               ? strl_brick_head_read(payload, record->payload_bytes, record->triangle_count, arena, head, &bytes, err)
                : STRL_OK;
 }
 
@@ -101,10 +101,10 @@ static strl_status decode(const strl_node *record, const uint8_t *page, size_t s
                           record->payload_bytes, size);
     const uint8_t *payload = page + record->payload_offset;
     size_t head_bytes = 0;
-    strl_sample_head head;
+    strl_brick_head head;
     strl_status status = STRL_OK;
     if (payload[0] == STRL_BRICK_VERSION)
-        status = strl_sample_head_read(payload, record->payload_bytes, record->triangle_count, arena, &head, &head_bytes, err);
+        status = strl_brick_head_read(payload, record->payload_bytes, record->triangle_count, arena, &head, &head_bytes, err);
     if (status == STRL_OK)
         status = check_sizes(record, payload + head_bytes, record->payload_bytes - head_bytes, err);
     if (status == STRL_OK)

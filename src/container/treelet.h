@@ -38,7 +38,7 @@ strl_status strl_page_check(const strl_page_ref *ref, const void *data, size_t s
 strl_status strl_page_mesh(const strl_node *record, const void *page, size_t size, const strl_payload_reference *reference,
                            strl_arena *arena, strl_pm *mesh, strl_error *err);
 /* What stands before the mesh in a node of a sample tree; zero in others. Runs come from arena. */
-strl_status strl_page_head(const strl_node *record, const void *page, size_t size, strl_arena *arena, strl_sample_head *head,
+strl_status strl_page_head(const strl_node *record, const void *page, size_t size, strl_arena *arena, strl_brick_head *head,
                            strl_error *err);
 /* Sets the offset of a reference whose positions are relative to `anchor`, for a node's payload. */
 void strl_page_place(strl_payload_reference *reference, const int64_t anchor[3], const strl_node *record);

@@ -17,23 +17,36 @@ typedef struct strl_splat {
     uint32_t rgba;      /* mean colour, sRGB-encoded */
 } strl_splat;
 
-#define STRL_SPLAT_BYTES 21u /* in a payload */
-#define STRL_MAX_SPLATS 8u
 /* First byte of such a payload; that of a mesh's is 1. */
 #define STRL_BRICK_VERSION 2u
+#define STRL_BRICK_LEVELS 22u
+#define STRL_BRICK_SPLATS 4096u
 
-/* The front part of a payload. */
-typedef struct strl_sample_head {
-    uint32_t splat_count;
-    strl_splat splat[STRL_MAX_SPLATS];
-    uint32_t run_count;   /* of triangles in the order of the mesh: of splats, large, of splats, ... */
-    const uint32_t *run;  /* [run_count] borrowed; none = all are of splats */
-} strl_sample_head;
+/* Triangles that follow each other in the mesh and are of one level. */
+typedef struct strl_brick_run {
+    uint32_t level, count;
+} strl_brick_run;
+
+/* The front part of a payload. Level 0 are triangles that are always drawn; in state s those of levels up to s are, and for what is
+ * finer the splats of level s + 1; in state level_count there is nothing finer. */
+typedef struct strl_brick_head {
+    uint32_t level_count; /* 0: the payload is a mesh's */
+    float error[STRL_BRICK_LEVELS];           /* [level_count] size of what the splats of level s + 1 stand for, lattice units; falling */
+    uint32_t splat_end[STRL_BRICK_LEVELS];    /* [level_count] those of level s + 1 end before this one */
+    strl_splat *splat;    /* [splat_end of the last level] */
+    uint32_t run_count;
+    strl_brick_run *run;  /* [run_count] of triangles in the order of the mesh */
+} strl_brick_head;
+
+static inline uint32_t strl_brick_splats(const strl_brick_head *head)
+{
+    return head->level_count ? head->splat_end[head->level_count - 1] : 0;
+}
 
 /* Appends it. */
-void strl_sample_head_write(const strl_sample_head *head, strl_writer *writer);
-/* *bytes: its length; the mesh's payload follows. Runs come from arena. triangles: of the mesh, which runs must sum up to. */
-strl_status strl_sample_head_read(const void *data, size_t size, uint32_t triangles, strl_arena *arena, strl_sample_head *head,
-                                  size_t *bytes, strl_error *err);
+void strl_brick_head_write(const strl_brick_head *head, strl_writer *writer);
+/* *bytes: its length; the mesh's payload follows. Arrays come from arena. triangles: of the mesh, which runs must sum up to. */
+strl_status strl_brick_head_read(const void *data, size_t size, uint32_t triangles, strl_arena *arena, strl_brick_head *head,
+                                 size_t *bytes, strl_error *err);
 
 #endif

@@ -23,6 +23,7 @@
 #define STRL__REQUEST_NODES 32u /* most nodes that one page is read for at a time */
 #define STRL__MAX_REQUESTS 256u
 #define STRL__PLACEMENT_BITS 24u /* a load's number and a placement share a key; strl_walk_open refuses more placements */
+#define STRL__SPLAT_ROOM 2048u /* bytes that a decoded node may take beside what its record says: splats of an empty brick */
 #define STRL__GIVE_UP_FAILURES 3u /* from then on strl_walk_settled does not wait for it; it is still retried */
 
 typedef enum strl__residency { STRL__ABSENT, STRL__PENDING, STRL__RESIDENT } strl__residency;
@@ -49,8 +50,8 @@ typedef struct strl__mesh {
     uint16_t *indices;                   /* [3 * triangle_count] */
     uint16_t (*finest)[3];               /* [triangle_count], corners of the finest state; NULL at leaves */
     strl_vertex_label *labels;           /* [vertex_count]; NULL where the walk keeps none */
-    strl_splat *splats;                  /* [splat_count]; of bricks */
-    uint32_t splat_count;
+    strl_splat *splats;                  /* of bricks: by state, those of state s before splat_end[s] */
+    uint16_t *splat_end;                 /* [step_count]; NULL where it is no brick */
 } strl__mesh;
 
 typedef struct strl__node {
@@ -352,7 +353,7 @@ strl_status strl__budget_cut(strl_walk *walk, const strl_view *view, strl__cut *
 void strl__refine_front(strl_walk *walk);
 
 /* brick.c: thread-safe. Vertices and labels are the caller's to fill in. */
-strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const strl_sample_head *head, bool labels,
+strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const strl_brick_head *head, bool labels,
                                strl__mesh *mesh, strl_error *err);
 
 /* splats.c: behind the other items of the list. */

@@ -44,7 +44,7 @@ static void make_labels(const strl_pm *pm, strl_vertex_label *labels)
 
 uint64_t strl__node_bytes(const strl_node *record, bool labels)
 {
-    return strl_node_decoded_bytes(record) + STRL_MAX_SPLATS * sizeof(strl_splat) + (labels ? record->vertex_count * sizeof(strl_vertex_label) : 0);
+    return strl_node_decoded_bytes(record) + STRL__SPLAT_ROOM + (labels ? record->vertex_count * sizeof(strl_vertex_label) : 0);
 }
 
 static strl_status allocate(const strl_node *record, const strl_pm *pm, bool labels, strl__mesh *mesh, strl_error *err)
@@ -176,12 +176,12 @@ strl_status strl__mesh_create(const strl_node *record, const void *page, size_t 
     strl_pm pm;
     *mesh = (strl__mesh){0};
     strl_arena_init(&arena, SCRATCH_BYTES);
-    strl_sample_head head;
+    strl_brick_head head;
     strl_status status = strl_page_mesh(record, page, size, reference, &arena, &pm, err);
     if (status == STRL_OK)
         status = strl_page_head(record, page, size, &arena, &head, err);
     if (status == STRL_OK)
-        status = head.splat_count || head.run_count ? strl__brick_create(record, &pm, &head, labels, mesh, err)
+        status = head.level_count ? strl__brick_create(record, &pm, &head, labels, mesh, err)
                                                     : make_progressive(record, &pm, labels, &arena, mesh, err);
     if (status == STRL_OK) {
         make_vertices(&pm, mesh->vertices);

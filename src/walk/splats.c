@@ -5,9 +5,15 @@
 
 #define MOST_POINTS 65535u /* of an item: indices have 16 bits */
 
-static bool is_shown(const strl__active *active)
+/* Of the state that the brick is drawn in. */
+static uint32_t shown_splats(const strl__active *active, const strl_splat **splats)
 {
-    return active->sight.seen && active->node->mesh.splat_count && active->node->mesh.state == 0;
+    const strl__mesh *mesh = &active->node->mesh;
+    if (!active->sight.seen || !mesh->splat_end || mesh->state >= mesh->step_count)
+        return 0;
+    uint32_t first = mesh->state ? mesh->splat_end[mesh->state - 1] : 0;
+    *splats = mesh->splats + first;
+    return mesh->splat_end[mesh->state] - first;
 }
 
 /* Relative to the least corner of the tree's box, which all cells lie near. */
@@ -26,12 +32,13 @@ static strl_vertex make_point(const strl_node *record, const strl_splat *splat, 
 
 static strl_status add_points(strl_walk *walk, const strl__active *active, strl_error *err)
 {
-    const strl__mesh *mesh = &active->node->mesh;
     const strl_tree *tree = walk->trees[walk->placements[active->placement].tree].tree;
-    if (!strl__grow(&walk->points, &walk->point_capacity, walk->point_count + mesh->splat_count, sizeof *walk->points))
+    const strl_splat *splats;
+    uint32_t count = shown_splats(active, &splats);
+    if (!strl__grow(&walk->points, &walk->point_capacity, walk->point_count + count, sizeof *walk->points))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu splats", walk->point_count);
-    for (uint32_t i = 0; i < mesh->splat_count; i++)
-        walk->points[walk->point_count++] = make_point(active->node->record, &mesh->splats[i], tree->box_min);
+    for (uint32_t i = 0; i < count; i++)
+        walk->points[walk->point_count++] = make_point(active->node->record, &splats[i], tree->box_min);
     return STRL_OK;
 }
 
@@ -81,8 +88,7 @@ strl_status strl__draw_splats(strl_walk *walk, strl_draw_list *list, strl_error 
     strl_status status = STRL_OK;
     walk->point_count = 0;
     for (size_t i = 0; i < walk->front.count && !status; i++)
-        if (is_shown(&walk->front.items[i]))
-            status = add_points(walk, &walk->front.items[i], err);
+        status = add_points(walk, &walk->front.items[i], err);
     if (status || walk->point_count == 0)
         return status;
     if (!fill_numbers(walk))
@@ -92,8 +98,9 @@ strl_status strl__draw_splats(strl_walk *walk, strl_draw_list *list, strl_error 
     for (size_t i = 0, next; i < walk->front.count && !status; i = next) {
         uint32_t placement = walk->front.items[i].placement;
         size_t first = at;
+        const strl_splat *splats;
         for (next = i; next < walk->front.count && walk->front.items[next].placement == placement; next++)
-            at += is_shown(&walk->front.items[next]) ? walk->front.items[next].node->mesh.splat_count : 0;
+            at += shown_splats(&walk->front.items[next], &splats);
         status = add_items(walk, placement, first, at, list, err);
     }
     list->items = walk->items;

@@ -14,11 +14,19 @@
 #define SQUARE_OF_CUBE 1.3160741f
 #define LEAVES_BESIDE 7u
 
+/* A cell whose triangles are no more goes into one brick as a whole. */
+#define COMPACT_TRIANGLES 2048u
+
 /* Triangles of one brick on their way to a payload. */
 typedef struct brick_content {
     uint32_t *triangle; /* [count] of the octree */
+    uint8_t *level;     /* [count] as of strl_brick_run */
     uint32_t count;
-    uint32_t large_from; /* those from here on belong to no splat */
+    uint32_t level_count;
+    uint32_t *cell[STRL_BRICK_LEVELS];     /* octants of level s + 1 */
+    uint32_t cell_count[STRL_BRICK_LEVELS];
+    uint32_t cell_capacity;                /* of each */
+    float size[STRL_BRICK_LEVELS];         /* the largest of a level's cells, lattice units */
 } brick_content;
 
 void strl_bricks_deinit(strl_brick_set *set)
@@ -212,30 +220,44 @@ static float size_of(const strl_octree *octree, const strl_octant *octant)
 
 /* ---- one brick */
 
-/* large: in the caller's order. Decoded, triangles come in another. */
-static strl_status set_runs(const brick_content *content, const strl_payload_order *order, strl_arena *arena, strl_sample_head *head,
+/* Decoded, triangles come in another order. */
+static strl_status set_runs(const brick_content *content, const strl_payload_order *order, strl_arena *arena, strl_brick_head *head,
                             strl_error *err)
 {
-    if (content->large_from == content->count)
-        return STRL_OK;
-    uint32_t *run = strl_arena_alloc(arena, content->count + 1, sizeof *run), runs = 0, length = 0;
-    if (!run)
+    head->run = strl_arena_alloc(arena, content->count + 1, sizeof *head->run);
+    head->run_count = 0;
+    if (!head->run)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a brick of %u triangles", content->count);
     for (uint32_t t = 0; t < content->count; t++) {
-        bool is_large = order->triangle[t] / 4 >= content->large_from;
-        if (is_large != (runs & 1)) {
-            run[runs++] = length;
-            length = 0;
-        }
-        length++;
+        uint32_t level = content->level[order->triangle[t] / 4];
+        if (head->run_count == 0 || head->run[head->run_count - 1].level != level)
+            head->run[head->run_count++] = (strl_brick_run){level, 0};
+        head->run[head->run_count - 1].count++;
     }
-    run[runs++] = length;
-    head->run = run;
-    head->run_count = runs;
     return STRL_OK;
 }
 
-static strl_status encode(strl_brick_set *set, const strl_pm *pm, const brick_content *content, strl_sample_head *head,
+static strl_status set_splats(const strl_octree *octree, const brick_content *content, const int64_t anchor[3], strl_arena *arena,
+                              strl_brick_head *head, strl_error *err)
+{
+    uint32_t count = 0;
+    head->level_count = content->level_count;
+    for (uint32_t s = 0; s < content->level_count; s++)
+        count += content->cell_count[s];
+    head->splat = strl_arena_alloc(arena, count, sizeof *head->splat);
+    if (!head->splat)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %u splats", count);
+    count = 0;
+    for (uint32_t s = 0; s < content->level_count; s++) {
+        for (uint32_t i = 0; i < content->cell_count[s]; i++)
+            head->splat[count++] = make_splat(octree, &octree->octant[content->cell[s][i]], anchor);
+        head->splat_end[s] = count;
+        head->error[s] = content->size[s];
+    }
+    return STRL_OK;
+}
+
+static strl_status encode(strl_brick_set *set, const strl_pm *pm, const brick_content *content, strl_brick_head *head,
                           strl_brick *brick, strl_arena *arena, strl_error *err)
 {
     strl_payload_order order = {strl_arena_alloc(arena, pm->vertex_count + 1, sizeof *order.vertex),
@@ -248,7 +270,7 @@ static strl_status encode(strl_brick_set *set, const strl_pm *pm, const brick_co
     if (!status)
         status = set_runs(content, &order, arena, head, err);
     if (!status) {
-        strl_sample_head_write(head, &set->bytes);
+        strl_brick_head_write(head, &set->bytes);
         strl_writer_bytes(&set->bytes, mesh.data, mesh.size);
         brick->payload_bytes = (uint32_t)(set->bytes.size - brick->payload_at);
         if (set->bytes.failed)
@@ -274,36 +296,32 @@ static strl_brick start_brick(const strl_brick_set *set, uint32_t parent)
     return (strl_brick){.parent = parent, .depth = parent == STRL_NO_BRICK ? 0 : set->brick[parent].depth + 1, .chunk = STRL_NO_CHUNK};
 }
 
-/* splats: of these children; NULL = none. size: of the largest cell that it stands for. */
-static strl_status add_brick(strl_brick_set *set, const strl_octree *octree, const brick_content *content, const strl_octant *splats,
-                             float size, uint32_t parent, strl_arena *arena, uint32_t *index, strl_error *err)
+static strl_status add_brick(strl_brick_set *set, const strl_octree *octree, const brick_content *content, uint32_t parent,
+                             strl_arena *arena, uint32_t *index, strl_error *err)
 {
     strl_arena_mark mark = strl_arena_get_mark(arena);
     strl_brick brick = start_brick(set, parent);
-    strl_sample_head head = {0};
+    strl_brick_head head = {0};
     int64_t alone[3] = {0};
-    if (splats && splats->child_count)
-        find_centre(octree, &octree->octant[splats->child[0]], alone);
     welding weld = {.octree = octree, .content = content};
     strl_pm pm;
     strl_status status = weld_all(&weld, arena) ? STRL_OK
                                                 : strl__fail(err, STRL_ERR_MEMORY, "no memory for a brick of %u triangles", content->count);
     if (!status) {
+        if (content->cell_count[0])
+            find_centre(octree, &octree->octant[content->cell[0][0]], alone);
         set_box(&weld, alone, &brick.record);
         if (!make_mesh(&weld, &brick.record, &pm, arena))
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a brick of %u triangles", content->count);
     }
-    for (uint32_t i = 0; splats && i < splats->child_count && !status; i++) {
-        const strl_octant *child = &octree->octant[splats->child[i]];
-        if (!child->is_large && head.splat_count < STRL_MAX_SPLATS)
-            head.splat[head.splat_count++] = make_splat(octree, child, brick.record.anchor);
-    }
+    if (!status)
+        status = set_splats(octree, content, brick.record.anchor, arena, &head, err);
     if (!status)
         status = encode(set, &pm, content, &head, &brick, arena, err);
     strl_node *record = &brick.record;
     record->vertex_count = record->base_vertex_count = weld.vertices;
     record->triangle_count = record->base_triangle_count = content->count;
-    record->geometric_min = record->geometric_max = record->group_geometric = fmaxf(size, octree->ingest->leaf_error);
+    record->geometric_min = record->geometric_max = record->group_geometric = fmaxf(head.error[0], octree->ingest->leaf_error);
     record->group_size = 1;
     record->decode_parent = STRL_NONE;
     set->triangles += content->count;
@@ -312,65 +330,93 @@ static strl_status add_brick(strl_brick_set *set, const strl_octree *octree, con
     return status ? status : push(set, &brick, index, err);
 }
 
-/* ---- the bricks of a cell */
+/* ---- what a brick holds */
 
-static void gather(const strl_octree *octree, uint32_t child, uint32_t *triangle, uint32_t *count)
+static void gather(const strl_octree *octree, uint32_t child, uint32_t level, brick_content *content)
 {
     const strl_octant *octant = &octree->octant[child];
     for (uint32_t i = 0; i < octant->item_count; i++) {
         uint32_t at = octree->item[octant->first_item + i].triangle;
-        if (octree->owner[at] == child)
-            triangle[(*count)++] = at;
+        if (octree->owner[at] != child)
+            continue;
+        content->triangle[content->count] = at;
+        content->level[content->count++] = (uint8_t)level;
     }
 }
 
-/* What the children of an octant store. */
-static strl_status gather_children(const strl_octree *octree, const strl_octant *octant, strl_arena *arena, brick_content *content,
-                                   float *size, strl_error *err)
+/* What the children of an octant at `level` store, and with is_whole all that is below them. */
+static void gather_children(const strl_octree *octree, const strl_octant *octant, uint32_t level, bool is_whole, brick_content *content)
 {
-    uint32_t most = 0;
-    for (uint32_t i = 0; i < octant->child_count; i++)
-        most += octree->octant[octant->child[i]].item_count;
-    content->triangle = strl_arena_alloc(arena, most + 1, sizeof *content->triangle);
-    content->count = 0;
-    if (!content->triangle)
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a cell of %u triangles", most);
-    *size = 0;
-    for (int large = 0; large < 2; large++) {
-        for (uint32_t i = 0; i < octant->child_count; i++) {
-            const strl_octant *child = &octree->octant[octant->child[i]];
-            if (child->is_large != (large == 1))
-                continue;
-            gather(octree, octant->child[i], content->triangle, &content->count);
-            *size = child->is_large ? *size : fmaxf(*size, size_of(octree, child));
+    for (uint32_t i = 0; i < octant->child_count; i++) {
+        const strl_octant *child = &octree->octant[octant->child[i]];
+        if (child->is_large) {
+            gather(octree, octant->child[i], level, content);
+            continue;
         }
-        if (!large)
-            content->large_from = content->count;
+        content->level_count = level + 1 > content->level_count ? level + 1 : content->level_count;
+        content->cell[level][content->cell_count[level]++] = octant->child[i];
+        content->size[level] = fmaxf(content->size[level], size_of(octree, child));
+        gather(octree, octant->child[i], level + 1, content);
+        if (is_whole)
+            gather_children(octree, child, level + 1, is_whole, content);
     }
+}
+
+static void count_below(const strl_octree *octree, const strl_octant *octant, bool is_whole, uint32_t *items, uint32_t *cells)
+{
+    for (uint32_t i = 0; i < octant->child_count; i++) {
+        const strl_octant *child = &octree->octant[octant->child[i]];
+        *items += child->item_count;
+        (*cells)++;
+        if (is_whole)
+            count_below(octree, child, is_whole, items, cells);
+    }
+}
+
+static strl_status find_content(const strl_octree *octree, const strl_octant *octant, bool is_whole, strl_arena *arena,
+                                brick_content *content, strl_error *err)
+{
+    uint32_t items = 0;
+    *content = (brick_content){.level_count = 1};
+    count_below(octree, octant, is_whole, &items, &content->cell_capacity);
+    content->triangle = strl_arena_alloc(arena, items + 1, sizeof *content->triangle);
+    content->level = strl_arena_alloc(arena, items + 1, sizeof *content->level);
+    bool good = content->triangle && content->level;
+    for (uint32_t s = 0; s < (is_whole ? STRL_BRICK_LEVELS : 1) && good; s++) {
+        content->cell[s] = strl_arena_alloc(arena, content->cell_capacity, sizeof *content->cell[s]);
+        good = content->cell[s] != NULL;
+    }
+    if (!good)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a cell of %u triangles", items);
+    gather_children(octree, octant, 0, is_whole, content);
     return STRL_OK;
 }
+
+/* ---- the bricks of a cell */
 
 /* A part of it, from its front. */
 static brick_content cut_front(brick_content *whole)
 {
-    brick_content front = {whole->triangle, whole->count < STRL_BRICK_TRIANGLES ? whole->count : STRL_BRICK_TRIANGLES, 0};
-    front.large_from = whole->large_from < front.count ? whole->large_from : front.count;
+    brick_content front = *whole;
+    front.count = whole->count < STRL_BRICK_TRIANGLES ? whole->count : STRL_BRICK_TRIANGLES;
     whole->triangle += front.count;
+    whole->level += front.count;
     whole->count -= front.count;
-    whole->large_from -= front.large_from;
     return front;
 }
 
-/* Too much for one brick: some leaves of it beside the next one, which goes on in the same way. *parent: the last. */
-static strl_status add_beside(strl_brick_set *set, const strl_octree *octree, brick_content *whole, const strl_octant *octant, float size,
-                              uint32_t *parent, strl_arena *arena, strl_error *err)
+/* Too much for one brick: some leaves beside the next one, which goes on in the same way. All are of one size, so they open at once; the splats
+ * are with those that have something below. *parent: the last. */
+static strl_status add_beside(strl_brick_set *set, const strl_octree *octree, brick_content *whole, uint32_t *parent,
+                              strl_arena *arena, strl_error *err)
 {
     brick_content front = cut_front(whole);
     uint32_t leaf;
-    strl_status status = add_brick(set, octree, &front, octant, size, *parent, arena, parent, err);
+    strl_status status = add_brick(set, octree, &front, *parent, arena, parent, err);
     for (uint32_t i = 0; i < LEAVES_BESIDE && whole->count > STRL_BRICK_TRIANGLES && !status; i++) {
         front = cut_front(whole);
-        status = add_brick(set, octree, &front, NULL, size, *parent, arena, &leaf, err);
+        memset(front.cell_count, 0, sizeof front.cell_count);
+        status = add_brick(set, octree, &front, *parent, arena, &leaf, err);
     }
     return status;
 }
@@ -388,18 +434,18 @@ strl_status strl_bricks_add(strl_brick_set *set, const strl_octree *octree, uint
 {
     const strl_octant *octant = &octree->octant[index];
     strl_arena_mark mark = strl_arena_get_mark(arena);
+    bool is_whole = octant->total <= COMPACT_TRIANGLES && !octree->has_pieces;
     brick_content content;
-    float size;
     uint32_t brick = parent;
     if (octant->chunk != STRL_NO_CHUNK)
         return add_place(set, octant->chunk, parent, err);
-    strl_status status = gather_children(octree, octant, arena, &content, &size, err);
+    strl_status status = find_content(octree, octant, is_whole, arena, &content, err);
     while (!status && content.count > STRL_BRICK_TRIANGLES)
-        status = add_beside(set, octree, &content, octant, size, &brick, arena, err);
+        status = add_beside(set, octree, &content, &brick, arena, err);
     if (!status)
-        status = add_brick(set, octree, &content, octant, size, brick, arena, &brick, err);
+        status = add_brick(set, octree, &content, brick, arena, &brick, err);
     strl_arena_rewind(arena, mark);
-    for (uint32_t i = 0; i < octant->child_count && !status; i++)
+    for (uint32_t i = 0; i < octant->child_count && !status && !is_whole; i++)
         if (!octree->octant[octant->child[i]].is_leaf)
             status = strl_bricks_add(set, octree, octant->child[i], brick, arena, err);
     return status;
@@ -410,11 +456,10 @@ strl_status strl_bricks_add_root(strl_brick_set *set, const strl_octree *octree,
     strl_octant above = {.child_count = 1, .child = {root}};
     strl_arena_mark mark = strl_arena_get_mark(arena);
     brick_content content;
-    float size;
     uint32_t brick;
-    strl_status status = gather_children(octree, &above, arena, &content, &size, err);
+    strl_status status = find_content(octree, &above, false, arena, &content, err);
     if (!status)
-        status = add_brick(set, octree, &content, &above, size, STRL_NO_BRICK, arena, &brick, err);
+        status = add_brick(set, octree, &content, STRL_NO_BRICK, arena, &brick, err);
     strl_arena_rewind(arena, mark);
     return status;
 }

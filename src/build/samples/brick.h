@@ -1,5 +1,6 @@
 /* Bricks: the nodes of the container that hold a sample tree (docs/algorithms/samples.md). The brick of an inner cell holds what the
- * cells below it store, because they are needed together; its child bricks are those of these cells. */
+ * cells below it store, because they are needed together; its child bricks are those of these cells. Of a cell with few triangles
+ * it holds all that lies below, level by level, and has no child. */
 #ifndef STRL_BUILD_SAMPLES_BRICK_H
 #define STRL_BUILD_SAMPLES_BRICK_H
 

@@ -5,7 +5,7 @@
 #include "base/fail.h"
 #include "build/ingest/normals.h"
 
-#define LEAF_TRIANGLES 512u
+#define LEAF_TRIANGLES 128u
 /* Of one bucket, more than these stay where they are, and the cells there count as so large: what is at the top is held in memory. */
 #define MOST_RISEN 2048u
 /* What a bucket takes in memory while it is worked on, in the size of its records: these, triangles, keys twice, cells, payloads. */
@@ -245,13 +245,13 @@ static strl_status append_set(strl_sample_stage *stage, strl_chunk *chunk, const
     for (size_t i = 0; i < set->count && !status; i++)
         number[i] = chunk->run[set->brick[i].depth].count++;
     for (uint32_t depth = 0; depth < chunk->run_count && !status; depth++) {
-        strl_brick_run *run = &chunk->run[depth];
+        strl_stored_run *run = &chunk->run[depth];
         run->at = strl_spill_bytes(stage->bricks);
         for (size_t i = 0; i < set->count && !status; i++) {
             const strl_brick *brick = &set->brick[i];
             if (brick->depth != depth)
                 continue;
-            strl_brick_head head = {brick->record, brick->parent == STRL_NO_BRICK ? STRL_NO_BRICK : number[brick->parent],
+            strl_stored_brick head = {brick->record, brick->parent == STRL_NO_BRICK ? STRL_NO_BRICK : number[brick->parent],
                                     brick->child_count ? next[depth + 1] : STRL_NO_BRICK, brick->payload_bytes};
             head.record.child_count = brick->child_count;
             next[depth + 1] += brick->child_count;

@@ -15,10 +15,10 @@ typedef struct strl_risen {
 } strl_risen;
 
 /* Bricks of one depth below a piece's root. */
-typedef struct strl_brick_run {
+typedef struct strl_stored_run {
     uint64_t at, bytes; /* in the stream of bricks */
     uint32_t count;
-} strl_brick_run;
+} strl_stored_run;
 
 typedef struct strl_chunk {
     uint64_t key;     /* first of its cell */
@@ -27,7 +27,7 @@ typedef struct strl_chunk {
     uint32_t item_count;
     strl_node first;  /* record of its first brick, where it has any */
     uint32_t run_count;
-    strl_brick_run *run; /* [run_count] by depth; owned */
+    strl_stored_run *run; /* [run_count] by depth; owned */
 } strl_chunk;
 
 typedef struct strl_chunks {
@@ -40,11 +40,11 @@ typedef struct strl_chunks {
 void strl_chunks_deinit(strl_chunks *chunks);
 
 /* A brick in the stream: this, then its payload. In the machine's own order. */
-typedef struct strl_brick_head {
+typedef struct strl_stored_brick {
     strl_node record;
     uint32_t parent, first_child; /* numbers within the runs above and below; STRL_NO_BRICK = none */
     uint32_t payload_bytes;
-} strl_brick_head;
+} strl_stored_brick;
 
 typedef struct strl_sample_stage {
     strl_build_context *context;

@@ -187,7 +187,7 @@ static strl_status add_leaf(strl_octree *octree, const uint32_t *order, uint32_t
     leaf->is_leaf = true;
     leaf->chunk = STRL_NO_CHUNK;
     leaf->first_item = (uint32_t)octree->item_count;
-    leaf->item_count = count;
+    leaf->item_count = leaf->total = count;
     for (uint32_t i = 0; i < count && !status; i++) {
         float area;
         add_triangle(octree, &octree->triangle[order[i]], &leaf->sums, &area);
@@ -289,9 +289,11 @@ strl_status strl_octree_add_leaf(strl_octree *octree, const uint32_t *order, uin
 void strl_octree_sum_children(strl_octree *octree, strl_octant *octant)
 {
     octant->sums = (strl_splat_sums){0};
+    octant->total = 0;
     for (uint32_t i = 0; i < octant->child_count; i++) {
         const strl_octant *child = &octree->octant[octant->child[i]];
         add_sums(&octant->sums, &child->sums);
         octant->extent = fmaxf(octant->extent, child->extent);
+        octant->total += child->total;
     }
 }

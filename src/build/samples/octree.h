@@ -39,6 +39,7 @@ typedef struct strl_octant {
     float extent;    /* lattice units: the longest of the triangles below that their cells do not hold; 0 = there is none */
     uint32_t first_item, item_count;
     uint32_t child_count, child[STRL_OCTANT_MAX_CHILDREN];
+    uint32_t total;  /* triangles in it */
     uint32_t chunk;  /* the piece whose root it is, at the top; else STRL_NO_CHUNK */
     strl_splat_sums sums;
 } strl_octant;
@@ -50,6 +51,7 @@ typedef struct strl_octree {
     const strl_ingest *ingest;
     uint32_t leaf_triangles; /* most of a leaf */
     double coupons;          /* c of the sample size */
+    bool has_pieces;         /* the top of a tree: leaves may be roots of pieces */
     uint32_t triangle_count;
     strl_soup_triangle *triangle; /* [triangle_count], owned with all that follows */
     uint64_t *key;                /* [triangle_count] ascending */

@@ -29,6 +29,7 @@ static strl_status load(const strl_sample_stage *stage, top *t, strl_error *err)
     const strl_chunks *chunks = &stage->chunks;
     uint32_t count = 0, at = 0;
     t->chunks = chunks;
+    t->octree.has_pieces = true;
     for (size_t i = 0; i < chunks->count; i++)
         count += chunks->chunk[i].item_count;
     strl_status status = strl_octree_prepare(&t->octree, stage, count + (uint32_t)chunks->risen_count, err);

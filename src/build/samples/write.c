@@ -92,7 +92,7 @@ static strl_status write_top(writing *w, size_t index, strl_error *err)
     return add_node(w, &record, brick->depth, w->set->bytes.data + brick->payload_at, brick->payload_bytes, err);
 }
 
-static strl_status write_head(writing *w, const strl_brick *entry, uint32_t run, const strl_brick_head *head, const void *payload,
+static strl_status write_head(writing *w, const strl_brick *entry, uint32_t run, const strl_stored_brick *head, const void *payload,
                               strl_error *err)
 {
     const uint32_t *piece = w->ids->piece[entry->chunk];
@@ -104,13 +104,13 @@ static strl_status write_head(writing *w, const strl_brick *entry, uint32_t run,
 
 static strl_status write_run(writing *w, const strl_brick *entry, uint32_t index, strl_error *err)
 {
-    const strl_brick_run *run = &w->stage->chunks.chunk[entry->chunk].run[index];
+    const strl_stored_run *run = &w->stage->chunks.chunk[entry->chunk].run[index];
     if (!strl__grow(&w->buffer, &w->capacity, run->bytes, 1))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for bricks of %" PRIu64 " bytes", run->bytes);
     strl_status status = strl_spill_read(w->stage->bricks, run->at, w->buffer, run->bytes, err);
     size_t at = 0;
     for (uint32_t i = 0; i < run->count && !status; i++) {
-        strl_brick_head head;
+        strl_stored_brick head;
         memcpy(&head, w->buffer + at, sizeof head);
         at += sizeof head;
         status = write_head(w, entry, index, &head, w->buffer + at, err);
