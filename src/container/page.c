@@ -82,7 +82,7 @@ strl_status strl_page_head(const strl_node *record, const void *page, size_t siz
         return strl__fail(err, STRL_ERR_FORMAT, "its %" PRIu32 " bytes pass the end of a page of %zu bytes",
                           record->payload_bytes, size);
     const uint8_t *payload = (const uint8_t *)page + record->payload_offset;
-    return payload[0] == STRL_BRICK_VERSION
+    return record->rung == STRL_RUNG_SAMPLED
                ? strl_brick_head_read(payload, record->payload_bytes, record->triangle_count, arena, head, &bytes, err)
                : STRL_OK;
 }
@@ -103,7 +103,7 @@ static strl_status decode(const strl_node *record, const uint8_t *page, size_t s
     size_t head_bytes = 0;
     strl_brick_head head;
     strl_status status = STRL_OK;
-    if (payload[0] == STRL_BRICK_VERSION)
+    if (record->rung == STRL_RUNG_SAMPLED)
         status = strl_brick_head_read(payload, record->payload_bytes, record->triangle_count, arena, &head, &head_bytes, err);
     if (status == STRL_OK)
         status = check_sizes(record, payload + head_bytes, record->payload_bytes - head_bytes, err);

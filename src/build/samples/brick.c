@@ -237,6 +237,21 @@ static strl_status set_runs(const brick_content *content, const strl_payload_ord
     return STRL_OK;
 }
 
+/* What a splat stands for may have moved up as a whole: the box of the brick's own triangles need not have it. */
+static void widen_box(const brick_content *content, const strl_octree *octree, strl_node *record)
+{
+    for (uint32_t s = 0; s < content->level_count; s++)
+        for (uint32_t i = 0; i < content->cell_count[s]; i++) {
+            const strl_octant *cell = &octree->octant[content->cell[s][i]];
+            int64_t centre[3];
+            find_centre(octree, cell, centre);
+            for (int k = 0; k < 3; k++) {
+                record->box_min[k] = centre[k] < record->box_min[k] ? centre[k] : record->box_min[k];
+                record->box_max[k] = centre[k] + 1 > record->box_max[k] ? centre[k] + 1 : record->box_max[k];
+            }
+        }
+}
+
 static strl_status set_splats(const strl_octree *octree, const brick_content *content, const int64_t anchor[3], strl_arena *arena,
                               strl_brick_head *head, strl_error *err)
 {
@@ -315,6 +330,8 @@ static strl_status add_brick(strl_brick_set *set, const strl_octree *octree, con
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a brick of %u triangles", content->count);
     }
     if (!status)
+        widen_box(content, octree, &brick.record);
+    if (!status)
         status = set_splats(octree, content, brick.record.anchor, arena, &head, err);
     if (!status)
         status = encode(set, &pm, content, &head, &brick, arena, err);
@@ -323,6 +340,7 @@ static strl_status add_brick(strl_brick_set *set, const strl_octree *octree, con
     record->triangle_count = record->base_triangle_count = content->count;
     record->geometric_min = record->geometric_max = record->group_geometric = fmaxf(head.error[0], octree->ingest->leaf_error);
     record->group_size = 1;
+    record->rung = STRL_RUNG_SAMPLED;
     record->decode_parent = STRL_NONE;
     set->triangles += content->count;
     set->vertices += weld.vertices;
