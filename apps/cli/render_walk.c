@@ -70,6 +70,7 @@ static void fill_stats(const strl_walk_stats *walk, strl_image_stats *stats)
     stats->nodes_culled = walk->nodes_culled;
     stats->resident_bytes = walk->resident_bytes;
     stats->missing_nodes = walk->missing_nodes;
+    stats->splats = walk->splats;
     stats->max_error_px = walk->max_error_px;
     stats->allowed_error_px = walk->allowed_error_px;
     stats->faults = walk->faults;
