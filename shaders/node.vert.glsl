@@ -64,6 +64,7 @@ void main()
     gl_ClipDistance[0] = dot(u_section.xyz, view) + u_section.w;
 #endif
 
+    gl_PointSize = intBitsToFloat(high.w);
     vec3 normal = decode_normal(in_normal);
     v_view = view;
     v_normal = vec3(dot(ITEM_ROW(3).xyz, normal), dot(ITEM_ROW(4).xyz, normal), dot(ITEM_ROW(5).xyz, normal));

@@ -137,12 +137,14 @@ static int run(strl_cli_args *args)
     strl_cli_list inputs;
     uint64_t jobs = 0;
     bool json = false, unit_given = false;
-    int unit = 0;
+    int unit = 0, structure = 0;
     const strl_cli_option options[] = {
         {.name = "output", .letter = 'o', .kind = STRL_CLI_STRING, .value = &desc.output, .argument = "OUT.stroll",
          .help = "the container to write; an older one is replaced only when the new one is whole", .required = true},
-        {.name = "structure", .kind = STRL_CLI_ENUM, .value = &(int){0}, .argument = "clusters",
-         .help = "how detail is arranged (clusters)"},
+        {.name = "structure", .kind = STRL_CLI_ENUM, .value = &structure, .argument = "clusters|samples",
+         .help = "how detail is arranged: clusters that are simplified, or for what cannot be, a tree of random samples (clusters)"},
+        {.name = "probability", .kind = STRL_CLI_REAL, .value = &desc.probability, .argument = "P",
+         .help = "of samples: that a cell of one pixel shows one of its visible triangles (1 - 1e-6)", .least = 0.01, .most = 1 - 1e-15},
         {.name = "memory", .letter = 'm', .kind = STRL_CLI_BYTES, .value = &desc.memory_bytes,
          .help = "peak memory of the build, at least 64M and 2 bytes for each triangle (1G)", .least = (double)STRL_BUILD_LEAST_MEMORY, .most = 0x1p50},
         {.name = "jobs", .letter = 'j', .kind = STRL_CLI_COUNT, .value = &jobs, .help = "threads (one per processor)",
@@ -185,7 +187,7 @@ static int run(strl_cli_args *args)
     desc.warn = show_warning;
     desc.context = &watch;
     strl_cli_catch_interrupts();
-    strl_status status = strl_build_clusters(&desc, &result, &err);
+    strl_status status = structure ? strl_build_samples(&desc, &result, &err) : strl_build_clusters(&desc, &result, &err);
     strl_cli_build_progress_end(&watch.progress);
     if (status)
         return fail(&result, &err);

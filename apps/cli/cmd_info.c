@@ -13,7 +13,7 @@
 
 typedef struct level_facts {
     uint64_t nodes, vertices, base_vertices, shared_vertices, triangles, base_triangles, steps;
-    uint64_t rungs[STRL_RUNG_CLUSTERING + 1];    /* nodes */
+    uint64_t rungs[STRL_RUNG_SAMPLED + 1];    /* nodes */
     uint64_t group_members[MOST_GROUP_SIZE + 2]; /* nodes by the size of their group; the last one: larger */
     double large_groups;                         /* groups larger than MOST_GROUP_SIZE */
     double boundary_steps;                       /* of groups: each member adds its share of the group's */
@@ -89,7 +89,7 @@ static strl_status survey(strl_container *container, uint32_t index, tree_facts 
 }
 
 static const char *const structure_names[] = {"", "clusters", "hlod", "samples"};
-static const char *const rung_names[] = {"topology", "seams", "disjoint", "clustering"};
+static const char *const rung_names[] = {"topology", "seams", "disjoint", "clustering", "sampled"};
 
 static double share(uint64_t part, uint64_t whole)
 {
@@ -148,7 +148,7 @@ static json_t *level_to_json(uint32_t number, const level_facts *level, double s
     put_length(object, "geometric_max", level->geometric_max, step);
     put_length(object, "appearance_min", level->appearance_min, step);
     put_length(object, "appearance_max", level->appearance_max, step);
-    for (unsigned rung = 0; rung <= STRL_RUNG_CLUSTERING; rung++)
+    for (unsigned rung = 0; rung <= STRL_RUNG_SAMPLED; rung++)
         put_count(rungs, rung_names[rung], level->rungs[rung]);
     json_object_set_new(object, "rungs", rungs);
     return object;
@@ -254,7 +254,7 @@ static void print_groups(const level_facts *level)
             printf(" %s%" PRIu32 ": %" PRIu64, size > MOST_GROUP_SIZE ? ">" : "",
                    size > MOST_GROUP_SIZE ? MOST_GROUP_SIZE : size, groups_of_size(level, size));
     printf("; rungs:");
-    for (unsigned rung = 0; rung <= STRL_RUNG_CLUSTERING; rung++)
+    for (unsigned rung = 0; rung <= STRL_RUNG_SAMPLED; rung++)
         if (level->rungs[rung])
             printf(" %s %" PRIu64, rung_names[rung], level->rungs[rung]);
     printf("\n");

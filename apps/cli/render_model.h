@@ -15,6 +15,7 @@
 typedef struct strl_image_stats {
     uint64_t frame_ns, select_ns, draw_ns; /* frame: from camera to finished pixels; select: of the last front */
     uint64_t triangles, bytes_read, resident_bytes, gpu_bytes, uploaded_bytes;
+    uint64_t splats;
     uint32_t nodes, nodes_culled, draws, requests, missing_nodes, evictions;
     uint32_t fronts; /* selected until the front was resident */
     float max_error_px;
@@ -44,7 +45,7 @@ typedef struct strl_render_model_desc {
     const char *path;
     bool full;             /* a container's finest level; an input file can be drawn in no other way */
     bool realtime;         /* a walk that never waits */
-    double error_px;
+    double error_px, splat_px;
     uint64_t memory_bytes; /* of the walk's decoded nodes */
     strl_cli_progress *progress;
 } strl_render_model_desc;

@@ -174,7 +174,7 @@ static strl_status write_stats(strl_render_output *output, size_t frame, const s
         const char *name;
         uint64_t value;
     } counts[] = {{"triangles", s->triangles},
-                  {"splats", 0},
+                  {"splats", s->splats},
                   {"nodes", s->nodes},
                   {"nodes_culled", s->nodes_culled},
                   {"draws", s->draws},

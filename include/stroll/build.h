@@ -56,6 +56,7 @@ typedef struct strl_build_desc {
     bool keep;
     uint64_t keep_triangles; /* of models of fewer nothing is kept: they are built at once; 0 = 65,536 */
     bool resume; /* goes on with what an earlier build of the same request has left, if anything; keeps, too */
+    double probability; /* of sample trees: that a cell of a pixel shows one of its visible triangles; 0 = 1 - 1e-6 */
     bool no_dependencies;   /* for measuring what dependencies bring: every group has one member */
     /* Called on the caller's thread, often; false cancels. May be NULL. */
     bool (*progress)(void *context, const strl_build_progress *progress);
@@ -106,6 +107,9 @@ typedef struct strl_build_result {
  * asks for, and an older file of that name stays. The bytes are the same whether the build was stopped and
  * resumed, however often, or not. */
 STRL_API strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err);
+/* The same of a sample tree, for what cannot be simplified: every triangle is stored once, and what is far away is drawn by a
+ * random part of its triangles and by splats. desc->certify, no_dependencies and resume are refused; keep is not heeded. */
+STRL_API strl_status strl_build_samples(const strl_build_desc *desc, strl_build_result *result, strl_error *err);
 
 #ifdef __cplusplus
 }

@@ -50,6 +50,8 @@ typedef struct strl_draw_item {
     const uint16_t *indices; /* 3 * triangle_count, of this state */
     uint32_t index_count;
     uint32_t dirty_first, dirty_count; /* indices that may differ from the list of frame - 1, where key is in that one */
+    float point_px;              /* > 0: the vertices that indices name are drawn as squares of so many pixels of the output, which the
+                                    alpha of their colour thins out: splats. 0: triangles */
     strl_positions positions;
     int64_t anchor[3];     /* lattice */
     int64_t box_min[3], box_max[3]; /* lattice */

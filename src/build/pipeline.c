@@ -211,7 +211,7 @@ static strl_status run_in_scratch(strl_build_context *context, strl_scratch *scr
     if (!status && desc->resume)
         status = resume(context, scratch, err);
     if (!status)
-        status = strl__clusters_run(context, err);
+        status = context->run(context, err);
     end_stage(context);
     if (context->spills)
         strl__build_note_scratch(context);
@@ -245,11 +245,12 @@ static strl_status run(strl_build_context *context, const char *target, strl_err
     return status ? tell_way_on(context, resumes, status, err) : STRL_OK;
 }
 
-strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err)
+static strl_status build_with(strl_status (*stages)(strl_build_context *, strl_error *), const strl_build_desc *desc,
+                              strl_build_result *result, strl_error *err)
 {
     char *target = NULL;
     uint64_t started = strl_clock_ns(), cpu_started = strl_clock_cpu_ns();
-    strl_build_context context = {.desc = desc, .result = result, .keep = desc->keep || desc->resume,
+    strl_build_context context = {.desc = desc, .result = result, .run = stages, .keep = desc->keep || desc->resume,
                                   .memory_bytes = desc->memory_bytes ? desc->memory_bytes : 1ull << 30};
     *result = (strl_build_result){.inputs = desc->input_count};
     strl__estimate_start(&context.estimate, started);
@@ -263,4 +264,19 @@ strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *
     uint64_t peak = strl_process_peak_rss_bytes();
     result->peak_rss_bytes = peak > result->peak_rss_bytes ? peak : result->peak_rss_bytes;
     return status;
+}
+
+strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err)
+{
+    return build_with(strl__clusters_run, desc, result, err);
+}
+
+strl_status strl_build_samples(const strl_build_desc *desc, strl_build_result *result, strl_error *err)
+{
+    strl_build_desc own = *desc;
+    if (desc->certify || desc->no_dependencies || desc->resume)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "a sample tree takes no %s",
+                          desc->certify ? "--certify: it claims no error" : desc->resume ? "--resume" : "--no-dependencies: it has none");
+    own.keep = false;
+    return build_with(strl__samples_run, &own, result, err);
 }

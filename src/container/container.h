@@ -25,7 +25,13 @@ typedef enum strl_structure {
 } strl_structure;
 
 /* Which rung of the simplification ladder a node's mesh needed (docs/algorithms/clusters.md); errors hold on all of them. */
-typedef enum strl_rung { STRL_RUNG_TOPOLOGY, STRL_RUNG_SEAMS, STRL_RUNG_DISJOINT, STRL_RUNG_CLUSTERING } strl_rung;
+typedef enum strl_rung {
+    STRL_RUNG_TOPOLOGY,
+    STRL_RUNG_SEAMS,
+    STRL_RUNG_DISJOINT,
+    STRL_RUNG_CLUSTERING,
+    STRL_RUNG_SAMPLED /* nothing was simplified: a brick of a sample tree */
+} strl_rung;
 
 /* Where bytes lie, with all that recognises a stale or foreign page. */
 typedef struct strl_page_ref {

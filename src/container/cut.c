@@ -5,6 +5,7 @@
 void strl_cut_init(strl_cut *cut, strl_container *container, uint32_t tree, double length)
 {
     *cut = (strl_cut){.container = container, .tree = tree, .parent = STRL_NONE};
+    cut->adds = strl_container_tree(container, tree)->structure == STRL_STRUCTURE_SAMPLES;
     cut->limit = length / strl_container_tree(container, tree)->step; /* exact: the step is a power of two */
 }
 
@@ -29,7 +30,7 @@ strl_status strl_cut_next(strl_cut *cut, uint32_t *id, strl_node *record, strl_e
         }
         if (status != STRL_OK)
             return status;
-        if ((node == 0 || cut->splits) && (record->child_count == 0 || !group_splits(cut, record))) {
+        if ((node == 0 || cut->splits) && (cut->adds || record->child_count == 0 || !group_splits(cut, record))) {
             *id = node;
             return STRL_OK;
         }

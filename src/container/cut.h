@@ -1,6 +1,6 @@
 /* Uniform cuts: the coarsest front of a tree with every claimed geometric error at most a given length, everywhere the same.
- * Used by `extract`, by `render --full` (length 0: all leaves in their finest state) and by tests. Structures that refine by
- * replacing (clusters, hlod).
+ * Used by `extract`, by `render --full` (length 0: all leaves in their finest state) and by tests. Of a sample tree, where
+ * nodes add up, what is above the front is active with it.
  *
  * A group splits while its geometric error is above the length; errors grow to the root, so a node is active when its parent's
  * group splits and its own does not, or is a leaf. Each is drawn in its coarsest state within the length, or its finest.
@@ -19,6 +19,7 @@ typedef struct strl_cut {
     strl_container *container; /* borrowed */
     uint32_t tree;
     double limit;    /* lattice units */
+    bool adds;       /* a sample tree's: nodes that split are active too */
     uint32_t next;   /* id to look at next */
     uint32_t parent; /* whose group's decision `splits` is; STRL_NONE at first */
     bool splits;

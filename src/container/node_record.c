@@ -167,7 +167,7 @@ static strl_status check_counts(const strl_node *node, uint32_t id, const strl_t
         {"the level", node->level, tree->level_count - 1},
         {"the group", node->group, tree->group_count - 1},
         {"the group's size", node->group_size, tree->node_count},
-        {"the rung", node->rung, STRL_RUNG_CLUSTERING},
+        {"the rung", node->rung, STRL_RUNG_SAMPLED},
         {"the number of vertices", node->vertex_count, STRL_PM_MAX_VERTICES},
         {"the number of vertices of the base mesh", node->base_vertex_count, node->vertex_count},
         {"the number of triangles", node->triangle_count, STRL_PM_MAX_TRIANGLES},

@@ -5,6 +5,7 @@
 #include "base/hash.h"
 #include "container/treelet.h"
 #include "geometry/payload.h"
+#include "geometry/sample_payload.h"
 
 strl_status strl_page_check(const strl_page_ref *ref, const void *data, size_t size, strl_error *err)
 {
@@ -20,10 +21,10 @@ strl_status strl_page_check(const strl_page_ref *ref, const void *data, size_t s
 }
 
 /* Before anything is allocated: a record that lies must not make its payload expensive. */
-static strl_status check_sizes(const strl_node *record, const uint8_t *payload, strl_error *err)
+static strl_status check_sizes(const strl_node *record, const uint8_t *payload, size_t bytes, strl_error *err)
 {
     strl_payload_sizes sizes;
-    strl_status status = strl_payload_peek(payload, record->payload_bytes, &sizes, err);
+    strl_status status = strl_payload_peek(payload, bytes, &sizes, err);
     if (status != STRL_OK)
         return status;
     if (sizes.vertex_count != record->vertex_count || sizes.base_vertex_count != record->base_vertex_count ||
@@ -72,6 +73,20 @@ static strl_status check_mesh(const strl_node *record, const strl_pm *mesh, strl
     return status;
 }
 
+strl_status strl_page_head(const strl_node *record, const void *page, size_t size, strl_arena *arena, strl_brick_head *head,
+                           strl_error *err)
+{
+    size_t bytes;
+    *head = (strl_brick_head){0};
+    if (record->payload_bytes == 0 || record->payload_offset > size || record->payload_bytes > size - record->payload_offset)
+        return strl__fail(err, STRL_ERR_FORMAT, "its %" PRIu32 " bytes pass the end of a page of %zu bytes",
+                          record->payload_bytes, size);
+    const uint8_t *payload = (const uint8_t *)page + record->payload_offset;
+    return record->rung == STRL_RUNG_SAMPLED
+               ? strl_brick_head_read(payload, record->payload_bytes, record->triangle_count, arena, head, &bytes, err)
+               : STRL_OK;
+}
+
 void strl_page_place(strl_payload_reference *reference, const int64_t anchor[3], const strl_node *record)
 {
     for (int axis = 0; axis < 3; axis++) /* modulo 2^32: what is further off than that is not the same place */
@@ -81,13 +96,19 @@ void strl_page_place(strl_payload_reference *reference, const int64_t anchor[3],
 static strl_status decode(const strl_node *record, const uint8_t *page, size_t size,
                           const strl_payload_reference *reference, strl_arena *arena, strl_pm *mesh, strl_error *err)
 {
-    if (record->payload_offset > size || record->payload_bytes > size - record->payload_offset)
+    if (record->payload_bytes == 0 || record->payload_offset > size || record->payload_bytes > size - record->payload_offset)
         return strl__fail(err, STRL_ERR_FORMAT, "its %" PRIu32 " bytes pass the end of a page of %zu bytes",
                           record->payload_bytes, size);
     const uint8_t *payload = page + record->payload_offset;
-    strl_status status = check_sizes(record, payload, err);
+    size_t head_bytes = 0;
+    strl_brick_head head;
+    strl_status status = STRL_OK;
+    if (record->rung == STRL_RUNG_SAMPLED)
+        status = strl_brick_head_read(payload, record->payload_bytes, record->triangle_count, arena, &head, &head_bytes, err);
     if (status == STRL_OK)
-        status = strl_payload_decode(payload, record->payload_bytes, reference, arena, mesh, err);
+        status = check_sizes(record, payload + head_bytes, record->payload_bytes - head_bytes, err);
+    if (status == STRL_OK)
+        status = strl_payload_decode(payload + head_bytes, record->payload_bytes - head_bytes, reference, arena, mesh, err);
     return status == STRL_OK ? check_mesh(record, mesh, err) : status;
 }
 

@@ -5,6 +5,7 @@
 
 #include "container/container.h"
 #include "geometry/payload.h"
+#include "geometry/sample_payload.h"
 
 /* Where a treelet lies. A treelet names the treelets that hold the children of its nodes; the header names the first. */
 typedef struct strl_treelet_ref {
@@ -36,6 +37,9 @@ strl_status strl_page_check(const strl_page_ref *ref, const void *data, size_t s
  * reference: the finest state of the record's decode_parent, placed; NULL where it has none. */
 strl_status strl_page_mesh(const strl_node *record, const void *page, size_t size, const strl_payload_reference *reference,
                            strl_arena *arena, strl_pm *mesh, strl_error *err);
+/* What stands before the mesh in a node of a sample tree; zero in others. Runs come from arena. */
+strl_status strl_page_head(const strl_node *record, const void *page, size_t size, strl_arena *arena, strl_brick_head *head,
+                           strl_error *err);
 /* Sets the offset of a reference whose positions are relative to `anchor`, for a node's payload. */
 void strl_page_place(strl_payload_reference *reference, const int64_t anchor[3], const strl_node *record);
 /* Nodes in a chain of decode parents, at most, from the one that is self-contained on. */

@@ -172,7 +172,7 @@ static void count_node(strl_tree *facts, const strl_node *node, uint32_t id)
         facts->root_triangles = node->base_triangle_count;
     if (node->group >= facts->group_count)
         facts->group_count = node->group + 1;
-    if (node->child_count)
+    if (node->child_count && facts->structure != STRL_STRUCTURE_SAMPLES) /* whose nodes add up */
         return;
     bool first = facts->triangle_count == 0 && facts->vertex_count == 0;
     facts->triangle_count += node->triangle_count;

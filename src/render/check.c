@@ -17,7 +17,7 @@ strl_status strl__check_item_counts(const strl_draw_item *item, strl_error *err)
 {
     if (item->vertex_count > 65536)
         return fail_item(item, err, "vertex count", item->vertex_count, 65536);
-    if (item->index_count % 3 != 0)
+    if (!(item->point_px > 0) && item->index_count % 3 != 0)
         return fail_item(item, err, "index count modulo three", item->index_count % 3, 0);
     if (item->dirty_first > item->index_count)
         return fail_item(item, err, "first dirty index", item->dirty_first, item->index_count);

@@ -101,7 +101,8 @@ static void complete_options(strl_draw_options *options)
 strl_status strl_renderer_draw(strl_renderer *renderer, const strl_camera *camera, const strl_draw_list *list,
                                const strl_draw_options *options, strl_render_stats *stats, strl_error *err)
 {
-    strl_draw_setup setup = {.camera = *camera, .near_distance = list->near_distance, .far_distance = list->far_distance};
+    strl_draw_setup setup = {.camera = *camera, .near_distance = list->near_distance, .far_distance = list->far_distance,
+                             .supersample = renderer->desc.supersample};
     strl_render_stats unwanted;
     if (!stats)
         stats = &unwanted;

@@ -11,6 +11,7 @@ typedef struct strl_draw_setup {
     strl_view view;
     double near_distance, far_distance;
     strl_draw_options options;
+    uint32_t supersample;
 } strl_draw_setup;
 
 typedef struct strl_renderer_class {

@@ -33,7 +33,10 @@ static strl_status decode_one(const strl__vnode *node, const uint8_t *bytes, boo
         for (unsigned k = 0; k < 3; k++)
             told.offset[k] = (uint32_t)((uint64_t)parent->anchor[k] - (uint64_t)node->anchor[k]);
     }
-    strl_status status = strl__v_payload_decode(bytes, node->payload_bytes, parent ? &told : NULL, arena, with_looks, mesh, err);
+    size_t head = 0;
+    strl_status status = node->rung == 4 ? strl__v_brick_check(bytes, node, &head, err) : STRL_OK;
+    if (status == STRL_OK)
+        status = strl__v_payload_decode(bytes + head, node->payload_bytes - head, parent ? &told : NULL, arena, with_looks, mesh, err);
     if (status == STRL_OK)
         status = counts_agree(node, mesh, err);
     return status == STRL_OK ? strl__v_mesh_check_ranges(mesh, err) : status;

@@ -408,7 +408,7 @@ void strl__v_check_leaves(strl__model *model, const strl__vtree *tree, const str
 {
     strl__hash128 sum = {0, 0};
     for (uint32_t id = 0; id < tree->node_count; id++)
-        if (tree->nodes[id].child_count == 0)
+        if (strl__holds_input(tree, id))
             strl__hash_add(&sum, tree->nodes[id].finest);
     strl__v_checked(model->checks, STRL_VERIFY_LEAVES, input->kept);
     if (input->triangles != model->triangles_in || input->nonfinite != model->dropped_nonfinite ||

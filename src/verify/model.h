@@ -101,6 +101,12 @@ static inline bool strl__replaces(const strl__vtree *tree)
     return tree->structure != 3;
 }
 
+/* Whether the input's triangles are in the node: leaves have them, or where nodes add up, all. */
+static inline bool strl__holds_input(const strl__vtree *tree, uint32_t node)
+{
+    return !strl__replaces(tree) || tree->nodes[node].child_count == 0;
+}
+
 static inline uint32_t strl__group_first(const strl__vtree *tree, uint32_t node)
 {
     return tree->group_first[tree->nodes[node].group];

@@ -108,7 +108,7 @@ static void check_counts(strl__model *model, const strl__vtree *tree)
     bool first = true;
     for (uint32_t id = 0; id < tree->node_count; id++) {
         const strl__vnode *n = &tree->nodes[id];
-        if (n->child_count)
+        if (!strl__holds_input(tree, id))
             continue;
         triangles += n->triangle_count;
         vertices += n->vertex_count;

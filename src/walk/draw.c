@@ -4,8 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-/* A load's number and a placement share a key; strl_walk_open refuses more placements. */
-#define PLACEMENT_BITS 24
 /* The eye may stand inside a box; the depth buffer still wants a near plane before it. */
 #define LEAST_NEAR 1e-6
 
@@ -18,7 +16,7 @@ static strl_draw_item make_item(const strl_walk *walk, const strl__active *activ
     const strl__mesh *mesh = &node->mesh;
     float error = mesh->errors[mesh->state];
     strl_draw_item item = {
-        .key = node->load << PLACEMENT_BITS | active->placement,
+        .key = node->load << STRL__PLACEMENT_BITS | active->placement,
         .placement = active->placement,
         .node = node->treelet->data.first_node + (uint32_t)(node - node->treelet->nodes),
         .level = record->level,
@@ -77,5 +75,5 @@ strl_status strl__draw_list(strl_walk *walk, const strl_view *view, strl_draw_li
     list->count = (uint32_t)walk->front.count;
     list->far_distance = largest > 0 ? largest : 1;
     list->near_distance = fmin(fmax(least, list->far_distance * LEAST_NEAR), list->far_distance / 2);
-    return STRL_OK;
+    return strl__draw_splats(walk, list, err);
 }

@@ -22,6 +22,8 @@
 
 #define STRL__REQUEST_NODES 32u /* most nodes that one page is read for at a time */
 #define STRL__MAX_REQUESTS 256u
+#define STRL__PLACEMENT_BITS 24u /* a load's number and a placement share a key; strl_walk_open refuses more placements */
+#define STRL__SPLAT_ROOM 2048u /* bytes that a decoded node may take beside what its record says: splats of an empty brick */
 #define STRL__GIVE_UP_FAILURES 3u /* from then on strl_walk_settled does not wait for it; it is still retried */
 
 typedef enum strl__residency { STRL__ABSENT, STRL__PENDING, STRL__RESIDENT } strl__residency;
@@ -48,6 +50,8 @@ typedef struct strl__mesh {
     uint16_t *indices;                   /* [3 * triangle_count] */
     uint16_t (*finest)[3];               /* [triangle_count], corners of the finest state; NULL at leaves */
     strl_vertex_label *labels;           /* [vertex_count]; NULL where the walk keeps none */
+    strl_splat *splats;                  /* of bricks: by state, those of state s before splat_end[s] */
+    uint16_t *splat_end;                 /* [step_count]; NULL where it is no brick */
 } strl__mesh;
 
 typedef struct strl__node {
@@ -95,7 +99,8 @@ typedef struct strl__treelets {
 typedef struct strl__placement {
     uint32_t tree;
     double transform[12];
-    double length_scale; /* world units per lattice unit, at most */
+    double length_scale; /* world units per lattice unit, at most; of sample trees by the pixels that a splat may have for each of the
+                            allowed error, so that sizes and errors are compared alike */
 } strl__placement;
 
 typedef struct strl__walk_tree {
@@ -213,6 +218,7 @@ typedef struct strl__demands {
 typedef struct strl__active {
     strl__node *node;
     uint32_t placement;
+    bool open;        /* of a sample tree: drawn with what is below it */
     strl_box box;     /* world */
     strl_sight sight; /* of the box */
 } strl__active;
@@ -250,6 +256,7 @@ struct strl_walk {
     strl_executor executor;    /* submit NULL: inline */
     uint64_t memory_bytes;
     double error_px;
+    double splat_ratio; /* pixels of a splat for each of the allowed error */
     bool labels; /* kept for each vertex */
     double bounds[6];
     strl__walk_tree *trees;
@@ -283,6 +290,9 @@ struct strl_walk {
     strl__front front;
     strl_draw_item *items;
     size_t item_capacity;
+    strl_vertex *points; /* splats of the frame */
+    size_t point_count, point_capacity;
+    uint16_t *numbers; /* 0, 1, 2, ...; NULL where there was no splat yet */
     strl_camera camera; /* of the last frame */
     strl_walk_stats stats;
 };
@@ -344,6 +354,13 @@ strl_status strl__budget_cut(strl_walk *walk, const strl_view *view, strl__cut *
 
 /* refine.c */
 void strl__refine_front(strl_walk *walk);
+
+/* brick.c: thread-safe. Vertices and labels are the caller's to fill in. */
+strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const strl_brick_head *head, bool labels,
+                               strl__mesh *mesh, strl_error *err);
+
+/* splats.c: behind the other items of the list. */
+strl_status strl__draw_splats(strl_walk *walk, strl_draw_list *list, strl_error *err);
 
 /* draw.c */
 strl_status strl__draw_list(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err);

@@ -44,7 +44,7 @@ static void make_labels(const strl_pm *pm, strl_vertex_label *labels)
 
 uint64_t strl__node_bytes(const strl_node *record, bool labels)
 {
-    return strl_node_decoded_bytes(record) + (labels ? record->vertex_count * sizeof(strl_vertex_label) : 0);
+    return strl_node_decoded_bytes(record) + (record->rung == STRL_RUNG_SAMPLED ? STRL__SPLAT_ROOM : 0) + (labels ? record->vertex_count * sizeof(strl_vertex_label) : 0);
 }
 
 static strl_status allocate(const strl_node *record, const strl_pm *pm, bool labels, strl__mesh *mesh, strl_error *err)
@@ -158,6 +158,17 @@ strl_payload_reference strl__mesh_reference(const strl__node *from, const strl_n
     return reference;
 }
 
+static strl_status make_progressive(const strl_node *record, const strl_pm *pm, bool labels, strl_arena *arena, strl__mesh *mesh,
+                                    strl_error *err)
+{
+    strl_status status = allocate(record, pm, labels, mesh, err);
+    if (status == STRL_OK)
+        status = find_moves(pm, mesh, arena, err);
+    if (status == STRL_OK)
+        copy_states(pm, mesh);
+    return status;
+}
+
 strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size,
                               const strl_payload_reference *reference, bool labels, strl__mesh *mesh, strl_error *err)
 {
@@ -165,13 +176,14 @@ strl_status strl__mesh_create(const strl_node *record, const void *page, size_t 
     strl_pm pm;
     *mesh = (strl__mesh){0};
     strl_arena_init(&arena, SCRATCH_BYTES);
+    strl_brick_head head;
     strl_status status = strl_page_mesh(record, page, size, reference, &arena, &pm, err);
     if (status == STRL_OK)
-        status = allocate(record, &pm, labels, mesh, err);
+        status = strl_page_head(record, page, size, &arena, &head, err);
     if (status == STRL_OK)
-        status = find_moves(&pm, mesh, &arena, err);
+        status = head.level_count ? strl__brick_create(record, &pm, &head, labels, mesh, err)
+                                                    : make_progressive(record, &pm, labels, &arena, mesh, err);
     if (status == STRL_OK) {
-        copy_states(&pm, mesh);
         make_vertices(&pm, mesh->vertices);
         if (labels)
             make_labels(&pm, mesh->labels);

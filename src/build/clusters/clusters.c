@@ -4,6 +4,7 @@
 
 #include "base/fail.h"
 #include "build/clusters/hierarchy.h"
+#include "build/container_facts.h"
 #include "platform/file.h"
 #include "platform/thread.h"
 
@@ -87,48 +88,12 @@ static void hierarchy_deinit(strl_hierarchy *hierarchy)
     strl_adjacency_deinit(&hierarchy->next);
 }
 
-static strl_status write_names(const strl_ingest *ingest, strl_container_writer *writer, strl_error *err)
-{
-    strl_status status = STRL_OK;
-    for (size_t i = 0; i < ingest->parts.count && !status; i++)
-        status = strl_container_writer_add_part(writer, ingest->parts.items[i], err);
-    for (size_t i = 0; i < ingest->materials.count && !status; i++)
-        status = strl_container_writer_add_material(writer, ingest->materials.items[i], ingest->materials.rgba[i], err);
-    for (size_t i = 0; ingest->materials.images && i < ingest->materials.count && !status; i++)
-        status = strl_container_writer_add_image(writer, &ingest->materials.images[i], err);
-    return status;
-}
-
-static bool shows_colour(const strl_ingest *ingest)
-{
-    bool coloured = ingest->has_colours;
-    for (size_t i = 0; i < ingest->materials.count; i++)
-        coloured |= ingest->materials.rgba[i] != 0xffffffffu;
-    return coloured;
-}
-
-static strl_container_writer_desc describe_container(const strl_build_context *context, const strl_ingest *ingest)
-{
-    const strl_build_result *result = context->result;
-    strl_container_writer_desc desc = {.path = context->desc->output, .scratch_dir = context->scratch_dir,
-                                       .part_dir = context->part_dir};
-    memcpy(desc.info.unit, ingest->unit, sizeof desc.info.unit);
-    desc.info.up_axis = (uint32_t)ingest->up;
-    desc.info.has_colour = shows_colour(ingest);
-    desc.info.triangles_in = result->triangles_in;
-    desc.info.dropped_nonfinite = result->dropped_nonfinite;
-    desc.info.dropped_degenerate = result->dropped_degenerate;
-    desc.info.dropped_lines = result->dropped_lines;
-    desc.info.dropped_points = result->dropped_points;
-    return desc;
-}
-
 static strl_status write_container(const strl_hierarchy *hierarchy, strl_error *err)
 {
     const strl_build_context *context = hierarchy->context;
     const strl_ingest *ingest = hierarchy->ingest;
     strl_build_result *result = context->result;
-    const strl_container_writer_desc desc = describe_container(context, ingest);
+    const strl_container_writer_desc desc = strl_describe_container(context, ingest);
     strl_container_writer *writer = NULL;
     strl_tree tree = {.structure = STRL_STRUCTURE_CLUSTERS, .step = ingest->step, .node_count = (uint32_t)((2ull << hierarchy->partition->depth) - 1),
                       .level_count = hierarchy->partition->depth + 1, .leaf_geometric = ingest->leaf_error};
@@ -146,7 +111,7 @@ static strl_status write_container(const strl_hierarchy *hierarchy, strl_error *
     if (!status)
         status = strl_container_writer_add_placement(writer, &identity, err);
     if (!status)
-        status = write_names(ingest, writer, err);
+        status = strl_write_names(ingest, writer, err);
     if (!status)
         status = strl_container_writer_finish(writer, &result->bytes_out, err);
     strl_container_writer_destroy(writer);
@@ -168,17 +133,6 @@ static void fill_result(const strl_hierarchy *hierarchy, strl_build_result *resu
     result->placements = 1;
     result->step = hierarchy->ingest->step;
     result->quantisation_error = (double)hierarchy->ingest->leaf_error * hierarchy->ingest->step;
-}
-
-/* Every triangle that came in is in a leaf or was counted when it was dropped. */
-static strl_status check_counts(const strl_build_result *result, strl_error *err)
-{
-    uint64_t dropped = result->dropped_nonfinite + result->dropped_degenerate;
-    if (result->triangles_in >= dropped && result->triangles_in - dropped == result->triangles_leaf)
-        return STRL_OK;
-    return strl__fail(err, STRL_ERR_INTERNAL,
-                      "%" PRIu64 " triangles came in and %" PRIu64 " were dropped, but the leaves have %" PRIu64,
-                      result->triangles_in, dropped, result->triangles_leaf);
 }
 
 static strl_status run_ingest(strl_hierarchy *hierarchy, strl_position *position, strl_spill **graph, strl_error *err)
@@ -239,10 +193,10 @@ strl_status strl__clusters_run(strl_build_context *context, strl_error *err)
     if (!status && !empty)
         fill_result(&hierarchy, context->result);
     if (!status)
-        status = check_counts(context->result, err);
+        status = strl_check_counts(context->result, err);
     if (!status && empty) {
-        const strl_container_writer_desc desc = describe_container(context, &ingest);
-        status = strl_write_empty(&desc, context->result, err);
+        const strl_container_writer_desc desc = strl_describe_container(context, &ingest);
+        status = strl_write_empty(&desc, STRL_STRUCTURE_CLUSTERS, context->result, err);
     } else if (!status) {
         status = write_container(&hierarchy, err);
     }

@@ -143,8 +143,6 @@ strl_status strl_node_states_restore(strl_level *level, uint32_t groups, strl_ad
 
 /* All nodes, breadth first, each payload told by its parent's. Uses up the payloads of the levels. */
 strl_status strl_write_nodes(const strl_hierarchy *hierarchy, strl_container_writer *writer, strl_error *err);
-/* The whole container of a model without a triangle. */
-strl_status strl_write_empty(const strl_container_writer_desc *desc, strl_build_result *result, strl_error *err);
 
 /* Removes faces of which there are more than two identical ones, in pairs, from a group's merged mesh. *dropped: how many. False
  * without memory. */

@@ -5,7 +5,7 @@
 #include "base/fail.h"
 #include "base/hash.h"
 #include "build/clusters/hierarchy.h"
-#include "build/clusters/normals.h"
+#include "build/ingest/normals.h"
 
 /* One shared position of a cluster, in the words of its bucket. */
 typedef struct shared_ref {

@@ -43,9 +43,27 @@ static void quantise(const strl_ingest *ingest, const double position[3], uint32
     }
 }
 
-/* Splitters at the quantiles of the sample. */
-static strl_status open_buckets(strl_build_context *context, const model_survey *survey, const strl_ingest *ingest,
-                                bucket_set *buckets, strl_error *err)
+/* The border of the largest cells between two keys, a < b: b, or what lies before it. */
+static uint64_t octree_border(uint64_t a, uint64_t b)
+{
+    unsigned level = 0;
+    while (a >> 3 * (level + 1) != b >> 3 * (level + 1))
+        level++;
+    return b >> 3 * level << 3 * level;
+}
+
+/* Splitters at the quantiles of the sample; of an octree, up to a quarter of a bucket off. */
+static void choose_splitters(const uint64_t *keys, uint32_t count, bool octree, strl_buckets *buckets)
+{
+    for (uint32_t i = 0; i + 1 < buckets->count; i++) {
+        uint64_t at = (uint64_t)(i + 1) * count / buckets->count, reach = count / buckets->count / 4;
+        uint64_t low = keys[at - (reach < at ? reach : at)], high = keys[at + reach < count ? at + reach : count - 1];
+        buckets->splitter[i] = octree && low < high ? octree_border(low, high) : keys[at];
+    }
+}
+
+static strl_status open_buckets(strl_build_context *context, const model_survey *survey, const strl_ingest *ingest, bool octree,
+                                strl_buckets *buckets, strl_error *err)
 {
     uint64_t bytes = survey->triangles * strl__soup_bucket_bytes(ingest), each = strl__bucket_bytes(context) * 2 / 3;
     uint64_t wanted = bytes / (each ? each : 1) + 1;
@@ -64,8 +82,7 @@ static strl_status open_buckets(strl_build_context *context, const model_survey 
         keys[i] = strl__curve_key(ingest, cell);
     }
     qsort(keys, survey->sample_count, sizeof *keys, compare_keys);
-    for (uint32_t i = 0; i + 1 < buckets->count; i++)
-        buckets->splitter[i] = keys[(uint64_t)(i + 1) * survey->sample_count / buckets->count];
+    choose_splitters(keys, survey->sample_count, octree, buckets);
     for (uint32_t i = 0; i < buckets->count && !status; i++) {
         char name[32];
         snprintf(name, sizeof name, "bucket-%03u", i);
@@ -76,16 +93,16 @@ done:
     return status;
 }
 
-void strl__buckets_deinit(bucket_set *buckets)
+void strl__buckets_deinit(strl_buckets *buckets)
 {
     for (uint32_t i = 0; buckets->spill && i < buckets->count; i++)
         strl_spill_close_and_delete(buckets->spill[i], NULL);
     strl__free(buckets->splitter);
     strl__free(buckets->spill);
-    *buckets = (bucket_set){0};
+    *buckets = (strl_buckets){0};
 }
 
-static uint32_t bucket_of(const bucket_set *buckets, uint64_t key)
+static uint32_t bucket_of(const strl_buckets *buckets, uint64_t key)
 {
     uint32_t low = 0, high = buckets->count - 1;
     while (low < high) {
@@ -197,7 +214,7 @@ typedef struct distributed {
 typedef struct distribution {
     strl_build_context *context;
     strl_ingest *ingest;
-    bucket_set *buckets;
+    strl_buckets *buckets;
     palette_table table;
     const strl_reader *reader; /* whose batches come */
     uint32_t part_base, material_base;
@@ -379,11 +396,11 @@ static strl_status distribute_inputs(distribution *d, strl_reader *const *reader
     return status;
 }
 
-strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, const model_survey *survey,
-                             strl_ingest *ingest, bucket_set *buckets, strl_error *err)
+strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, const model_survey *survey, bool octree,
+                             strl_ingest *ingest, strl_buckets *buckets, strl_error *err)
 {
     distribution d = {.context = context, .ingest = ingest, .buckets = buckets};
-    strl_status status = open_buckets(context, survey, ingest, buckets, err);
+    strl_status status = open_buckets(context, survey, ingest, octree, buckets, err);
     if (!status)
         status = distribute_inputs(&d, readers, err);
     if (!status && !strl__ingest_fill_images(&ingest->materials))

@@ -162,22 +162,29 @@ static strl_status tell_estimate(strl_build_context *context, strl_reader *const
     return status ? status : check_disk(context, certain, false, err);
 }
 
-strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, strl_error *err)
+static strl_status close_readers(strl_build_context *context, strl_reader **readers, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
+        status = strl__request_note_beside(context, readers[i], err);
+        strl_reader_close(readers[i]);
+        readers[i] = NULL;
+    }
+    return status;
+}
+
+strl_status strl_ingest_begin(strl_build_context *context, bool octree, strl_ingest *ingest, strl_buckets *buckets, strl_error *err)
 {
     model_survey survey = {0};
-    bucket_set buckets = {0};
-    pair_spills pairs = {0};
     *ingest = (strl_ingest){0};
     strl__build_stage(context, "survey");
     strl_reader **readers = strl__alloc_zero(context->desc->input_count, sizeof *readers);
     strl_status status = readers ? open_readers(context, readers, ingest, err)
                                  : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u inputs", context->desc->input_count);
-    if (status)
-        goto done;
-    status = tell_estimate(context, readers, err);
-    if (status)
-        goto done;
-    status = strl__survey_run(context, readers, &survey, err);
+    if (!status)
+        status = tell_estimate(context, readers, err);
+    if (!status)
+        status = strl__survey_run(context, readers, &survey, err);
     if (status)
         goto done;
     context->result->triangles_in = survey.triangles;
@@ -201,29 +208,34 @@ strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, st
     if (status)
         goto done;
     strl__build_stage(context, "read");
-    status = strl__distribute(context, readers, &survey, ingest, &buckets, err);
+    status = strl__distribute(context, readers, &survey, octree, ingest, buckets, err);
     if (status)
         goto done;
     strl__ingest_warn(context, readers, ingest); /* not before: of a refused model only the refusal is told */
     strl__build_note_scratch(context);
     context->spool_bytes = 0;
-    for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
-        status = strl__request_note_beside(context, readers[i], err);
-        strl_reader_close(readers[i]);
-        readers[i] = NULL;
-    }
-    strl__build_stage(context, "sort");
-    if (!status)
-        status = strl__sort_buckets(context, ingest, &buckets, &pairs, err);
-    if (status)
-        goto done;
-    strl__build_stage(context, "connect");
-    status = strl__connect_cells(context, ingest, &pairs, err);
+    status = close_readers(context, readers, err);
 done:
     for (uint32_t i = 0; readers && i < context->desc->input_count; i++)
         strl_reader_close(readers[i]);
     strl__free(readers);
     strl__survey_deinit(&survey);
+    return status;
+}
+
+strl_status strl_ingest_run(strl_build_context *context, strl_ingest *ingest, strl_error *err)
+{
+    strl_buckets buckets = {0};
+    pair_spills pairs = {0};
+    strl_status status = strl_ingest_begin(context, false, ingest, &buckets, err);
+    if (!status && buckets.count) {
+        strl__build_stage(context, "sort");
+        status = strl__sort_buckets(context, ingest, &buckets, &pairs, err);
+        if (!status)
+            strl__build_stage(context, "connect");
+        if (!status)
+            status = strl__connect_cells(context, ingest, &pairs, err);
+    }
     strl__buckets_deinit(&buckets);
     strl__pair_spills_deinit(&pairs);
     return status;

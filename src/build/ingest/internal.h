@@ -2,7 +2,7 @@
 #ifndef STRL_BUILD_INGEST_INTERNAL_H
 #define STRL_BUILD_INGEST_INTERNAL_H
 
-#include "build/ingest/ingest.h"
+#include "build/ingest/buckets.h"
 
 #define MAX_BUCKETS 384u
 
@@ -43,28 +43,14 @@ void strl__ingest_warn(strl_build_context *context, strl_reader *const *readers,
 bool strl__ingest_add_image(strl_names *materials, size_t material, const strl_material_image *image);
 bool strl__ingest_fill_images(strl_names *materials);
 
-/* Position on the curve of a lattice point. */
-uint64_t strl__curve_key(const strl_ingest *ingest, const uint32_t position[3]);
-uint64_t strl__curve_key_of_triangle(const strl_ingest *ingest, const strl_soup_triangle *triangle);
-
-/* Records of buckets: all that a triangle has. The soup's are the first strl_soup_bytes() of them. */
-size_t strl__soup_bucket_bytes(const strl_ingest *ingest);
 void strl__soup_pack(const strl_ingest *ingest, const strl_soup_triangle *triangle, uint8_t *bytes);
 /* Two corners in one lattice cell. */
 bool strl__soup_has_collapsed(const strl_soup_triangle *triangle);
 void strl__soup_set_palette(const strl_ingest *ingest, uint32_t palette, uint8_t *bytes);
-void strl__soup_unpack(const strl_ingest *ingest, const uint8_t *bytes, strl_soup_triangle *triangle);
 
 /* Triangles to buckets by curve range. */
-typedef struct bucket_set {
-    uint32_t count;
-    uint64_t *splitter;   /* [count - 1] first key of bucket i + 1 */
-    strl_spill **spill;   /* [count] */
-} bucket_set;
-
-strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, const model_survey *survey,
-                             strl_ingest *ingest, bucket_set *buckets, strl_error *err);
-void strl__buckets_deinit(bucket_set *buckets);
+strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, const model_survey *survey, bool octree,
+                             strl_ingest *ingest, strl_buckets *buckets, strl_error *err);
 
 /* A lattice position and the cell that has it. */
 typedef struct pair {
@@ -98,14 +84,10 @@ strl_status strl__pair_spills_delete(pair_spills *pairs, uint32_t index, strl_er
 void strl__pair_spills_deinit(pair_spills *pairs);
 
 /* Buckets to soup, cells and position pairs. */
-strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest, bucket_set *buckets, pair_spills *pairs,
+strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest, strl_buckets *buckets, pair_spills *pairs,
                                strl_error *err);
 /* Pairs to edges and shared positions. */
 strl_status strl__connect_cells(strl_build_context *context, strl_ingest *ingest, pair_spills *pairs, strl_error *err);
-
-/* How many items of this size may be under way at once: one a worker and one more where the budget allows, one in any case. Buckets and pair
- * spills are of bounded number, so those of a very large model are larger than strl__bucket_bytes. */
-unsigned strl__ingest_window(const strl_build_context *context, uint64_t bytes_each);
 
 /* Bytes that one bucket or pair spill may take, so that every worker can hold one and its sort; the same for any number of workers. */
 uint64_t strl__bucket_bytes(const strl_build_context *context);

@@ -26,22 +26,17 @@ typedef struct sorted_bucket {
 typedef struct sorting {
     strl_build_context *context;
     strl_ingest *ingest;
-    bucket_set *buckets;
+    strl_buckets *buckets;
     pair_spills *pairs;
     sorted_bucket *slots; /* per pipeline slot */
     uint32_t cell_triangles; /* most triangles of a cell */
     size_t cell_capacity;
 } sorting;
 
-typedef struct keyed {
-    uint64_t key;
-    uint64_t index;
-} keyed;
-
 /* Stable least-significant-digit radix sort; digits that are all equal cost one counting pass. */
-static void radix_sort(keyed *items, keyed *other, uint64_t count)
+void strl__sort_keys(strl_keyed *items, strl_keyed *other, uint64_t count)
 {
-    keyed *from = items, *to = other;
+    strl_keyed *from = items, *to = other;
     for (unsigned shift = 0; shift < 64; shift += 11) {
         uint64_t start[2049] = {0};
         for (uint64_t i = 0; i < count; i++)
@@ -55,7 +50,7 @@ static void radix_sort(keyed *items, keyed *other, uint64_t count)
             start[d + 1] += start[d];
         for (uint64_t i = 0; i < count; i++)
             to[start[from[i].key >> shift & 2047]++] = from[i];
-        keyed *swap = from;
+        strl_keyed *swap = from;
         from = to;
         to = swap;
     }
@@ -63,14 +58,14 @@ static void radix_sort(keyed *items, keyed *other, uint64_t count)
         memcpy(items, from, count * sizeof *items);
 }
 
-static strl_status load_sorted(sorting *s, uint32_t bucket, sorted_bucket *out, keyed **keys_out, strl_error *err)
+static strl_status load_sorted(sorting *s, uint32_t bucket, sorted_bucket *out, strl_keyed **keys_out, strl_error *err)
 {
     size_t bytes = strl_soup_bytes(s->ingest), raw_bytes = strl__soup_bucket_bytes(s->ingest);
     strl_spill *spill = s->buckets->spill[bucket];
     strl_status status = STRL_OK;
     out->count = strl_spill_bytes(spill) / raw_bytes;
     uint8_t *raw = strl__alloc(out->count, raw_bytes);
-    keyed *keys = strl__alloc(out->count, sizeof *keys), *other = strl__alloc(out->count, sizeof *keys);
+    strl_keyed *keys = strl__alloc(out->count, sizeof *keys), *other = strl__alloc(out->count, sizeof *keys);
     out->records = strl__alloc(out->count, bytes);
     if (!raw || !keys || !other || !out->records) {
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory to sort %llu triangles", (unsigned long long)out->count);
@@ -80,10 +75,10 @@ static strl_status load_sorted(sorting *s, uint32_t bucket, sorted_bucket *out, 
     for (uint64_t i = 0; i < out->count && !status; i++) {
         strl_soup_triangle triangle;
         strl__soup_unpack(s->ingest, raw + i * raw_bytes, &triangle);
-        keys[i] = (keyed){strl__curve_key_of_triangle(s->ingest, &triangle), i};
+        keys[i] = (strl_keyed){strl__curve_key_of_triangle(s->ingest, &triangle), i};
     }
     if (!status) {
-        radix_sort(keys, other, out->count);
+        strl__sort_keys(keys, other, out->count);
         for (uint64_t i = 0; i < out->count; i++)
             memcpy(out->records + i * bytes, raw + keys[i].index * raw_bytes, bytes);
     }
@@ -98,7 +93,7 @@ done:
 
 /* Where to end a run that begins at `at` and may have `most` items: where the curve makes its largest step in reach, so that runs are
  * compact. */
-static uint64_t run_end(const keyed *keys, uint64_t at, uint64_t most, uint64_t count)
+static uint64_t run_end(const strl_keyed *keys, uint64_t at, uint64_t most, uint64_t count)
 {
     uint64_t widest = 0, best = at + most;
     if (count - at <= most)
@@ -118,7 +113,7 @@ typedef struct block {
     uint32_t *component;  /* [3 * BLOCK] union-find over corners; then, per triangle, its component */
     uint32_t *table;      /* [BLOCK_TABLE] corner + 1 by position */
     uint32_t *order;      /* [BLOCK] */
-    keyed *keys;          /* [BLOCK] */
+    strl_keyed *keys;          /* [BLOCK] */
     uint8_t *records;     /* [BLOCK] packed */
     uint32_t run[BLOCK];  /* triangles of each component, in new order */
     uint32_t runs;
@@ -159,7 +154,7 @@ static void find_components(block *b, const uint8_t *records, size_t bytes, uint
 
 /* Sheets that pass through one block are laid one after the other, each in the order of the curve: cells then hold pieces of
  * one sheet, and clusters of layered models keep short borders. */
-static void separate_sheets(block *b, uint8_t *records, keyed *keys, size_t bytes, uint32_t count)
+static void separate_sheets(block *b, uint8_t *records, strl_keyed *keys, size_t bytes, uint32_t count)
 {
     uint32_t placed = 0;
     find_components(b, records, bytes, count);
@@ -182,7 +177,7 @@ static void separate_sheets(block *b, uint8_t *records, keyed *keys, size_t byte
 }
 
 /* Cells of one block: pieces of one component, small components together. */
-static bool cut_block(const sorting *s, sorted_bucket *out, const block *b, const keyed *keys)
+static bool cut_block(const sorting *s, sorted_bucket *out, const block *b, const strl_keyed *keys)
 {
     uint64_t at = 0, end = 0, pending = 0;
     for (uint32_t i = 0; i < b->runs; i++) {
@@ -202,7 +197,7 @@ static bool cut_block(const sorting *s, sorted_bucket *out, const block *b, cons
     return true;
 }
 
-static bool cut_cells(const sorting *s, sorted_bucket *out, keyed *keys)
+static bool cut_cells(const sorting *s, sorted_bucket *out, strl_keyed *keys)
 {
     size_t bytes = strl_soup_bytes(s->ingest);
     block b = {.component = strl__alloc(3 * BLOCK, sizeof *b.component), .table = strl__alloc(BLOCK_TABLE, sizeof *b.table),
@@ -258,7 +253,7 @@ static strl_status sort_bucket(void *context, uint64_t index, unsigned slot, uns
 {
     sorting *s = context;
     sorted_bucket *out = &s->slots[slot];
-    keyed *keys = NULL;
+    strl_keyed *keys = NULL;
     (void)worker;
     *out = (sorted_bucket){0};
     strl_status status = load_sorted(s, (uint32_t)index, out, &keys, err);
@@ -303,7 +298,7 @@ static strl_status append_bucket(void *context, uint64_t index, unsigned slot, u
     return status ? status : strl__build_report(s->context, first, ingest->triangle_count, err);
 }
 
-strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest, bucket_set *buckets, pair_spills *pairs,
+strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest, strl_buckets *buckets, pair_spills *pairs,
                                strl_error *err)
 {
     sorting s = {.context = context, .ingest = ingest, .buckets = buckets, .pairs = pairs};

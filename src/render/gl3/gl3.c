@@ -180,14 +180,15 @@ static strl_status draw_item(gl3_draw *draw, const strl_draw_item *item, const s
         return status;
     if (entry->hidden)
         return STRL_OK;
-    bool discards = entry->translucent || entry->hides || draw->discards;
+    bool points = item->point_px > 0, discards = entry->translucent || entry->hides || draw->discards;
     const strl_gl_program *program = &draw->self->gl.programs[discards ? STRL_GL_NODE_ALPHA : STRL_GL_NODE];
     glUseProgram(program->name);
     glUniform4fv(program->rows, 6, record->rows[0]);
     glUniform4iv(program->base, 2, record->base[0]);
     GLsizei count = (GLsizei)item->index_count;
-    glDrawElements(draw->lines ? GL_LINES : GL_TRIANGLES, draw->lines ? 2 * count : count, GL_UNSIGNED_SHORT, NULL);
-    draw->stats->triangles += item->index_count / 3;
+    bool lines = draw->lines && !points;
+    glDrawElements(points ? GL_POINTS : lines ? GL_LINES : GL_TRIANGLES, lines ? 2 * count : count, GL_UNSIGNED_SHORT, NULL);
+    draw->stats->triangles += points ? 0 : item->index_count / 3;
     draw->stats->items++;
     draw->stats->draws++;
     return STRL_OK;

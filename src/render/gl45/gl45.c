@@ -22,8 +22,13 @@ typedef struct gl45_command {
 typedef struct gl45_queued {
     gl45_command command;
     uint32_t slab;
-    bool translucent;
+    bool translucent, points;
 } gl45_queued;
+
+/* What one multi-draw has in common, besides the slab. */
+typedef struct gl45_kind {
+    bool translucent, points;
+} gl45_kind;
 
 typedef struct gl45_renderer {
     strl_gl gl;
@@ -52,14 +57,14 @@ typedef struct gl45_piece {
 } gl45_piece;
 
 /* The queued commands of one slab and kind, contiguous, as one call. */
-static void draw_slab(gl45_draw *draw, gl45_piece *piece, uint32_t slab, bool translucent)
+static void draw_slab(gl45_draw *draw, gl45_piece *piece, uint32_t slab, gl45_kind kind)
 {
     gl45_renderer *self = draw->self;
     size_t first = piece->used;
     uint32_t count = 0;
     for (uint32_t q = 0; q < self->batch_count; q++) {
         const gl45_queued *queued = &self->queued[q];
-        if (queued->slab != slab || queued->translucent != translucent)
+        if (queued->slab != slab || queued->translucent != kind.translucent || queued->points != kind.points)
             continue;
         memcpy(piece->mapped + piece->used, &queued->command, sizeof queued->command);
         piece->used += sizeof queued->command;
@@ -70,7 +75,7 @@ static void draw_slab(gl45_draw *draw, gl45_piece *piece, uint32_t slab, bool tr
     GLuint array = self->store.slabs[slab].array;
     glVertexArrayVertexBuffer(array, 1, self->ring.buffer, (GLintptr)piece->offset, sizeof(strl_gl_item));
     glBindVertexArray(array);
-    glMultiDrawElementsIndirect(GL_TRIANGLES, GL_UNSIGNED_SHORT, (const void *)(piece->offset + first), (GLsizei)count, 0);
+    glMultiDrawElementsIndirect(kind.points ? GL_POINTS : GL_TRIANGLES, GL_UNSIGNED_SHORT, (const void *)(piece->offset + first), (GLsizei)count, 0);
     draw->stats->draws += count;
 }
 
@@ -84,10 +89,10 @@ static void flush(gl45_draw *draw)
     piece.mapped = strl__gl_ring_take(&self->ring, record_bytes + self->batch_count * sizeof(gl45_command), &piece.offset);
     memcpy(piece.mapped, self->records, record_bytes);
     glBindBuffer(GL_DRAW_INDIRECT_BUFFER, self->ring.buffer);
-    for (int translucent = 0; translucent < 2; translucent++) {
-        glUseProgram(self->gl.programs[translucent ? STRL_GL_NODE_ALPHA : STRL_GL_NODE].name);
+    for (int kind = 0; kind < 4; kind++) {
+        glUseProgram(self->gl.programs[kind & 1 ? STRL_GL_NODE_ALPHA : STRL_GL_NODE].name);
         for (uint32_t slab = 0; slab < self->store.slab_count; slab++)
-            draw_slab(draw, &piece, slab, translucent);
+            draw_slab(draw, &piece, slab, (gl45_kind){kind & 1, kind & 2});
     }
     self->batch_count = 0;
     self->batch++;
@@ -210,9 +215,9 @@ static strl_status queue_item(gl45_draw *draw, const strl_draw_item *item, const
     int32_t first_vertex = (int32_t)(entry->place.range.vertex_at * (STRL_GRANULE_BYTES / (uint32_t)sizeof(strl_vertex)));
     self->records[at] = *record;
     self->queued[at] = (gl45_queued){{item->index_count, 1, first_index, first_vertex, at}, entry->place.range.slab,
-                                     entry->translucent || entry->hides};
+                                     entry->translucent || entry->hides, item->point_px > 0};
     entry->batch = self->batch;
-    draw->stats->triangles += item->index_count / 3;
+    draw->stats->triangles += item->point_px > 0 ? 0 : item->index_count / 3;
     draw->stats->items++;
     return STRL_OK;
 }

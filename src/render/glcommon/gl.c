@@ -144,6 +144,7 @@ void strl__gl_begin_draw(strl_gl *gl, const strl_draw_setup *setup)
     if (!gl->dialect.es) {
         glDisable(GL_FRAMEBUFFER_SRGB);
         glPolygonMode(GL_FRONT_AND_BACK, setup->options.wireframe ? GL_LINE : GL_FILL);
+        glEnable(GL_PROGRAM_POINT_SIZE);
         if (strl__gl_has_section(setup))
             glEnable(GL_CLIP_DISTANCE0);
     }

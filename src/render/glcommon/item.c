@@ -126,5 +126,7 @@ void strl__gl_item_make(strl_gl_placing *placing, const strl_draw_setup *setup, 
         out->base[1][i] = (int32_t)(uint32_t)(base >> 32);
         out->rows[3 + i][3] = tint[i];
     }
+    float point_size = (float)setup->supersample * item->point_px;
+    memcpy(&out->base[1][3], &point_size, sizeof point_size);
     out->base[0][3] = item->positions == STRL_POSITIONS_FLOAT ? FLAG_FLOAT_POSITIONS : 0;
 }

@@ -1,6 +1,6 @@
 /* Vertex normals for corners that came without. */
-#ifndef STRL_BUILD_CLUSTERS_NORMALS_H
-#define STRL_BUILD_CLUSTERS_NORMALS_H
+#ifndef STRL_BUILD_INGEST_NORMALS_H
+#define STRL_BUILD_INGEST_NORMALS_H
 
 #include "base/memory.h"
 #include "build/ingest/ingest.h"

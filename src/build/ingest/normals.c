@@ -1,4 +1,4 @@
-#include "build/clusters/normals.h"
+#include "build/ingest/normals.h"
 
 #include <math.h>
 #include <string.h>

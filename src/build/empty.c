@@ -1,7 +1,7 @@
 /* The container of a model without a triangle: one node that holds nothing, at the origin. What readers have skipped is counted in its
  * header, which is all that such a model has to tell. */
 #include "base/fail.h"
-#include "build/clusters/hierarchy.h"
+#include "build/container_facts.h"
 #include "geometry/payload.h"
 
 /* A mesh without a vertex still has one palette entry, of the unnamed part and material. */
@@ -16,10 +16,10 @@ static strl_status encode_nothing(strl_arena *arena, strl_writer *payload, strl_
     return strl_payload_encode(&pm, NULL, arena, payload, NULL, err);
 }
 
-static strl_status add_tree(strl_container_writer *writer, strl_error *err)
+static strl_status add_tree(strl_container_writer *writer, strl_structure structure, strl_error *err)
 {
     const strl_tree tree = {
-        .structure = STRL_STRUCTURE_CLUSTERS, .step = 1, .node_count = 1, .level_count = 1, .group_count = 1};
+        .structure = structure, .step = 1, .node_count = 1, .level_count = 1, .group_count = 1};
     const strl_node node = {.parent = STRL_NONE, .first_child = STRL_NONE, .decode_parent = STRL_NONE, .group_size = 1};
     strl_arena arena = {0};
     strl_writer payload = {0};
@@ -35,12 +35,13 @@ static strl_status add_tree(strl_container_writer *writer, strl_error *err)
     return status;
 }
 
-strl_status strl_write_empty(const strl_container_writer_desc *desc, strl_build_result *result, strl_error *err)
+strl_status strl_write_empty(const strl_container_writer_desc *desc, strl_structure structure, strl_build_result *result,
+                             strl_error *err)
 {
     strl_container_writer *writer = NULL;
     strl_status status = strl_container_writer_create(desc, &writer, err);
     if (!status)
-        status = add_tree(writer, err);
+        status = add_tree(writer, structure, err);
     if (!status)
         status = strl_container_writer_finish(writer, &result->bytes_out, err);
     strl_container_writer_destroy(writer);

@@ -1,0 +1,146 @@
+/* The splats of a frame: of all bricks whose cells are small enough, merged into items of points, one or more a placement. */
+#include "walk/internal.h"
+
+#include <math.h>
+#include <string.h>
+
+#define MOST_POINTS 65535u /* of an item: indices have 16 bits */
+#define MOST_POINT_PX 64.0 /* what every GL draws */
+
+typedef struct shown {
+    const strl_splat *splats;
+    uint32_t count;
+} shown;
+
+/* Of the state that the brick is drawn in. Of one whose children are wanted and not there yet, none: see missing_splats. */
+static shown shown_splats(const strl__active *active)
+{
+    const strl__mesh *mesh = &active->node->mesh;
+    if (!active->sight.seen || !mesh->splat_end || mesh->state >= mesh->step_count)
+        return (shown){0};
+    uint32_t first = mesh->state ? mesh->splat_end[mesh->state - 1] : 0;
+    return (shown){mesh->splats + first, mesh->splat_end[mesh->state] - first};
+}
+
+/* What is below has not arrived: the finest splats of the brick close its holes, as large as their cells. */
+static shown missing_splats(const strl__active *active)
+{
+    const strl__mesh *mesh = &active->node->mesh;
+    if (!active->sight.seen || !mesh->splat_end || mesh->state < mesh->step_count || active->open ||
+        active->node->record->child_count == 0)
+        return (shown){0};
+    uint32_t first = mesh->step_count > 1 ? mesh->splat_end[mesh->step_count - 2] : 0;
+    return (shown){mesh->splats + first, mesh->splat_end[mesh->step_count - 1] - first};
+}
+
+/* Relative to the least corner of the tree's box, which all cells lie near. */
+static strl_vertex make_point(const strl_node *record, const strl_splat *splat, const int64_t origin[3])
+{
+    strl_vertex point;
+    for (int k = 0; k < 3; k++)
+        point.position[k] = (int32_t)(uint32_t)((uint64_t)record->anchor[k] - (uint64_t)origin[k] + (uint64_t)(int64_t)splat->centre[k]);
+    for (int k = 0; k < 2; k++)
+        point.normal[k] = (uint16_t)(splat->normal[k] * 1023u / 255u);
+    for (int k = 0; k < 3; k++)
+        point.rgba[k] = (uint8_t)(splat->rgba >> 8 * k);
+    point.rgba[3] = (uint8_t)((splat->rgba >> 24) * splat->coverage / 255);
+    return point;
+}
+
+static strl_status add_points(strl_walk *walk, const strl__active *active, shown added, strl_error *err)
+{
+    const strl_tree *tree = walk->trees[walk->placements[active->placement].tree].tree;
+    if (!strl__grow(&walk->points, &walk->point_capacity, walk->point_count + added.count, sizeof *walk->points))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu splats", walk->point_count);
+    for (uint32_t i = 0; i < added.count; i++)
+        walk->points[walk->point_count++] = make_point(active->node->record, &added.splats[i], tree->box_min);
+    return STRL_OK;
+}
+
+static bool fill_numbers(strl_walk *walk)
+{
+    if (walk->numbers)
+        return true;
+    walk->numbers = strl__alloc(MOST_POINTS, sizeof *walk->numbers);
+    for (uint32_t i = 0; walk->numbers && i < MOST_POINTS; i++)
+        walk->numbers[i] = (uint16_t)i;
+    return walk->numbers != NULL;
+}
+
+/* The next `count` points, all of one placement. */
+static strl_status add_items(strl_walk *walk, uint32_t placement_index, double px, size_t first, size_t count, strl_draw_list *list,
+                             strl_error *err)
+{
+    const strl__placement *placement = &walk->placements[placement_index];
+    const strl_tree *tree = walk->trees[placement->tree].tree;
+    for (size_t end = first + count; first < end; first += MOST_POINTS) {
+        uint32_t part = end - first < MOST_POINTS ? (uint32_t)(end - first) : MOST_POINTS;
+        if (!strl__grow(&walk->items, &walk->item_capacity, (size_t)list->count + 1, sizeof *walk->items))
+            return strl__fail(err, STRL_ERR_MEMORY, "no memory for a draw list of %u items", list->count);
+        strl_draw_item *item = &walk->items[list->count++];
+        *item = (strl_draw_item){.key = ++walk->loads << STRL__PLACEMENT_BITS | placement_index,
+                                 .placement = placement_index,
+                                 .visible = true,
+                                 .vertices = walk->points + first,
+                                 .vertex_count = part,
+                                 .indices = walk->numbers,
+                                 .index_count = part,
+                                 .dirty_count = part,
+                                 .step = tree->step,
+                                 .point_px = (float)fmin(fmax(px, 1), MOST_POINT_PX),
+                                 .error_px = (float)px};
+        memcpy(item->anchor, tree->box_min, sizeof item->anchor);
+        memcpy(item->box_min, tree->box_min, sizeof item->box_min);
+        memcpy(item->box_max, tree->box_max, sizeof item->box_max);
+        memcpy(item->origin, tree->origin, sizeof item->origin);
+        memcpy(item->transform, placement->transform, sizeof item->transform);
+        walk->stats.splats += part;
+    }
+    return STRL_OK;
+}
+
+static double missing_px(const strl_walk *walk, const strl__active *active)
+{
+    const strl__mesh *mesh = &active->node->mesh;
+    double size = (double)mesh->errors[mesh->step_count - 1] * walk->placements[active->placement].length_scale;
+    return walk->splat_ratio * strl_sight_error_px(&active->sight, size);
+}
+
+/* Items are made when all points are there: the array has its place only then. */
+static strl_status list_splats(strl_walk *walk, strl_draw_list *list, strl_error *err)
+{
+    const strl__front *front = &walk->front;
+    strl_status status = STRL_OK;
+    size_t at = 0;
+    for (size_t i = 0, next; i < front->count && !status; i = next) {
+        size_t first = at;
+        for (next = i; next < front->count && front->items[next].placement == front->items[i].placement; next++)
+            at += shown_splats(&front->items[next]).count;
+        status = add_items(walk, front->items[i].placement, walk->splat_ratio * walk->stats.allowed_error_px, first, at - first, list,
+                           err);
+    }
+    for (size_t i = 0; i < front->count && !status; i++) {
+        uint32_t count = missing_splats(&front->items[i]).count;
+        if (count)
+            status = add_items(walk, front->items[i].placement, missing_px(walk, &front->items[i]), at, count, list, err);
+        at += count;
+    }
+    return status;
+}
+
+strl_status strl__draw_splats(strl_walk *walk, strl_draw_list *list, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    walk->point_count = 0;
+    for (size_t i = 0; i < walk->front.count && !status; i++)
+        status = add_points(walk, &walk->front.items[i], shown_splats(&walk->front.items[i]), err);
+    for (size_t i = 0; i < walk->front.count && !status; i++)
+        status = add_points(walk, &walk->front.items[i], missing_splats(&walk->front.items[i]), err);
+    if (status || walk->point_count == 0)
+        return status;
+    if (!fill_numbers(walk))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for splats");
+    status = list_splats(walk, list, err);
+    list->items = walk->items;
+    return status;
+}
