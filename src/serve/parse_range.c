@@ -171,7 +171,10 @@ static bool accepts(const char *accept, const char *type)
         const char *quality = memchr(at, ';', bytes);
         if (bytes >= length && strncasecmp(at, type, length) == 0 && (bytes == length || strchr(" \t;", at[length]))) {
             const char *zero = quality ? strstr(quality, "q=0") : NULL;
-            return !zero || zero >= at + bytes || zero[3 + strspn(zero + 3, ".0")] > '0';
+            if (!zero || zero >= at + bytes)
+                return true;
+            char digit = zero[3 + strspn(zero + 3, ".0")];
+            return digit >= '1' && digit <= '9';
         }
         at += bytes;
     }

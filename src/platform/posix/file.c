@@ -189,6 +189,15 @@ strl_status strl_file_create_nameless(const char *folder, strl_file **file, strl
     return strl__file_create_nameless(folder, folder, file, err);
 }
 
+strl_status strl_file_duplicate(const strl_file *file, strl_file **copy, strl_error *err)
+{
+    *copy = NULL;
+    int descriptor = fcntl(file->descriptor, F_DUPFD_CLOEXEC, 0);
+    if (descriptor < 0)
+        return strl__fail_system(err, errno, "open", file->path);
+    return strl__file_adopt(descriptor, strl_file_bytes(file), file->path, copy, err);
+}
+
 int strl__file_descriptor(const strl_file *file)
 {
     return file->descriptor;
