@@ -30,6 +30,9 @@ typedef bool (*strl_folder_visit)(void *context, const char *name, bool is_folde
 strl_found strl_folder_list(strl_folder *folder, const char *name, strl_folder_visit visit, void *context,
                             strl_error *err);
 
+/* Whether a folder of this name can be opened; name is not "". */
+bool strl_folder_has_folder(strl_folder *folder, const char *name);
+
 /* Test hook, for this folder: as if the kernel could not watch over links. */
 void strl_folder_follow_no_links(strl_folder *folder);
 

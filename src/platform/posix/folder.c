@@ -194,8 +194,16 @@ strl_found strl_folder_open_file(strl_folder *folder, const char *name, strl_fil
     return status == STRL_OK ? STRL_FOUND : STRL_FOUND_FAILED;
 }
 
+bool strl_folder_has_folder(strl_folder *folder, const char *name)
+{
+    int descriptor = open_below(folder, name, O_PATH | O_DIRECTORY);
+    if (descriptor >= 0)
+        close(descriptor);
+    return descriptor >= 0;
+}
+
 /* Whether an entry leads to a folder that can be opened as one. */
-static bool is_folder(const strl_folder *folder, const char *parent, const struct dirent *entry)
+static bool is_folder(strl_folder *folder, const char *parent, const struct dirent *entry)
 {
     if (entry->d_type == DT_DIR)
         return true;
@@ -203,12 +211,7 @@ static bool is_folder(const strl_folder *folder, const char *parent, const struc
         return false;
     char name[NAME_BYTES];
     int length = snprintf(name, sizeof name, "%s%s%s", parent, *parent ? "/" : "", entry->d_name);
-    if (length < 0 || (size_t)length >= sizeof name)
-        return false;
-    int descriptor = open_below(folder, name, O_PATH | O_DIRECTORY);
-    if (descriptor >= 0)
-        close(descriptor);
-    return descriptor >= 0;
+    return length > 0 && (size_t)length < sizeof name && strl_folder_has_folder(folder, name);
 }
 
 strl_found strl_folder_list(strl_folder *folder, const char *name, strl_folder_visit visit, void *context,
