@@ -40,14 +40,9 @@ void strl__answer_sentence(strl__answer *answer, unsigned status, const char *fo
     strl__answer_text(answer, SENTENCE_TYPE, &out);
 }
 
-static bool is_get(const char *method)
-{
-    return strcmp(method, "GET") == 0;
-}
-
 static bool is_known(const char *method)
 {
-    return is_get(method) || strcmp(method, "HEAD") == 0;
+    return strcmp(method, "GET") == 0 || strcmp(method, "HEAD") == 0 || strcmp(method, "OPTIONS") == 0;
 }
 
 bool strl__is_served_name(const char *name)
@@ -160,10 +155,12 @@ void strl__answer(strl__site *site, strl__request *request, strl__answer *answer
     if (request->refusal.status) {
         strl__answer_sentence(answer, request->refusal.status, "%s", request->refusal.sentence);
         answer->close = true;
-    } else if (strcmp(request->method, "OPTIONS") == 0) {
-        answer->status = 204;
     } else if (!is_known(request->method)) {
         strl__answer_sentence(answer, 405, "the methods are GET, HEAD and OPTIONS");
+    } else if (request->has_body) {
+        strl__answer_sentence(answer, 400, "no request here has a body");
+    } else if (strcmp(request->method, "OPTIONS") == 0) {
+        answer->status = 204;
     } else {
         answer_target(site, request, answer);
     }

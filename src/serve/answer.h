@@ -16,13 +16,13 @@ typedef struct strl__request {
     strl__conditions conditions;
     const char *accept;    /* NULL = not there */
     strl__refusal refusal; /* what is wrong with its head */
+    bool has_body;
 } strl__request;
 
 typedef struct strl__answer {
     unsigned status;
     const char *type; /* static; NULL = no body */
     strl__body *body; /* owned; NULL = none */
-    bool is_empty;    /* the body is announced and not sent: 304 */
     bool takes_ranges;
     bool close;       /* the connection, afterwards */
     bool is_page;

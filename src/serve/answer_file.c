@@ -69,7 +69,6 @@ void strl__answer_file(strl__site *site, const strl__request *request, const cha
         if (answer->status == 206)
             snprintf(answer->range, sizeof answer->range, "bytes %" PRIu64 "-%" PRIu64 "/%" PRIu64, first,
                      first + bytes - 1, info.bytes);
-        answer->is_empty = answer->status == 304;
         given = give_part(answer, file, &info, first, bytes);
         if (!given)
             strl__answer_sentence(answer, 503, "there is no memory for the answer");
