@@ -149,7 +149,7 @@ static void answer_target(strl__site *site, strl__request *request, strl__answer
     strl__free(target);
 }
 
-void strl__answer(strl__site *site, strl__request *request, strl__answer *answer)
+void strl__answer_request(strl__site *site, strl__request *request, strl__answer *answer)
 {
     *answer = (strl__answer){0};
     if (request->refusal.status) {

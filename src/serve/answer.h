@@ -41,7 +41,7 @@ typedef struct strl__site {
 } strl__site;
 
 /* Always gives an answer; the caller destroys its body. */
-void strl__answer(strl__site *site, strl__request *request, strl__answer *answer);
+void strl__answer_request(strl__site *site, strl__request *request, strl__answer *answer);
 /* A status with a sentence as its body. */
 void strl__answer_sentence(strl__answer *answer, unsigned status, const char *format, ...)
     __attribute__((format(printf, 3, 4)));

@@ -232,7 +232,7 @@ enum MHD_Result strl__exchange_answer(void *cls, struct MHD_Connection *connecti
     self->request.target = self->target;
     strl__exchange_read_head(self, connection);
     if (!is_over_limits(self, &answer))
-        strl__answer(&self->server->site, &self->request, &answer);
+        strl__answer_request(&self->server->site, &self->request, &answer);
     /* Answered before a body has come, so none is ever taken in; the library ends the connection then. */
     answer.close |= self->request.has_body;
     return strl__exchange_send(self, connection, &answer);

@@ -109,7 +109,8 @@ void strl_peer_text(const strl_peer *peer, char text[STRL_PEER_TEXT])
 void strl_host_text(const char *host, uint16_t port, char *text, unsigned size)
 {
     bool brackets = strchr(host, ':') != NULL;
-    snprintf(text, size, "%s%.255s%s:%u", brackets ? "[" : "", host, brackets ? "]" : "", port);
+    unsigned room = size > 16 ? size - 16 : 0; /* for brackets, colon and port */
+    snprintf(text, size, "%s%.*s%s:%u", brackets ? "[" : "", (int)room, host, brackets ? "]" : "", port);
 }
 
 bool strl_host_is_loopback(const char *host)
