@@ -218,6 +218,16 @@ static bool is_over_limits(strl__exchange *exchange, strl__answer *answer)
     return wait_s > 0;
 }
 
+static void take_head(strl__exchange *exchange, struct MHD_Connection *connection, const char *method)
+{
+    snprintf(exchange->method, sizeof exchange->method, "%s", method);
+    exchange->request.method = exchange->method;
+    exchange->request.target = exchange->target;
+    exchange->head_read = true;
+    strl__connection_progress(exchange->connection);
+    strl__exchange_read_head(exchange, connection);
+}
+
 enum MHD_Result strl__exchange_answer(void *cls, struct MHD_Connection *connection, const char *url, const char *method,
                                       const char *version, const char *data, size_t *data_bytes, void **exchange)
 {
@@ -225,34 +235,45 @@ enum MHD_Result strl__exchange_answer(void *cls, struct MHD_Connection *connecti
     strl__exchange *self = *exchange;
     if (!self || !self->target || !self->shown)
         return MHD_NO; /* without memory the connection ends */
+    if (!self->head_read) {
+        take_head(self, connection, method);
+        /* The library ends a connection whose answer comes before its request is whole. That is what a request with a body
+         * deserves, of which nothing is ever taken in; others are asked for again. */
+        if (!self->request.has_body)
+            return MHD_YES;
+    }
     strl__answer answer;
-    snprintf(self->method, sizeof self->method, "%s", method);
-    strl__connection_progress(self->connection);
-    self->request.method = self->method;
-    self->request.target = self->target;
-    strl__exchange_read_head(self, connection);
     if (!is_over_limits(self, &answer))
         strl__answer_request(&self->server->site, &self->request, &answer);
-    /* Answered before a body has come, so none is ever taken in; the library ends the connection then. */
     answer.close |= self->request.has_body;
     return strl__exchange_send(self, connection, &answer);
+}
+
+/* Of an answer of the library's own; 0 = the connection ended without one. */
+static unsigned status_of(struct MHD_Connection *connection)
+{
+    const union MHD_ConnectionInfo *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_HTTP_STATUS);
+    return info ? info->http_status : 0;
 }
 
 void strl__exchange_end(void *cls, struct MHD_Connection *connection, void **exchange,
                         enum MHD_RequestTerminationCode reason)
 {
-    (void)cls, (void)connection;
+    (void)cls;
     strl__exchange *self = *exchange;
     if (!self)
         return;
     *exchange = NULL;
+    bool answered = self->status != 0;
+    if (!answered)
+        self->status = status_of(connection);
     strl__metrics *metrics = &self->server->site.metrics;
     uint64_t duration_ns = strl_clock_ns() - self->start_ns;
+    if (!answered)
+        atomic_fetch_add(&metrics->rejected[STRL__REJECTED_PROTOCOL], 1);
     if (self->status)
         strl__metrics_count_request(metrics, self->status, duration_ns);
-    else
-        atomic_fetch_add(&metrics->rejected[STRL__REJECTED_PROTOCOL], 1);
-    if (self->status && reason != MHD_REQUEST_TERMINATED_COMPLETED_OK)
+    if (answered && reason != MHD_REQUEST_TERMINATED_COMPLETED_OK)
         atomic_fetch_add(&metrics->aborted, 1);
     strl__connection_progress(self->connection);
     log_exchange(self, duration_ns);
