@@ -29,7 +29,8 @@ class Server:
 
     def __init__(self, folder, *options, host="127.0.0.1", **more):
         self.log_file = tempfile.TemporaryFile()
-        words = [STROLL, "serve", folder, "--port", "0", "--rate", "0", "--host", host, *options]
+        rate = () if "--rate" in options else ("--rate", "0")
+        words = [STROLL, "serve", folder, "--port", "0", "--host", host, *rate, *options]
         self.child = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=self.log_file, **more)
         self.host = host
         line = self.child.stdout.readline().decode()
