@@ -13,7 +13,7 @@ static void refuse(strl__answer *answer, strl_status status, const strl_error *e
         break;
     case STRL_ERR_FORMAT:
     case STRL_ERR_UNSUPPORTED:
-        strl__answer_sentence(answer, 422, "the file is not a container that can be read: %s", err->message);
+        strl__answer_sentence(answer, 422, "the file cannot be asked for nodes: %s", err->message);
         break;
     default:
         /* What has been looked up so far is kept, so asking again goes on from there. */

@@ -217,7 +217,7 @@ static strl_status ready(strl__model *model, strl_error *err)
         return STRL_OK;
     strl_container_close(model->container);
     model->container = NULL;
-    return strl__fail(err, STRL_ERR_LIMIT,
+    return strl__fail(err, STRL_ERR_UNSUPPORTED,
                       "looking nodes up takes %" PRIu64 " bytes of memory, more than the %" PRIu64 " of a container", bytes,
                       STRL__MODEL_BYTES);
 }

@@ -55,8 +55,8 @@ void strl__models_facts(strl__models *models, strl_file *file, const strl_file_i
 /* The tag of a file: a container's is its model id, so that it is the same on every server. */
 void strl__model_etag(const strl__model_facts *facts, const strl_file_info *info, char *etag, size_t size);
 
-/* For one query: locked and opened. STRL_ERR_FORMAT or _UNSUPPORTED: it is no container; STRL_ERR_LIMIT: a container too
- * large to look nodes up in, or one place too few. */
+/* For one query: locked and opened. STRL_ERR_FORMAT or _UNSUPPORTED: it is no container, or one too large to look nodes up
+ * in; STRL_ERR_LIMIT: one place too few. */
 strl_status strl__models_borrow(strl__models *models, const strl_file *file, const strl_file_info *info,
                                 strl__model **model, strl_error *err);
 void strl__models_return(strl__models *models, strl__model *model); /* NULL is legal */

@@ -20,6 +20,14 @@ typedef struct strl__refusal {
     const char *sentence; /* static */
 } strl__refusal;
 
+static inline int strl__hex_digit(char c) /* -1 = none */
+{
+    return c >= '0' && c <= '9'   ? c - '0'
+           : c >= 'a' && c <= 'f' ? c - 'a' + 10
+           : c >= 'A' && c <= 'F' ? c - 'A' + 10
+                                  : -1;
+}
+
 /* ---- the target ---- */
 
 typedef struct strl__target {

@@ -6,11 +6,6 @@
 #define REFUSED(code, text) ((strl__refusal){code, text})
 #define FINE ((strl__refusal){0, NULL})
 
-static int hex_value(char c)
-{
-    return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
-}
-
 /* In place; a form's "+" is a space. False where it is malformed or has a control character. */
 static bool decode(char *text)
 {
@@ -18,7 +13,7 @@ static bool decode(char *text)
     while (*text) {
         int c = (unsigned char)*text++;
         if (c == '%') {
-            int high = hex_value(text[0]), low = high < 0 ? -1 : hex_value(text[1]);
+            int high = strl__hex_digit(text[0]), low = high < 0 ? -1 : strl__hex_digit(text[1]);
             if (low < 0)
                 return false;
             c = high << 4 | low;

@@ -8,11 +8,6 @@
 #define REFUSED(code, text) ((strl__refusal){code, text})
 #define FINE ((strl__refusal){0, NULL})
 
-static int hex_digit(char c)
-{
-    return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
-}
-
 /* The next character, percent-encoded or not; *encoded tells which. -1 = a percent sign without two digits. */
 static int next_character(const char **at, bool *encoded)
 {
@@ -22,7 +17,7 @@ static int next_character(const char **at, bool *encoded)
         *at = text + 1;
         return (unsigned char)text[0];
     }
-    int high = hex_digit(text[1]), low = high < 0 ? -1 : hex_digit(text[2]);
+    int high = strl__hex_digit(text[1]), low = high < 0 ? -1 : strl__hex_digit(text[2]);
     *at = text + 3;
     return low < 0 ? -1 : high << 4 | low;
 }

@@ -129,10 +129,6 @@ static strl_status visit_lowest(choice *self, strl_error *err)
 {
     uint32_t id = self->runs[0].next;
     bool is_new = self->last_node == STRL_NONE || id > self->last_node;
-    if (++self->visited > STRL__VISITED_NODES) {
-        cut_before(self, is_new ? id : self->last_node + 1);
-        return STRL_OK;
-    }
     strl_node node;
     strl_status status = strl_container_node(self->container, self->tree, id, &node, err);
     if (status == STRL_OK && is_new)
@@ -142,6 +138,17 @@ static strl_status visit_lowest(choice *self, strl_error *err)
     if (status == STRL_OK && !self->out->cut)
         advance(self);
     return status;
+}
+
+/* What is too much work is cut like what is too many bytes, but for the first node: that would be no answer. */
+static strl_status visit_bounded(choice *self, strl_error *err)
+{
+    strl_status status = ++self->visited > STRL__VISITED_NODES ? STRL_ERR_LIMIT : visit_lowest(self, err);
+    if (status != STRL_ERR_LIMIT || self->out->node_count == 0)
+        return status;
+    uint32_t id = self->runs[0].next;
+    cut_before(self, id > self->last_node ? id : self->last_node + 1);
+    return STRL_OK;
 }
 
 /* ---- all of it ---- */
@@ -200,7 +207,7 @@ strl_status strl__select(strl_container *container, const strl__query *query, ui
         self.runs[i] = (run){.next = item->node, .end = item->node + 1, .depth = item->depth};
     }
     while (status == STRL_OK && self.count > 0 && !selection->cut)
-        status = visit_lowest(&self, err);
+        status = visit_bounded(&self, err);
     strl__free(self.runs);
     if (status == STRL_OK)
         order_pieces(selection);
