@@ -172,7 +172,7 @@ static void a_query_that_may_read_no_more_goes_on_next_time(void **state)
     drop_served(self);
 }
 
-/* Nodes of many treelets, each of which is read: more than one query may read. */
+/* Nodes of many treelets, more than one query may read; those that were read are at hand for the next one. */
 static void a_query_that_may_read_no_more_is_cut(void **state)
 {
     (void)state;
@@ -190,7 +190,6 @@ static void a_query_that_may_read_no_more_is_cut(void **state)
             query->items[query->count] = (strl__query_item){first + query->count, 0};
         assert_int_equal(strl__select(model->container, query, UINT64_C(1) << 40, &selection, &err), STRL_OK);
         strl__models_return(&self->models, model);
-        strl__models_forget(&self->models, 0); /* no treelet is at hand for the next one */
         assert_true(selection.node_count > 0 && selection.cut == (selection.next_node != STRL_NONE));
         nodes += selection.node_count;
         first = selection.next_node;
