@@ -55,6 +55,7 @@ strl__connection *strl__connections_add(strl__connections *self, void *handle, i
         slot->peer = peer;
         slot->socket = socket;
         slot->paused = slot->ended = false;
+        slot->exchange = NULL;
         atomic_store(&slot->progress_ns, strl_clock_ns());
         slot->handle = handle;
         self->count++;

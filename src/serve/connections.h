@@ -20,6 +20,7 @@ typedef struct strl__connection {
     strl__surplus surplus; /* beyond a limit when it came: its first request is turned away */
     bool paused;           /* for the bandwidth's sake */
     bool ended;
+    void *exchange; /* the request at work, of its thread's; NULL = none */
     _Atomic uint64_t progress_ns;
 } strl__connection;
 

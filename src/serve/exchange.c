@@ -17,20 +17,6 @@ static strl__connection *connection_of(struct MHD_Connection *connection)
     return info ? info->socket_context : NULL;
 }
 
-void *strl__exchange_begin(void *cls, const char *target, struct MHD_Connection *connection)
-{
-    strl__exchange *made = strl__alloc_zero(1, sizeof *made);
-    if (!made)
-        return NULL;
-    made->server = cls;
-    made->connection = connection_of(connection);
-    made->start_ns = strl_clock_ns();
-    made->shown = strl__strdup(target ? target : "");
-    made->target = strl__strdup(target ? target : "");
-    atomic_fetch_add(&made->server->under_way, 1);
-    return made;
-}
-
 /* ---- the log ---- */
 
 static void put_target(strl_writer *out, const char *target)
@@ -47,11 +33,10 @@ static void put_target(strl_writer *out, const char *target)
 
 static void log_exchange(const strl__exchange *exchange, uint64_t duration_ns)
 {
-    char time[STRL__DATE_BYTES], peer[STRL_PEER_TEXT] = "-";
+    char time[STRL__DATE_BYTES], peer[STRL_PEER_TEXT];
     strl_writer out = {0};
     strl__format_time(strl_clock_wall_ns(), time);
-    if (exchange->connection)
-        strl_peer_text(&exchange->connection->peer, peer);
+    strl_peer_text(&exchange->connection->peer, peer);
     strl__put_format(&out, "%s %s ", time, peer);
     strl__put_log(&out, exchange->method);
     strl__put(&out, " ");
@@ -61,6 +46,55 @@ static void log_exchange(const strl__exchange *exchange, uint64_t duration_ns)
     if (!out.failed)
         strl__server_log(exchange->server, (const char *)out.data);
     strl__free(out.data);
+}
+
+/* ---- beginning and end ---- */
+
+static void end(strl__exchange *self, unsigned library_status, bool aborted)
+{
+    strl__metrics *metrics = &self->server->site.metrics;
+    uint64_t duration_ns = strl_clock_ns() - self->start_ns;
+    bool answered = self->status != 0;
+    if (!answered) {
+        self->status = library_status;
+        atomic_fetch_add(&metrics->rejected[STRL__REJECTED_PROTOCOL], 1);
+    }
+    if (self->status)
+        strl__metrics_count_request(metrics, self->status, duration_ns);
+    if (answered && aborted)
+        atomic_fetch_add(&metrics->aborted, 1);
+    self->connection->exchange = NULL;
+    strl__connection_progress(self->connection);
+    log_exchange(self, duration_ns);
+    atomic_fetch_sub(&self->server->under_way, 1);
+    strl__free(self->shown);
+    strl__free(self->target);
+    strl__free(self);
+}
+
+void strl__exchange_drop(strl__connection *connection)
+{
+    if (connection && connection->exchange)
+        end(connection->exchange, 0, true);
+}
+
+void *strl__exchange_begin(void *cls, const char *target, struct MHD_Connection *handle)
+{
+    strl__connection *connection = connection_of(handle);
+    if (!connection)
+        return NULL;
+    strl__exchange_drop(connection);
+    strl__exchange *made = strl__alloc_zero(1, sizeof *made);
+    if (!made)
+        return NULL;
+    made->server = cls;
+    made->connection = connection;
+    connection->exchange = made;
+    made->start_ns = strl_clock_ns();
+    made->shown = strl__strdup(target ? target : "");
+    made->target = strl__strdup(target ? target : "");
+    atomic_fetch_add(&made->server->under_way, 1);
+    return made;
 }
 
 /* ---- the body ---- */
@@ -83,8 +117,6 @@ static void release_carrier(void *cls)
 static ssize_t wait_for_bandwidth(carrier *self)
 {
     strl__exchange *exchange = self->exchange;
-    if (!exchange->connection)
-        return MHD_CONTENT_READER_END_WITH_ERROR;
     MHD_suspend_connection(self->handle);
     if (!strl__connections_pause(&exchange->server->site.connections, exchange->connection))
         MHD_resume_connection(self->handle);
@@ -204,7 +236,7 @@ static void turn_away(strl__exchange *exchange, strl__rejection reason, unsigned
 static bool is_over_limits(strl__exchange *exchange, strl__answer *answer)
 {
     const strl__connection *connection = exchange->connection;
-    if (!connection || connection->surplus == STRL__SURPLUS_CONNECTIONS) {
+    if (connection->surplus == STRL__SURPLUS_CONNECTIONS) {
         turn_away(exchange, STRL__REJECTED_CONNECTIONS, 503, 1, answer);
         return true;
     }
@@ -234,7 +266,7 @@ enum MHD_Result strl__exchange_answer(void *cls, struct MHD_Connection *connecti
     (void)cls, (void)url, (void)version, (void)data, (void)data_bytes;
     strl__exchange *self = *exchange;
     if (!self || !self->target || !self->shown)
-        return MHD_NO; /* without memory the connection ends */
+        return MHD_NO; /* without memory or a place the connection ends */
     if (!self->head_read) {
         take_head(self, connection, method);
         /* The library ends a connection whose answer comes before its request is whole. That is what a request with a body
@@ -261,24 +293,7 @@ void strl__exchange_end(void *cls, struct MHD_Connection *connection, void **exc
 {
     (void)cls;
     strl__exchange *self = *exchange;
-    if (!self)
-        return;
     *exchange = NULL;
-    bool answered = self->status != 0;
-    if (!answered)
-        self->status = status_of(connection);
-    strl__metrics *metrics = &self->server->site.metrics;
-    uint64_t duration_ns = strl_clock_ns() - self->start_ns;
-    if (!answered)
-        atomic_fetch_add(&metrics->rejected[STRL__REJECTED_PROTOCOL], 1);
-    if (self->status)
-        strl__metrics_count_request(metrics, self->status, duration_ns);
-    if (answered && reason != MHD_REQUEST_TERMINATED_COMPLETED_OK)
-        atomic_fetch_add(&metrics->aborted, 1);
-    strl__connection_progress(self->connection);
-    log_exchange(self, duration_ns);
-    atomic_fetch_sub(&self->server->under_way, 1);
-    strl__free(self->shown);
-    strl__free(self->target);
-    strl__free(self);
+    if (self)
+        end(self, status_of(connection), reason != MHD_REQUEST_TERMINATED_COMPLETED_OK);
 }

@@ -6,7 +6,7 @@
 
 typedef struct strl__exchange {
     strl_server *server;           /* borrowed */
-    strl__connection *connection;  /* borrowed; NULL = there was no place for it */
+    strl__connection *connection;  /* borrowed */
     uint64_t start_ns;
     char *shown, *target; /* owned; as it came, and what parsing writes to */
     char method[24];

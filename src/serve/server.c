@@ -60,6 +60,7 @@ static void notice_connection(void *cls, struct MHD_Connection *connection, void
 {
     strl_server *server = cls;
     if (what == MHD_CONNECTION_NOTIFY_CLOSED) {
+        strl__exchange_drop(*context);
         strl__connections_remove(&server->site.connections, *context);
         *context = NULL;
         return;

@@ -27,6 +27,8 @@ SECRET = b"nobody outside may read this"
 class Server:
     """stroll serve DIR on a free port."""
 
+    connected = 0 # connections so far
+
     def __init__(self, folder, *options, host="127.0.0.1", **more):
         self.log_file = tempfile.TemporaryFile()
         rate = () if "--rate" in options else ("--rate", "0")
@@ -69,6 +71,7 @@ class Server:
         self.log_file.close()
 
     def connect(self, source=None):
+        self.connected += 1
         return socket.create_connection((self.host, self.port), PATIENCE_S, source_address=(source, 0) if source else None)
 
     def get(self, target, method="GET", source=None, **headers):
@@ -81,16 +84,14 @@ class Server:
             return read_answer(connection, method)
 
     def metrics(self):
-        lines = self.get("/metrics").body.decode().splitlines()
+        answer = self.get("/metrics")
+        lines = answer.body.decode().splitlines() if answer.status == 200 else []
         return {line.rsplit(" ", 1)[0][len("stroll_serve_"):]: float(line.rsplit(" ", 1)[1])
                 for line in lines if not line.startswith("#")}
 
     def wait_for(self, name, least):
-        """Until a counter is there; the clock only bounds the waiting."""
-        end = time.monotonic() + PATIENCE_S
-        while self.metrics().get(name, 0) < least:
-            assert time.monotonic() < end, (name, least, self.metrics())
-            time.sleep(0.02)
+        """Until a counter is there: a client has its answer before the server has counted it."""
+        until(lambda: self.metrics().get(name, 0) >= least, name, least)
 
 
 class Answer:
@@ -154,6 +155,14 @@ def is_ended(connection):
     """Whether the other side has ended it; waits at most PATIENCE_S."""
     ready, _, _ = select.select([connection], [], [], PATIENCE_S)
     return bool(ready) and receive(connection) == b""
+
+
+def until(claim, *facts):
+    """Waits; the clock only bounds the waiting."""
+    end = time.monotonic() + PATIENCE_S
+    while not claim():
+        assert time.monotonic() < end, facts
+        time.sleep(0.02)
 
 
 def check(condition, *facts):

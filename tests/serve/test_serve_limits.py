@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 
-from serving import PATIENCE_S, Server, check, content, head, is_ended, make_folder, put, read_answer, receive, run_all
+from serving import PATIENCE_S, Server, check, content, head, is_ended, make_folder, put, read_answer, run_all, until
 
 
 def keep(server, source=None):
@@ -19,13 +19,6 @@ def keep(server, source=None):
     connection = server.connect(source)
     connection.sendall(head("GET", "/model.stroll", close=False, Range="bytes=0-5"))
     return connection, read_answer(connection)
-
-
-def until(claim, *facts):
-    end = time.monotonic() + PATIENCE_S
-    while not claim():
-        check(time.monotonic() < end, *facts)
-        time.sleep(0.02)
 
 
 # ---- how many
@@ -178,13 +171,13 @@ def metrics_are_what_happened(folder):
         server.get("/model.stroll", Range="bytes=0-99")
         server.get("/none.stroll")
         server.get("/model.stroll", "HEAD")
-        text = server.get("/metrics").body.decode()
-        metrics = server.metrics()
-        check(metrics['requests_total{code="200"}'] == 5 and metrics['requests_total{code="206"}'] == 1, metrics)
-        check(metrics['requests_total{code="404"}'] == 1, metrics)
+        for status, least in (("200", 4), ("206", 1), ("404", 1)):
+            server.wait_for(f'requests_total{{code="{status}"}}', least)
+        text, metrics = server.get("/metrics").body.decode(), server.metrics()
+        check(metrics['requests_total{code="206"}'] == metrics['requests_total{code="404"}'] == 1, metrics)
         check(metrics["bytes_total"] >= 3 * size + 100, metrics)
-        check(metrics["connections_total"] == 8 and metrics["connections"] >= 1, metrics)
-        check(metrics['request_seconds_bucket{le="+Inf"}'] == metrics["request_seconds_count"] == 7, metrics)
+        check(metrics["connections_total"] == server.connected and metrics["connections"] >= 1, metrics)
+        check(metrics['request_seconds_bucket{le="+Inf"}'] == metrics["request_seconds_count"] >= 6, metrics)
         buckets = [value for name, value in metrics.items() if name.startswith("request_seconds_bucket")]
         check(buckets == sorted(buckets), metrics)
         for line in text.splitlines(): # the format of Prometheus
@@ -208,11 +201,11 @@ def each_request_is_a_line_of_the_log(folder):
     check(lines[0] == "a line before" and len(lines) == 5, lines)
     parts = [LINE.fullmatch(line) for line in lines[1:]]
     check(all(parts), lines)
-    told = [part.groups()[2:6] for part in parts]
-    check(told[0] == ("GET", "/model.stroll", "200", str(size)), told)
-    check(told[1] == ("HEAD", "/model.stroll?nodes=0:0", "200", "0"), told)
-    check(told[2][1:3] == ("/a%0ab%20.stroll", "400"), told)
-    check(told[3][2] == "414" and len(told[3][1]) < 1100, told)
+    told = sorted(part.groups()[2:6] for part in parts) # which thread is the first to write is its own business
+    check(told[0][1:3] == ("/a%0ab%20.stroll", "400"), told)
+    check(told[1] == ("GET", "/model.stroll", "200", str(size)), told)
+    check(told[2][2] == "414" and len(told[2][1]) < 1100, told)
+    check(told[3] == ("HEAD", "/model.stroll?nodes=0:0", "200", "0"), told)
     check(stat.S_ISREG(os.stat(folder + "/log").st_mode))
 
 
