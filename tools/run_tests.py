@@ -32,7 +32,7 @@ LEFT_OUT = {
 }
 # Folders of tests/ whose modules start threads or are called from several; none of them needs a GL driver, whose own
 # threads ThreadSanitizer cannot see into.
-THREADED_AREAS = ("platform", "jobs", "store", "source", "container", "build", "walk", "verify")
+THREADED_AREAS = ("platform", "jobs", "store", "source", "container", "build", "walk", "verify", "serve")
 
 STAGES = {
     "gcc": ("dev", "gcc", "g++", {}),

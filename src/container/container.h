@@ -41,6 +41,12 @@ typedef struct strl_page_ref {
     uint64_t checksum;      /* XXH3 of the stored bytes */
 } strl_page_ref;
 
+/* Where a treelet lies. */
+typedef struct strl_treelet_place {
+    uint64_t offset;
+    uint32_t bytes;
+} strl_treelet_place;
+
 /* A node's record. Ids are breadth first from the root (0); the children of a node have consecutive ids. */
 typedef struct strl_node {
     uint32_t parent;      /* STRL_NONE for the root */
@@ -92,6 +98,11 @@ strl_source *strl_container_source(strl_container *container);                  
 /* Blocking calls, for tools. A few treelets are cached. */
 strl_status strl_container_node(strl_container *container, uint32_t tree, uint32_t node, strl_node *record,
                                 strl_error *err);
+/* Where the treelet lies that holds the node's record. After strl_container_node of the same node it is known. */
+strl_status strl_container_treelet_of(strl_container *container, uint32_t tree, uint32_t node, strl_treelet_place *place,
+                                      strl_error *err);
+/* Bytes of memory that looking nodes up in all trees can take at most. */
+uint64_t strl_container_lookup_bytes(const strl_container *container);
 /* Reads and decodes a node's mesh into arena; the page's checksum is checked. Meshes that it is decoded by are decoded too,
  * and kept along one way from the root: to go through nodes in the order of their ids costs about twice their own decoding. */
 strl_status strl_container_mesh(strl_container *container, uint32_t tree, const strl_node *record, strl_arena *arena,

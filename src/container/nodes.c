@@ -116,16 +116,43 @@ static strl_status get_treelet(strl_container *container, uint32_t tree, uint32_
     return get_known(container, tree, index, treelet, err);
 }
 
+static strl_status get_treelet_of(strl_container *container, uint32_t tree, uint32_t node, strl_treelet **treelet,
+                                  strl_error *err)
+{
+    const strl_tree *facts = strl_container_tree(container, tree);
+    if (!facts || node >= facts->node_count)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "there is no node %" PRIu32 " in tree %" PRIu32, node, tree);
+    return get_treelet(container, tree, node / STRL_TREELET_NODES, treelet, err);
+}
+
 strl_status strl_container_node(strl_container *container, uint32_t tree, uint32_t node, strl_node *record,
                                 strl_error *err)
 {
     *record = (strl_node){0};
-    const strl_tree *facts = strl_container_tree(container, tree);
-    if (!facts || node >= facts->node_count)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "there is no node %" PRIu32 " in tree %" PRIu32, node, tree);
     strl_treelet *treelet = NULL;
-    strl_status status = get_treelet(container, tree, node / STRL_TREELET_NODES, &treelet, err);
+    strl_status status = get_treelet_of(container, tree, node, &treelet, err);
     if (status == STRL_OK)
         *record = treelet->nodes[node % STRL_TREELET_NODES];
     return strl_source_fail(container->source, status, err);
+}
+
+strl_status strl_container_treelet_of(strl_container *container, uint32_t tree, uint32_t node, strl_treelet_place *place,
+                                      strl_error *err)
+{
+    *place = (strl_treelet_place){0};
+    strl_treelet *treelet = NULL;
+    strl_status status = get_treelet_of(container, tree, node, &treelet, err);
+    if (status == STRL_OK) {
+        const strl_treelet_ref *ref = &container->trees[tree].refs[node / STRL_TREELET_NODES];
+        *place = (strl_treelet_place){ref->offset, ref->bytes};
+    }
+    return strl_source_fail(container->source, status, err);
+}
+
+uint64_t strl_container_lookup_bytes(const strl_container *container)
+{
+    uint64_t bytes = sizeof *container + STRL__CACHED_TREELETS * sizeof(strl_treelet);
+    for (uint32_t i = 0; i < container->header.info.tree_count; i++)
+        bytes += sizeof *container->trees + treelet_count(&container->trees[i]) * (uint64_t)sizeof(strl_treelet_ref);
+    return bytes;
 }

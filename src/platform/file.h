@@ -25,6 +25,8 @@ strl_status strl_file_create(const char *path, strl_file **file, strl_error *err
 strl_status strl_file_reopen(const char *path, uint64_t bytes, strl_file **file, strl_error *err);
 /* Read and write; without a name in `folder`, so that nothing of it is left when it is closed or the process ends. */
 strl_status strl_file_create_nameless(const char *folder, strl_file **file, strl_error *err);
+/* Another object onto the same open file, whatever has become of its name. */
+strl_status strl_file_duplicate(const strl_file *file, strl_file **copy, strl_error *err);
 strl_status strl_file_close(strl_file *file, strl_error *err); /* NULL is legal; reports a late write error */
 
 const char *strl_file_path(const strl_file *file); /* borrowed */

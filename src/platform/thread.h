@@ -27,6 +27,7 @@ void strl_condition_signal(strl_condition *condition);
 void strl_condition_broadcast(strl_condition *condition);
 
 uint64_t strl_clock_ns(void);     /* monotonic */
+uint64_t strl_clock_wall_ns(void); /* since 1970, as the system's clock is set */
 uint64_t strl_clock_cpu_ns(void); /* processor time of this process, all threads */
 void strl_sleep_ns(uint64_t ns);
 unsigned strl_cpu_count(void);              /* processors this process may use, at least 1 */
@@ -36,6 +37,8 @@ uint64_t strl_thread_disk_waits(void);
 uint64_t strl_process_rss_bytes(void);      /* the operating system's resident set now; 0 where it does not tell */
 uint64_t strl_process_peak_rss_bytes(void); /* the operating system's peak resident set, children included */
 void strl_process_forget_peak(void);        /* counts the peak anew from here on, where the system can */
+/* Makes room for `wanted` open files as far as the system lets this process; how many it may have then. */
+uint64_t strl_process_allow_files(uint64_t wanted);
 void strl_cpu_model(char *model, size_t size); /* as the system names it; "unknown" where it does not */
 
 #endif

@@ -25,6 +25,8 @@ strl_status strl__file_create_nameless(const char *folder, const char *shown, st
 /* strl_lock_acquire; *held: it failed because another process has the lock. */
 strl_status strl__lock_acquire(const char *path, strl_lock **lock, bool *held, strl_error *err);
 int strl__file_descriptor(const strl_file *file); /* borrowed */
+/* A file object of a descriptor of a regular file of so many bytes. Takes the descriptor over: closed on failure. */
+strl_status strl__file_adopt(int descriptor, uint64_t bytes, const char *path, strl_file **file, strl_error *err);
 
 void strl__file_info_fill(strl_file_info *info, const struct stat *facts);
 

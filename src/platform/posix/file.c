@@ -56,8 +56,7 @@ static int open_retrying(const char *path, int flags)
     return descriptor;
 }
 
-/* Takes the descriptor over: closed on failure. */
-static strl_status wrap(int descriptor, uint64_t bytes, const char *path, strl_file **file, strl_error *err)
+strl_status strl__file_adopt(int descriptor, uint64_t bytes, const char *path, strl_file **file, strl_error *err)
 {
     strl_file *made = strl__alloc_zero(1, sizeof *made);
     char *copy = strl__strdup(path);
@@ -100,7 +99,7 @@ strl_status strl_file_open(const char *path, strl_file **file, strl_error *err)
     int descriptor;
     struct stat facts;
     strl_status status = open_regular(path, O_RDONLY, &descriptor, &facts, err);
-    return status != STRL_OK ? status : wrap(descriptor, (uint64_t)facts.st_size, path, file, err);
+    return status != STRL_OK ? status : strl__file_adopt(descriptor, (uint64_t)facts.st_size, path, file, err);
 }
 
 strl_status strl_file_reopen(const char *path, uint64_t bytes, strl_file **file, strl_error *err)
@@ -120,7 +119,7 @@ strl_status strl_file_reopen(const char *path, uint64_t bytes, strl_file **file,
         close(descriptor);
         return status;
     }
-    return wrap(descriptor, bytes, path, file, err);
+    return strl__file_adopt(descriptor, bytes, path, file, err);
 }
 
 strl_status strl_file_create(const char *path, strl_file **file, strl_error *err)
@@ -129,7 +128,7 @@ strl_status strl_file_create(const char *path, strl_file **file, strl_error *err
     int descriptor = open_retrying(path, O_RDWR | O_CREAT | O_TRUNC | O_NOCTTY);
     if (descriptor < 0)
         return strl__fail_system(err, errno, "create", path);
-    return wrap(descriptor, 0, path, file, err);
+    return strl__file_adopt(descriptor, 0, path, file, err);
 }
 
 #define RANDOM_CHARACTERS 8u
@@ -161,7 +160,7 @@ strl_status strl__file_create_unique(char *path, size_t random_at, const char *s
     }
     if (descriptor < 0)
         return strl__fail_system(err, errno, "create", shown);
-    strl_status status = wrap(descriptor, 0, shown, file, err);
+    strl_status status = strl__file_adopt(descriptor, 0, shown, file, err);
     if (status != STRL_OK)
         unlink(path);
     return status;
@@ -188,6 +187,15 @@ strl_status strl__file_create_nameless(const char *folder, const char *shown, st
 strl_status strl_file_create_nameless(const char *folder, strl_file **file, strl_error *err)
 {
     return strl__file_create_nameless(folder, folder, file, err);
+}
+
+strl_status strl_file_duplicate(const strl_file *file, strl_file **copy, strl_error *err)
+{
+    *copy = NULL;
+    int descriptor = fcntl(file->descriptor, F_DUPFD_CLOEXEC, 0);
+    if (descriptor < 0)
+        return strl__fail_system(err, errno, "open", file->path);
+    return strl__file_adopt(descriptor, strl_file_bytes(file), file->path, copy, err);
 }
 
 int strl__file_descriptor(const strl_file *file)

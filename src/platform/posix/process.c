@@ -25,6 +25,11 @@ uint64_t strl_clock_ns(void)
     return clock_now_ns(CLOCK_MONOTONIC);
 }
 
+uint64_t strl_clock_wall_ns(void)
+{
+    return clock_now_ns(CLOCK_REALTIME);
+}
+
 uint64_t strl_clock_cpu_ns(void)
 {
     return clock_now_ns(CLOCK_PROCESS_CPUTIME_ID);
@@ -99,6 +104,21 @@ void strl_process_forget_peak(void)
     ssize_t written = write(descriptor, "5\n", 2);
     (void)written; /* a system that cannot forget keeps the old peak */
     close(descriptor);
+}
+
+uint64_t strl_process_allow_files(uint64_t wanted)
+{
+    struct rlimit limit;
+    if (getrlimit(RLIMIT_NOFILE, &limit) != 0)
+        return 0;
+    if (limit.rlim_cur != RLIM_INFINITY && limit.rlim_cur < wanted) {
+        const struct rlimit raised = {
+            .rlim_cur = limit.rlim_max == RLIM_INFINITY || wanted < limit.rlim_max ? (rlim_t)wanted : limit.rlim_max,
+            .rlim_max = limit.rlim_max};
+        if (setrlimit(RLIMIT_NOFILE, &raised) == 0)
+            limit = raised;
+    }
+    return limit.rlim_cur == RLIM_INFINITY ? UINT64_MAX : (uint64_t)limit.rlim_cur;
 }
 
 void strl_cpu_model(char *model, size_t size)

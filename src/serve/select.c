@@ -1,0 +1,240 @@
+/* Nodes to pieces of the file. Ids are breadth first, so what a subtree has at one depth is one run of ids, and its children
+ * are the run of the next depth. A query is a heap of such runs by their next id: taking the lowest always gives all nodes
+ * asked for in the order of their ids, each once, however the subtrees overlap, in memory that depends on the query alone. */
+#include "serve/select.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "base/cursor.h"
+#include "base/fail.h"
+#include "base/memory.h"
+
+/* Of one subtree, what is left of one depth, and what is known of the next. */
+typedef struct run {
+    uint32_t next, end;
+    uint32_t depth; /* how many more levels are wanted below */
+    uint32_t child_first, child_end; /* equal: no child so far */
+} run;
+
+typedef struct choice {
+    strl_container *container;
+    uint32_t tree;
+    uint64_t most_bytes;
+    strl__selection *out;
+    run *runs; /* [count], a heap: the lowest next first */
+    uint32_t count;
+    uint32_t visited;
+    uint64_t last_treelet, last_page; /* offsets of the pieces that were added last; 0 = none, for there is the header */
+    uint32_t last_node;               /* answered last; STRL_NONE = none */
+} choice;
+
+/* ---- the heap ---- */
+
+static void sift_down(choice *self, uint32_t at)
+{
+    for (;;) {
+        uint32_t least = at;
+        for (uint32_t child = 2 * at + 1; child <= 2 * at + 2 && child < self->count; child++)
+            if (self->runs[child].next < self->runs[least].next)
+                least = child;
+        if (least == at)
+            return;
+        run moved = self->runs[at];
+        self->runs[at] = self->runs[least];
+        self->runs[least] = moved;
+        at = least;
+    }
+}
+
+/* The first run has given its node: on to the next one, or to the next depth. */
+static void advance(choice *self)
+{
+    run *first = &self->runs[0];
+    if (++first->next == first->end) {
+        if (first->child_first < first->child_end)
+            *first = (run){.next = first->child_first, .end = first->child_end, .depth = first->depth - 1};
+        else
+            *first = self->runs[--self->count];
+    }
+    sift_down(self, 0);
+}
+
+static strl_status note_children(const choice *self, const strl_node *node, strl_error *err)
+{
+    run *first = &self->runs[0];
+    if (first->depth == 0 || node->child_count == 0)
+        return STRL_OK;
+    bool is_first = first->child_first == first->child_end;
+    if (node->first_child < first->end || (!is_first && node->first_child != first->child_end))
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "the children of node %" PRIu32 " are not in breadth-first order, they begin at %" PRIu32,
+                          first->next, node->first_child);
+    if (is_first)
+        first->child_first = node->first_child;
+    first->child_end = node->first_child + node->child_count; /* the record's check keeps it within the tree */
+    return STRL_OK;
+}
+
+/* ---- pieces ---- */
+
+static uint64_t cost_of(uint64_t last, uint64_t offset, uint32_t bytes)
+{
+    return offset == last ? 0 : (uint64_t)STRL__FRAME_BYTES + bytes;
+}
+
+static strl_status add_piece(choice *self, uint64_t *last, uint64_t offset, uint32_t bytes, strl_error *err)
+{
+    strl__selection *out = self->out;
+    if (offset == *last)
+        return STRL_OK;
+    if (!strl__grow(&out->pieces, &out->capacity, out->count + 1, sizeof *out->pieces))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for the pieces of an answer");
+    out->pieces[out->count++] = (strl__piece){offset, bytes};
+    out->bytes += (uint64_t)STRL__FRAME_BYTES + bytes;
+    *last = offset;
+    return STRL_OK;
+}
+
+static void cut_before(choice *self, uint32_t node)
+{
+    self->out->cut = true;
+    self->out->next_node = node;
+}
+
+static strl_status answer_node(choice *self, uint32_t id, const strl_node *node, strl_error *err)
+{
+    strl__selection *out = self->out;
+    strl_treelet_place place;
+    strl_status status = strl_container_treelet_of(self->container, self->tree, id, &place, err);
+    if (status != STRL_OK)
+        return status;
+    uint64_t cost = cost_of(self->last_treelet, place.offset, place.bytes) +
+                    cost_of(self->last_page, node->page.offset, node->page.bytes);
+    if (out->node_count > 0 && (out->node_count == STRL__SELECTED_NODES ||
+                                STRL__ANSWER_HEAD_BYTES + out->bytes + cost > self->most_bytes)) {
+        cut_before(self, id);
+        return STRL_OK;
+    }
+    status = add_piece(self, &self->last_treelet, place.offset, place.bytes, err);
+    if (status == STRL_OK)
+        status = add_piece(self, &self->last_page, node->page.offset, node->page.bytes, err);
+    self->last_node = id;
+    out->node_count++;
+    return status;
+}
+
+static strl_status visit_lowest(choice *self, strl_error *err)
+{
+    uint32_t id = self->runs[0].next;
+    bool is_new = self->last_node == STRL_NONE || id > self->last_node;
+    strl_node node;
+    strl_status status = strl_container_node(self->container, self->tree, id, &node, err);
+    if (status == STRL_OK && is_new)
+        status = answer_node(self, id, &node, err);
+    if (status == STRL_OK && !self->out->cut)
+        status = note_children(self, &node, err);
+    if (status == STRL_OK && !self->out->cut)
+        advance(self);
+    return status;
+}
+
+/* What is too much work is cut like what is too many bytes, but for the first node: that would be no answer. */
+static strl_status visit_bounded(choice *self, strl_error *err)
+{
+    strl_status status = ++self->visited > STRL__VISITED_NODES ? STRL_ERR_LIMIT : visit_lowest(self, err);
+    if (status != STRL_ERR_LIMIT || self->out->node_count == 0)
+        return status;
+    uint32_t id = self->runs[0].next;
+    cut_before(self, id > self->last_node ? id : self->last_node + 1);
+    return STRL_OK;
+}
+
+/* ---- all of it ---- */
+
+static int compare_pieces(const void *left, const void *right)
+{
+    const strl__piece *a = left, *b = right;
+    if (a->offset != b->offset)
+        return a->offset < b->offset ? -1 : 1;
+    return a->bytes < b->bytes ? -1 : a->bytes > b->bytes;
+}
+
+/* Only a container that lies names a piece twice, but what is told in the head must hold all the same. */
+static void order_pieces(strl__selection *out)
+{
+    size_t kept = 0;
+    if (out->count > 0)
+        qsort(out->pieces, out->count, sizeof *out->pieces, compare_pieces);
+    for (size_t i = 0; i < out->count; i++) {
+        if (i > 0 && compare_pieces(&out->pieces[i], &out->pieces[kept - 1]) == 0) {
+            out->bytes -= STRL__FRAME_BYTES + out->pieces[i].bytes;
+            continue;
+        }
+        out->pieces[kept++] = out->pieces[i];
+    }
+    out->count = kept;
+}
+
+static strl_status check_query(const strl_container *container, const strl__query *query, strl_error *err)
+{
+    const strl_tree *tree = strl_container_tree(container, query->tree);
+    if (!tree)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "there is no tree %" PRIu32 ", expected less than %" PRIu32, query->tree,
+                          strl_container_get_info(container)->tree_count);
+    uint32_t last = query->items[query->count - 1].node; /* they increase */
+    if (last >= tree->node_count)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "there is no node %" PRIu32 " in tree %" PRIu32 ", expected less than %" PRIu32,
+                          last, query->tree, tree->node_count);
+    return STRL_OK;
+}
+
+strl_status strl__select(strl_container *container, const strl__query *query, uint64_t most_bytes,
+                         strl__selection *selection, strl_error *err)
+{
+    *selection = (strl__selection){.next_node = STRL_NONE};
+    strl_status status = check_query(container, query, err);
+    if (status != STRL_OK)
+        return status;
+    choice self = {.container = container, .tree = query->tree, .most_bytes = most_bytes, .out = selection,
+                   .count = query->count, .last_node = STRL_NONE};
+    self.runs = strl__alloc(query->count, sizeof *self.runs);
+    if (!self.runs)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %" PRIu32 " subtrees", query->count);
+    for (uint32_t i = 0; i < query->count; i++) { /* in increasing order, so a heap already */
+        const strl__query_item *item = &query->items[i];
+        self.runs[i] = (run){.next = item->node, .end = item->node + 1, .depth = item->depth};
+    }
+    while (status == STRL_OK && self.count > 0 && !selection->cut)
+        status = visit_bounded(&self, err);
+    strl__free(self.runs);
+    if (status == STRL_OK)
+        order_pieces(selection);
+    else
+        strl__selection_deinit(selection);
+    return status;
+}
+
+void strl__selection_deinit(strl__selection *selection)
+{
+    strl__free(selection->pieces);
+    *selection = (strl__selection){.next_node = STRL_NONE};
+}
+
+void strl__selection_head(const strl__selection *selection, const strl_container_info *info, uint32_t tree,
+                          uint8_t head[STRL__ANSWER_HEAD_BYTES])
+{
+    static const uint8_t magic[8] = {'S', 'T', 'R', 'O', 'L', 'L', 'Q', '\n'};
+    memset(head, 0, STRL__ANSWER_HEAD_BYTES);
+    memcpy(head, magic, sizeof magic);
+    strl__store_le(head + 8, 4, 1);
+    strl__store_le(head + 12, 4, STRL__ANSWER_HEAD_BYTES);
+    memcpy(head + 16, info->model_id, 16);
+    strl__store_le(head + 32, 4, tree);
+    strl__store_le(head + 36, 4, selection->cut);
+    strl__store_le(head + 40, 4, selection->node_count);
+    strl__store_le(head + 44, 4, selection->next_node);
+    strl__store_le(head + 48, 4, selection->count);
+    strl__store_le(head + 56, 8, STRL__ANSWER_HEAD_BYTES + selection->bytes);
+}

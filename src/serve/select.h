@@ -1,0 +1,30 @@
+/* Which pieces of a container a query's nodes need: docs/serve.md, "Queries". Internal. */
+#ifndef STRL_SERVE_SELECT_H
+#define STRL_SERVE_SELECT_H
+
+#include "serve/body.h"
+#include "serve/parse.h"
+#include "container/container.h"
+
+#define STRL__SELECTED_NODES 65536u  /* of one answer */
+#define STRL__VISITED_NODES 262144u /* subtrees that overlap are gone through each */
+#define STRL__ANSWER_HEAD_BYTES 64u
+
+typedef struct strl__selection {
+    strl__piece *pieces; /* owned (strl__free); by offset, each once */
+    size_t count, capacity;
+    uint64_t bytes;      /* of the pieces and their frames */
+    uint32_t node_count; /* nodes that are answered */
+    bool cut;
+    uint32_t next_node; /* where cut: what was asked for and is lower is answered, and nothing else; else STRL_NONE */
+} strl__selection;
+
+/* most_bytes: of the answer; the first node is always answered. STRL_ERR_ARGUMENT: the query asks for what there is not. */
+strl_status strl__select(strl_container *container, const strl__query *query, uint64_t most_bytes,
+                         strl__selection *selection, strl_error *err);
+void strl__selection_deinit(strl__selection *selection);
+/* The head of the answer. */
+void strl__selection_head(const strl__selection *selection, const strl_container_info *info, uint32_t tree,
+                          uint8_t head[STRL__ANSWER_HEAD_BYTES]);
+
+#endif
