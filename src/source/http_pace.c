@@ -59,7 +59,7 @@ void strl__pace_add_latency(strl__pace *pace, uint64_t latency_ns)
 
 void strl__pace_add_lookup(strl__pace *pace, bool hit)
 {
-    pace->miss_share += LOOKUP_SMOOTHING * ((hit ? 0 : 1) - pace->miss_share);
+    pace->hit_share += LOOKUP_SMOOTHING * ((hit ? 1 : 0) - pace->hit_share);
 }
 
 static double clamp(double value, double least, double most)
@@ -84,7 +84,7 @@ uint64_t strl__pace_room(const strl__pace *pace, uint64_t waiting)
     double all = pace->bytes_per_s == 0 ? 2 * UNKNOWN_WINDOW : clamp(bytes_of(pace, ROOM_S), LEAST_ROOM, MOST_WINDOW);
     if ((double)waiting >= all)
         return 0;
-    return (uint64_t)((all - (double)waiting) / clamp(pace->miss_share, LEAST_MISS_SHARE, 1));
+    return (uint64_t)((all - (double)waiting) / clamp(1 - pace->hit_share, LEAST_MISS_SHARE, 1));
 }
 
 uint64_t strl__pace_gap(const strl__pace *pace, unsigned connections)

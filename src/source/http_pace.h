@@ -14,7 +14,7 @@ typedef struct strl__pace {
     unsigned receiving; /* transfers whose bytes are coming: only then does the clock of a sample run */
     uint64_t since_ns;  /* when it was last read */
     uint64_t sample_ns, sample_bytes;
-    double miss_share; /* of late look-ups in the cache: 1 where there is none */
+    double hit_share; /* of late look-ups in the cache */
 } strl__pace;
 
 /* A transfer's first bytes have come; its last ones, or it was given up. */
