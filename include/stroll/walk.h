@@ -37,7 +37,8 @@ typedef struct strl_walk_desc {
     uint64_t memory_bytes;     /* hard bound of decoded nodes and node records held; 0 = 512 MiB. Pages that wait for decoding
                                   come on top: requests_in_flight of them at most */
     double error_px;           /* allowed pixel error; 0 = 1 */
-    uint32_t requests_in_flight; /* 0 = 16; at most 256 */
+    uint32_t requests_in_flight; /* 0 = 16, of a remote source 64; at most 256. Of a remote source fewer, as bandwidth and
+                                    latency want it */
     const strl_executor *executor; /* copied */
     bool labels; /* keep part, material and texture coordinate of each vertex: 12 bytes a vertex more, within memory_bytes */
 } strl_walk_desc;
@@ -60,6 +61,8 @@ typedef struct strl_walk_stats {
     double allowed_error_px;   /* error_px, or more where the budget is tight */
     float max_error_px;        /* largest claimed among visible items; infinite where the eye is inside a node's box */
     uint64_t select_ns;        /* time in strl_walk_frame */
+    bool remote;               /* the source is: then what it has done since it was opened is in `network` */
+    strl_network_stats network;
     uint64_t faults;           /* reads or pages that failed since the walk began */
     char last_fault[256];      /* the newest one's sentence; empty = none */
 } strl_walk_stats;

@@ -21,19 +21,22 @@
 
 /* ---- blocking reads */
 
-/* Mutex held. From what is in memory already. *from_ahead: the cache has not seen it yet. */
-static bool copy_known(const strl__http *http, uint64_t offset, uint8_t *data, size_t size, bool *from_ahead)
+/* Mutex held. Where the range is in memory already; NULL = nowhere. */
+static const uint8_t *find_known(const strl__http *http, uint64_t offset, size_t size)
 {
-    *from_ahead = false;
-    if (offset + size <= http->head_bytes) {
-        memcpy(data, http->head + offset, size);
-        return true;
-    }
-    if (!http->ahead || offset < http->ahead_begin || offset + size > http->ahead_end)
-        return false;
-    memcpy(data, http->ahead + (offset - http->ahead_begin), size);
-    *from_ahead = true;
-    return true;
+    if (offset + size <= http->head_bytes)
+        return http->head + offset;
+    if (http->ahead && offset >= http->ahead_begin && offset + size <= http->ahead_end)
+        return http->ahead + (offset - http->ahead_begin);
+    return NULL;
+}
+
+/* Mutex held. What came along with another read is new to the cache. */
+static void copy_known(strl__http *http, const uint8_t *known, uint64_t offset, void *data, size_t size)
+{
+    memcpy(data, known, size);
+    if (offset + size > http->head_bytes)
+        strl__http_keep(http, offset, known, size);
 }
 
 /* Mutex held. What to fetch for a blocking read: more than it asks for, because the next one asks for what is near. */
@@ -113,16 +116,13 @@ static strl_status http_read(strl_source *source, uint64_t offset, void *data, s
     strl__http_read like = {
         .offset = offset, .size = size, .begin = offset, .end = offset + size, .urgency = INFINITY, .waited = true};
     strl_status status = STRL_OK;
-    bool from_ahead;
     strl_mutex_lock(&http->mutex);
+    const uint8_t *known = find_known(http, offset, size);
     if (http->changed.status != STRL_OK) {
         status = fail_changed(http, err);
-    } else if (size == 0) {
-        status = STRL_OK;
-    } else if (copy_known(http, offset, data, size, &from_ahead)) {
-        if (from_ahead)
-            strl__http_keep(http, offset, data, size);
-    } else {
+    } else if (known) {
+        copy_known(http, known, offset, data, size);
+    } else if (size > 0) {
         look_ahead(http, &like);
         status = wait_for(http, &like, data, err);
     }
@@ -132,27 +132,23 @@ static strl_status http_read(strl_source *source, uint64_t offset, void *data, s
 
 /* ---- reads that are polled for */
 
-/* Mutex held. Answers at once what needs no request. */
-static void answer_known(strl__http *http, strl__http_read *read)
+/* Mutex held. Whether the read could be answered without a request. */
+static bool answer_known(strl__http *http, strl__http_read *read)
 {
-    bool from_ahead = false;
-    if (http->changed.status != STRL_OK) {
-        strl__http_read_fail(http, read, &http->changed);
-        return;
-    }
-    uint8_t *data = strl__alloc(read->size, 1);
-    if (data && (read->size == 0 || copy_known(http, read->offset, data, read->size, &from_ahead))) {
-        if (from_ahead)
-            strl__http_keep(http, read->offset, data, read->size);
-        read->result.data = data;
-        strl__http_read_finish(http, read);
-    } else if (read->size == 0) {
-        strl_error error;
-        strl__fail(&error, STRL_ERR_MEMORY, "no memory for a read");
+    const uint8_t *known = find_known(http, read->offset, read->size);
+    strl_error error = http->changed;
+    if (error.status == STRL_OK && !known && read->size > 0)
+        return false;
+    if (error.status == STRL_OK && !(read->result.data = strl__alloc(read->size, 1)))
+        strl__fail(&error, STRL_ERR_MEMORY, "no memory for a read of %zu bytes", read->size);
+    if (error.status != STRL_OK) {
         strl__http_read_fail(http, read, &error);
-    } else {
-        read->result.data = data; /* for the transfer */
+        return true;
     }
+    if (known)
+        copy_known(http, known, read->offset, read->result.data, read->size);
+    strl__http_read_finish(http, read);
+    return true;
 }
 
 static strl_status http_submit(strl_source *source, uint64_t token, uint64_t offset, size_t size, float urgency,
@@ -168,10 +164,8 @@ static strl_status http_submit(strl_source *source, uint64_t token, uint64_t off
     strl__http_read *read;
     strl_mutex_lock(&http->mutex);
     strl_status status = strl__http_read_add(http, &like, &read, err);
-    if (status == STRL_OK) {
-        answer_known(http, read);
+    if (status == STRL_OK && !answer_known(http, read))
         wake(http, read);
-    }
     strl_mutex_unlock(&http->mutex);
     return status;
 }
@@ -327,7 +321,6 @@ static void init_curl(void)
 
 static strl_status make_handles(strl__http *http, strl_error *err)
 {
-    strl_once_run(&curl_once, init_curl);
     http->multi = curl_ready == CURLE_OK ? curl_multi_init() : NULL;
     bool good = http->multi != NULL;
     for (uint32_t i = 0; good && i < http->desc.connections; i++) {
@@ -377,6 +370,7 @@ strl_status strl_source_open_http(const char *url, const strl_http_desc *desc, s
     strl_condition_init(&http->disk_work);
     http->kept_end = &http->kept;
     http->ahead_begin = http->ahead_end = UINT64_MAX / 2; /* near to nothing */
+    strl_once_run(&curl_once, init_curl);
     strl_status status = strl__http_url(url, &http->url, &http->shown, &http->secure, err);
     if (status == STRL_OK) {
         apply_desc(http, desc);

@@ -50,8 +50,13 @@ static void watched_close(strl_source *source)
 
 watched_source *watched_source_open(strl_source *inner)
 {
-    static const strl_source_class klass = {"watched",      watched_submit, watched_poll,
-                                            watched_cancel, watched_read,   watched_close};
+    static const strl_source_class klass = {.kind = "watched",
+                                            .submit = watched_submit,
+                                            .poll = watched_poll,
+                                            .cancel = watched_cancel,
+                                            .read = watched_read,
+                                            .close = watched_close,
+                                            .room = watched_room};
     watched_source *self = strl__alloc_zero(1, sizeof *self);
     assert_non_null(self);
     self->base = (strl_source){.klass = &klass, .bytes = inner->bytes};
