@@ -43,8 +43,10 @@ static void copy_known(strl__http *http, const uint8_t *known, uint64_t offset, 
 static void look_ahead(strl__http *http, strl__http_read *read)
 {
     uint64_t total = http->base.bytes;
-    bool forward = read->begin >= http->ahead_end && read->begin - http->ahead_end <= AHEAD_GAP;
-    bool backward = read->end <= http->ahead_begin && http->ahead_begin - read->end <= AHEAD_GAP;
+    bool forward = read->begin >= http->ahead_begin && read->begin <= http->ahead_end + AHEAD_GAP &&
+                   read->end > http->ahead_end;
+    bool backward = read->end <= http->ahead_end && read->end + AHEAD_GAP >= http->ahead_begin &&
+                    read->begin < http->ahead_begin;
     if (!forward && !backward)
         http->ahead_window = AHEAD_BYTES;
     else if (http->ahead_window < MOST_AHEAD_BYTES)

@@ -18,7 +18,7 @@
 
 #include "platform/thread.h"
 
-/* Plain malloc here: the tests' hook for failing allocations is for the client. */
+/* Plain malloc and plain threads here: the tests' hook for failing allocations is for the client. */
 
 #define MOST_CONNECTIONS 256u
 #define REQUEST_BYTES 8192u
@@ -26,8 +26,9 @@
 
 typedef struct connection {
     fault_server *server;
-    strl_thread *thread;
+    pthread_t thread;
     int socket;
+    bool ended; /* under the server's mutex: its thread is done but for returning */
 } connection;
 
 struct fault_server {
@@ -35,7 +36,8 @@ struct fault_server {
     void *context;
     uint16_t port;
     int listener;
-    strl_thread *acceptor;
+    pthread_t acceptor;
+    bool listens;
     strl_mutex mutex; /* guards the rest */
     fault_content content;
     bool ending;
@@ -187,15 +189,16 @@ static bool send_range(fault_server *server, int socket, const fault_content *co
     if (rule->longer) /* the header is what was asked for, the body goes on */
         last = last < content->size ? last : content->size - 1;
     uint64_t said = last - (uint64_t)(int64_t)rule->longer;
-    if (!send_text(socket, "HTTP/1.1 206 Partial Content\r\n") || !send_fields(socket, content, rule))
-        return false;
-    if (rule->endless_header)
+    bool sent = send_text(socket, "HTTP/1.1 206 Partial Content\r\n") && send_fields(socket, content, rule);
+    if (sent && rule->endless_header)
         return send_endless(server, socket);
-    if (!rule->no_range_field &&
-        !send_text(socket, "Content-Range: bytes %" PRIu64 "-%" PRIu64 "/%zu\r\n", first, said, content->size))
+    if (sent && !rule->no_range_field)
+        sent = send_text(socket, "Content-Range: bytes %" PRIu64 "-%" PRIu64 "/%zu\r\n", first, said, content->size);
+    if (!sent || !send_text(socket, "Content-Length: %" PRIu64 "\r\n\r\n", last + 1 - first)) {
+        note_abort(server);
         return false;
-    return send_text(socket, "Content-Length: %" PRIu64 "\r\n\r\n", last + 1 - first) &&
-           send_body(server, socket, rule, content->data + first, last + 1 - first);
+    }
+    return send_body(server, socket, rule, content->data + first, last + 1 - first);
 }
 
 static bool send_status(int socket, unsigned status, const char *field)
@@ -244,7 +247,7 @@ static bool answer(fault_server *server, int socket, fault_request *request)
 
 /* ---- connections */
 
-static void serve(void *context)
+static void *serve(void *context)
 {
     connection *own = context;
     char text[REQUEST_BYTES];
@@ -254,28 +257,45 @@ static void serve(void *context)
         if (!answer(own->server, own->socket, &request))
             break;
     }
-    shutdown(own->socket, SHUT_RDWR); /* closed when the server ends: its number may not be used anew before */
+    shutdown(own->socket, SHUT_RDWR); /* closed with the slot: its number may not be used anew before */
+    strl_mutex_lock(&own->server->mutex);
+    own->ended = true;
+    strl_mutex_unlock(&own->server->mutex);
+    return NULL;
 }
 
-static void accept_all(void *context)
+/* Mutex held: a slot that was never used, or whose connection has ended. NULL: none. */
+static connection *free_slot(fault_server *server)
+{
+    for (unsigned i = 0; i < server->connection_count; i++) {
+        connection *old = &server->connections[i];
+        if (!old->ended)
+            continue;
+        pthread_join(old->thread, NULL);
+        close(old->socket);
+        return old;
+    }
+    return server->connection_count < MOST_CONNECTIONS ? &server->connections[server->connection_count++] : NULL;
+}
+
+static void *accept_all(void *context)
 {
     fault_server *server = context;
     for (;;) {
-        int socket = accept(server->listener, NULL, NULL);
+        int socket = accept(server->listener, NULL, NULL), one = 1;
         if (socket < 0 && errno == EINTR)
             continue;
         if (socket < 0)
-            return;
-        int one = 1;
+            return NULL;
         setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &one, sizeof one);
         strl_mutex_lock(&server->mutex);
-        bool room = !server->ending && server->connection_count < MOST_CONNECTIONS;
-        connection *made = &server->connections[server->connection_count];
-        *made = (connection){.server = server, .socket = socket};
-        room = room && strl_thread_start(&made->thread, serve, made, NULL) == STRL_OK;
-        server->connection_count += room;
+        connection *made = server->ending ? NULL : free_slot(server);
+        if (made) {
+            *made = (connection){.server = server, .socket = socket};
+            assert_int_equal(pthread_create(&made->thread, NULL, serve, made), 0);
+        }
         strl_mutex_unlock(&server->mutex);
-        if (!room)
+        if (!made)
             close(socket);
     }
 }
@@ -294,7 +314,8 @@ void fault_server_restart(fault_server *server)
     assert_int_equal(listen(server->listener, 128), 0);
     assert_int_equal(getsockname(server->listener, (struct sockaddr *)&address, &size), 0);
     server->port = ntohs(address.sin_port);
-    assert_int_equal(strl_thread_start(&server->acceptor, accept_all, server, NULL), STRL_OK);
+    assert_int_equal(pthread_create(&server->acceptor, NULL, accept_all, server), 0);
+    server->listens = true;
 }
 
 fault_server *fault_server_create(const fault_content *content, fault_script script, void *context)
@@ -311,7 +332,7 @@ fault_server *fault_server_create(const fault_content *content, fault_script scr
 
 void fault_server_kill(fault_server *server)
 {
-    if (!server->acceptor)
+    if (!server->listens)
         return;
     strl_mutex_lock(&server->mutex);
     server->ending = true;
@@ -319,14 +340,14 @@ void fault_server_kill(fault_server *server)
         shutdown(server->connections[i].socket, SHUT_RDWR);
     strl_mutex_unlock(&server->mutex);
     shutdown(server->listener, SHUT_RDWR); /* accept comes back */
-    strl_thread_join(server->acceptor);
+    pthread_join(server->acceptor, NULL);
     close(server->listener);
     for (unsigned i = 0; i < server->connection_count; i++) {
-        strl_thread_join(server->connections[i].thread);
+        pthread_join(server->connections[i].thread, NULL);
         close(server->connections[i].socket);
     }
     server->connection_count = 0;
-    server->acceptor = NULL;
+    server->listens = false;
 }
 
 void fault_server_destroy(fault_server *server)
