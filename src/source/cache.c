@@ -136,6 +136,11 @@ static void shrink(const strl__cache *cache, listing *all, uint64_t target)
     }
 }
 
+static uint64_t kept_bytes(const strl__cache *cache)
+{
+    return (uint64_t)(KEPT_SHARE * (double)cache->most_bytes);
+}
+
 /* Counts what is there; where that is more than `most`, what was used least lately goes until `target` is left. */
 static void recount(strl__cache *cache, uint64_t most, uint64_t target)
 {
@@ -149,12 +154,17 @@ static void recount(strl__cache *cache, uint64_t most, uint64_t target)
     strl__free(all.items);
 }
 
+void strl__cache_trim(strl__cache *cache)
+{
+    recount(cache, cache->most_bytes, kept_bytes(cache));
+}
+
 /* False where there is none to be had. */
 static bool make_room(strl__cache *cache, uint64_t bytes)
 {
     if (bytes > cache->most_bytes / LARGEST_SHARE)
         return false;
-    uint64_t most = cache->most_bytes - bytes, kept = (uint64_t)(KEPT_SHARE * (double)cache->most_bytes);
+    uint64_t most = cache->most_bytes - bytes, kept = kept_bytes(cache);
     if (!cache->counted || cache->put_bytes > cache->most_bytes / RECOUNT_SHARE || cache->bytes > most)
         recount(cache, most, kept < most ? kept : most);
     return cache->bytes <= most;

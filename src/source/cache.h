@@ -14,6 +14,8 @@ typedef struct strl__cache strl__cache;
 strl_status strl__cache_open(const char *folder, uint64_t most_bytes, strl__cache **cache, strl_error *err);
 void strl__cache_close(strl__cache *cache); /* NULL is legal */
 
+/* Counts what is there; what is beyond the cap goes. put does the same now and then. */
+void strl__cache_trim(strl__cache *cache);
 /* Fills key->size bytes. An entry that is not whole is removed. */
 bool strl__cache_get(strl__cache *cache, const strl__cache_key *key, void *data);
 /* After the first write that fails (full disk, folder that cannot be written) nothing is written any more. */

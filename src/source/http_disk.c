@@ -146,9 +146,19 @@ static void look_up(strl__http *http, strl__http_read *read)
     }
 }
 
+/* Once, when there is time: the cap may be a smaller one than last time. */
+static void trim(strl__http *http, bool *trimmed)
+{
+    *trimmed = true;
+    strl_mutex_unlock(&http->mutex);
+    strl__cache_trim(http->cache);
+    strl_mutex_lock(&http->mutex);
+}
+
 void strl__http_disk_run(void *context)
 {
     strl__http *http = context;
+    bool trimmed = false;
     strl_mutex_lock(&http->mutex);
     while (!http->disk_closing || http->doubted || http->kept) {
         strl__http_read *read = NULL;
@@ -158,6 +168,8 @@ void strl__http_disk_run(void *context)
             look_up(http, read);
         else if (http->kept)
             write_one(http);
+        else if (!trimmed)
+            trim(http, &trimmed);
         else
             strl_condition_wait(&http->disk_work, &http->mutex);
     }

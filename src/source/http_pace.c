@@ -9,7 +9,6 @@
 #define MOST_GAP 262144.0
 #define SAMPLE_NS 50000000u      /* of bytes coming make a measurement, or so many bytes: */
 #define SAMPLE_BYTES 1048576u
-#define FIRST_SAMPLE_BYTES 16384u
 #define SMOOTHING 0.3
 #define LATENCY_FORGETTING 0.05  /* how fast a smaller latency is forgotten */
 #define LOOKUP_SMOOTHING 0.05
@@ -39,8 +38,7 @@ void strl__pace_add_bytes(strl__pace *pace, uint64_t now_ns, size_t bytes)
 {
     run_clock(pace, now_ns);
     pace->sample_bytes += bytes;
-    bool whole = pace->sample_ns >= SAMPLE_NS || pace->sample_bytes >= SAMPLE_BYTES ||
-                 (pace->bytes_per_s == 0 && pace->sample_bytes >= FIRST_SAMPLE_BYTES);
+    bool whole = pace->sample_ns >= SAMPLE_NS || pace->sample_bytes >= SAMPLE_BYTES; /* less is what a buffer held */
     if (!whole || pace->sample_ns == 0 || pace->sample_bytes == 0)
         return;
     double found = (double)pace->sample_bytes * 1e9 / (double)pace->sample_ns;

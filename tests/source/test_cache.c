@@ -167,6 +167,8 @@ static void the_cap_holds_and_what_was_used_longest_ago_goes(void **state)
     assert_false(has(cache, 1));
     strl__cache_close(cache);
     strl__cache *smaller = must_open("three", CAP / 2);
+    strl__cache_trim(smaller);
+    assert_true(count("three").bytes <= CAP / 2);
     put(smaller, 1000);
     assert_true(count("three").bytes <= CAP / 2);
     assert_true(has(smaller, 1000));
