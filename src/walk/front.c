@@ -100,7 +100,6 @@ static bool want_child(strl__descent *c, strl__node *child, double px)
     c->cut->waits = true;
     if (child->residency == STRL__PENDING) {
         child->request->touched_frame = walk->frame;
-        child->request->prefetch &= !front;
         return true;
     }
     return front ? strl__add_candidate(&walk->missing, child, STRL_NONE, px)

@@ -129,7 +129,7 @@ typedef struct strl__job {
 
 typedef struct strl__request {
     bool used, answered, cancelled;
-    bool prefetch; /* nothing of it has been wanted yet */
+    bool prefetch; /* for nothing that was wanted at submission */
     uint64_t token;
     uint64_t touched_frame; /* last frame that wanted something of it */
     uint64_t offset;        /* of the page */
@@ -270,7 +270,6 @@ struct strl_walk {
     strl__request requests[STRL__MAX_REQUESTS];
     uint32_t requests_in_flight, requests_pending;
     uint64_t room; /* bytes that the source still has room for in this frame */
-    bool starved;  /* in this frame: something wanted could not be asked for */
     strl__job **jobs; /* owned, in order of submission */
     size_t job_count, job_capacity;
 

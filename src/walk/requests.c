@@ -8,7 +8,6 @@
 #include "platform/thread.h"
 
 #define FORGET_FRAMES 16u /* a read that nothing has wanted for this long is cancelled */
-#define FORGET_FRAMES_STARVED 2u /* the same where it takes the place of something wanted */
 #define SPARE_FRAMES 60u  /* prefetching evicts only what has been idle for longer */
 #define ABANDON_WAIT_NS 50000u
 
@@ -293,11 +292,9 @@ static strl__request *unanswered_page(strl_walk *walk, uint64_t offset)
 
 /* On a slow link the source has room for less than the slots: what could not come soon is not asked for, so that it cannot
  * be in the way of what the camera wants by then. */
-static bool has_slot(strl_walk *walk, uint32_t in_flight, bool prefetch)
+static bool has_slot(const strl_walk *walk, uint32_t in_flight)
 {
-    bool has = walk->requests_pending < in_flight && walk->room > 0;
-    walk->starved |= !has && !prefetch;
-    return has;
+    return walk->requests_pending < in_flight && walk->room > 0;
 }
 
 static strl__request *take_slot(strl_walk *walk)
@@ -343,7 +340,7 @@ static bool ask_for_node(strl_walk *walk, const strl__candidate *candidate, uint
     if (node->residency != STRL__ABSENT)
         return true;
     strl__request *request = unanswered_page(walk, node->record->page.offset);
-    if (!request && !has_slot(walk, in_flight, prefetch))
+    if (!request && !has_slot(walk, in_flight))
         return true;
     if (!strl__node_hold(walk, node))
         return true;
@@ -361,16 +358,15 @@ static bool ask_for_node(strl_walk *walk, const strl__candidate *candidate, uint
     node->request = request;
     request->nodes[request->node_count++] = node;
     request->touched_frame = walk->frame;
-    request->prefetch &= prefetch;
     return true;
 }
 
-static void ask_for_treelet(strl_walk *walk, const strl__candidate *candidate, uint32_t in_flight, bool prefetch)
+static void ask_for_treelet(strl_walk *walk, const strl__candidate *candidate, uint32_t in_flight)
 {
     const strl__treelet *parent = candidate->node->treelet;
     strl__treelet *treelet = strl__treelets_find(&walk->treelets, parent->tree, candidate->treelet);
     if ((treelet && (treelet->residency != STRL__ABSENT || treelet->retry.frame > walk->frame)) ||
-        !has_slot(walk, in_flight, prefetch))
+        !has_slot(walk, in_flight))
         return;
     /* Decoding has checked that a treelet names those of all children of its nodes. */
     const strl_treelet_ref *ref = &parent->data.child_refs[candidate->treelet - parent->data.first_child_treelet];
@@ -395,7 +391,7 @@ static void ask_for_all(strl_walk *walk, strl__candidates *candidates, uint32_t 
     for (size_t i = 0; i < candidates->count; i++) {
         const strl__candidate *candidate = &candidates->items[i];
         if (candidate->treelet != STRL_NONE)
-            ask_for_treelet(walk, candidate, in_flight, prefetch);
+            ask_for_treelet(walk, candidate, in_flight);
         else if (room)
             room = ask_for_node(walk, candidate, in_flight, evict_before, prefetch);
     }
@@ -403,11 +399,10 @@ static void ask_for_all(strl_walk *walk, strl__candidates *candidates, uint32_t 
 
 static void forget_stale(strl_walk *walk)
 {
-    uint32_t frames = walk->starved ? FORGET_FRAMES_STARVED : FORGET_FRAMES;
     for (uint32_t i = 0; i < walk->requests_in_flight; i++) {
         strl__request *request = &walk->requests[i];
         if (!request->used || request->answered || request->cancelled || request->treelet ||
-            (request->touched_frame + frames >= walk->frame && !(walk->starved && request->prefetch)))
+            request->touched_frame + FORGET_FRAMES >= walk->frame)
             continue;
         request->cancelled = true;
         strl_source_cancel(walk->source, request->token);
@@ -417,7 +412,6 @@ static void forget_stale(strl_walk *walk)
 void strl__requests_submit(strl_walk *walk)
 {
     walk->room = strl_source_room(walk->source);
-    walk->starved = false;
     ask_for_all(walk, &walk->missing, walk->requests_in_flight, walk->frame + 1, false);
     uint64_t idle_since = walk->frame > SPARE_FRAMES ? walk->frame - SPARE_FRAMES : 0;
     if (walk->missing.count == 0)

@@ -55,9 +55,7 @@ static bool watched_poll(strl_source *source, strl_source_result *result)
 
 static void watched_cancel(strl_source *source, uint64_t token)
 {
-    watched_source *self = (watched_source *)source;
-    self->cancels++;
-    strl_source_cancel(self->inner, token);
+    strl_source_cancel(((watched_source *)source)->inner, token);
 }
 
 static uint64_t watched_room(strl_source *source)

@@ -22,7 +22,7 @@ typedef struct watched_source {
     uint64_t link_bytes; /* that still come before the test sets it anew; of a slow link alone */
     uint64_t wanted_bytes, most_wanted_bytes; /* asked for and not answered: now, and at most */
     uint32_t asked[256]; /* bytes, by the token's last byte, which is the walk's slot */
-    uint64_t cancels, came_bytes;
+    uint64_t came_bytes;
     strl_source_result held; /* waits for the link */
     bool holds;
 } watched_source;
