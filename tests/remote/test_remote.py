@@ -190,6 +190,18 @@ class Test:
         out, _, result = self.render(server.url("redirect?model.stroll"))
         self.same("a redirect is followed", out, self.local, result)
 
+    def test_a_server_that_does_not_prove_who_it_is(self, server):
+        pair = self.folder / "certificate", self.folder / "key"
+        if not shutil.which("openssl"):
+            print("not looked at: certificates (there is no openssl)")
+            return
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=127.0.0.1",
+                        "-addext", "subjectAltName=IP:127.0.0.1", "-out", pair[0], "-keyout", pair[1]], check=True,
+                       stderr=subprocess.DEVNULL)
+        with ShapedServer(self.web, pair) as secure:
+            self.refused("the server does not prove who it is", "info", secure.url("model.stroll"))
+            self.check("nothing was asked of it", not secure.asked)
+
     # ---- the cache
 
     def test_cache(self, server):

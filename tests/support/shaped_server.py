@@ -14,6 +14,7 @@ import http.server
 import pathlib
 import re
 import socket
+import ssl
 import threading
 import time
 
@@ -21,12 +22,13 @@ CHUNK = 8192
 
 
 class ShapedServer:
-    def __init__(self, folder):
+    def __init__(self, folder, certificate=None):
+        """certificate: (certificate, key), files of PEM; then it speaks https."""
         self.folder = pathlib.Path(folder)
         self.bits_per_second, self.latency, self.fault = 0, 0, None
         self.asked, self.lock, self.link = [], threading.Lock(), threading.Lock()
         self.port, self.sockets, self.httpd = 0, set(), None
-        self.dead = threading.Event()
+        self.dead, self.certificate = threading.Event(), certificate
 
     def __enter__(self):
         self.restart()
@@ -36,7 +38,7 @@ class ShapedServer:
         self.kill()
 
     def url(self, name):
-        return f"http://127.0.0.1:{self.port}/{name}"
+        return f"http{'s' if self.certificate else ''}://127.0.0.1:{self.port}/{name}"
 
     def restart(self):
         owner = self
@@ -54,6 +56,10 @@ class ShapedServer:
         self.dead = threading.Event()
         self.httpd = Server(("127.0.0.1", self.port), Handler)
         self.port = self.httpd.server_address[1]
+        if self.certificate:
+            context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+            context.load_cert_chain(*self.certificate)
+            self.httpd.socket = context.wrap_socket(self.httpd.socket, server_side=True)
         threading.Thread(target=self.httpd.serve_forever, args=(0.02,), daemon=True).start()
 
     def kill(self):
