@@ -1,5 +1,5 @@
-/* What a server's answer and the cache's folder may say: lines of a header with the verdict on them, names and bytes of cache
- * entries. The first byte chooses. */
+/* What a server's answer and the cache's folder may say: lines of a header with the verdict on them, names and
+ * bytes of cache entries. The first byte chooses. */
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -20,7 +20,8 @@ static void check(bool holds)
 static void check_identity(const strl__http_identity *identity)
 {
     size_t length = strnlen(identity->etag, sizeof identity->etag);
-    check(length < sizeof identity->etag && strnlen(identity->modified, sizeof identity->modified) < sizeof identity->modified);
+    check(length < sizeof identity->etag &&
+          strnlen(identity->modified, sizeof identity->modified) < sizeof identity->modified);
     check(length == 0 || (length >= 2 && identity->etag[0] == '"' && identity->etag[length - 1] == '"'));
     for (size_t i = 0; i < length; i++) /* it goes into the next request's header */
         check((unsigned char)identity->etag[i] > 0x20 && identity->etag[i] != 0x7f);

@@ -12,7 +12,8 @@ bool strl_location_is_remote(const char *name)
     return strstr(name, "://") != NULL;
 }
 
-strl_status strl_location_open_source(const strl_location *location, unsigned threads, strl_source **source, strl_error *err)
+strl_status strl_location_open_source(const strl_location *location, unsigned threads, strl_source **source,
+                                      strl_error *err)
 {
     const char *name = location->name;
     const strl_http_desc desc = {.cache = location->cache, .cache_bytes = location->cache_bytes};
@@ -20,7 +21,8 @@ strl_status strl_location_open_source(const strl_location *location, unsigned th
     if (!strl_location_is_remote(name))
         return strl_source_open_file(name, threads, source, err);
     if (strncasecmp(name, "http://", 7) != 0 && strncasecmp(name, "https://", 8) != 0)
-        return strl__fail(err, STRL_ERR_UNSUPPORTED, "%.200s: models are read from files, http:// and https:// alone", name);
+        return strl__fail(err, STRL_ERR_UNSUPPORTED, "%.200s: models are read from files, http:// and https:// alone",
+                          name);
     return strl_source_open_http(name, &desc, source, err);
 }
 

@@ -18,7 +18,8 @@ typedef struct strl_location {
 /* Anything with "://" is meant as an address, which not all programs can reach. */
 bool strl_location_is_remote(const char *name);
 /* threads: of a file; an address has its own. STRL_ERR_UNSUPPORTED where it is an address of another kind. */
-strl_status strl_location_open_source(const strl_location *location, unsigned threads, strl_source **source, strl_error *err);
+strl_status strl_location_open_source(const strl_location *location, unsigned threads, strl_source **source,
+                                      strl_error *err);
 /* For reads that may wait. */
 strl_status strl_location_open_container(const strl_location *location, strl_container **container, strl_error *err);
 /* By its first bytes. What is behind an address is taken for one: opening it will tell. */

@@ -19,17 +19,17 @@ typedef struct strl_folder_entry {
 uint64_t strl_folder_now_ns(void);
 
 /* Every regular file in the folder, in no order; links are none. visit returns false to end. */
-strl_status strl_folder_visit(const char *path, bool (*visit)(void *context, const strl_folder_entry *entry), void *context,
-                              strl_error *err);
+strl_status strl_folder_visit(const char *path, bool (*visit)(void *context, const strl_folder_entry *entry),
+                              void *context, strl_error *err);
 
 typedef struct strl_folder_piece {
     const void *data;
     size_t size;
 } strl_folder_piece;
 
-/* Writes the pieces, one after the other, as the file `name`; replaces what has that name, also a link. Until then the bytes
- * are in "name.XXXXXXXX.part", XXXXXXXX being what nothing else is called by, which a kill leaves behind. Not forced to the
- * disk. */
+/* Writes the pieces, one after the other, as the file `name`; replaces what has that name, also a link. Until then
+ * the bytes are in "name.XXXXXXXX.part", XXXXXXXX being what nothing else is called by, which a kill leaves
+ * behind. Not forced to the disk. */
 strl_status strl_folder_put(const char *path, const char *name, const strl_folder_piece *pieces, size_t count,
                             strl_error *err);
 /* Now is its last use. Nothing happens where that cannot be noted. */

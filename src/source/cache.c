@@ -9,19 +9,19 @@
 #include "platform/file.h"
 #include "platform/folder.h"
 
-#define BLOCK_BYTES 4096u         /* a file takes whole ones */
-#define PART_AGE_NS 3600000000000u /* a file being written is not touched for as long */
+#define BLOCK_BYTES 4096u              /* a file takes whole ones */
+#define PART_AGE_NS 3600000000000u     /* a file being written is not touched for as long */
 #define MOST_ENTRIES ((size_t)1 << 20) /* that are looked at in one count */
-#define RECOUNT_SHARE 16u         /* of the cap, written since the last count, before the folder is looked through again */
-#define LARGEST_SHARE 4u          /* of the cap; a larger entry is not kept */
-#define KEPT_SHARE 0.875          /* of the cap, left by making room: so that it does not have to be made each time */
+#define RECOUNT_SHARE 16u /* of the cap, written since the last count, before the folder is looked through again */
+#define LARGEST_SHARE 4u  /* of the cap; a larger entry is not kept */
+#define KEPT_SHARE 0.875  /* of the cap, left by making room: so that it does not have to be made each time */
 
 struct strl__cache {
     char *folder;
     uint64_t most_bytes;
-    uint64_t bytes;       /* as counted, and what was put since */
-    uint64_t put_bytes;   /* since the count */
-    bool counted, full;   /* full: nothing is written any more */
+    uint64_t bytes;     /* as counted, and what was put since */
+    uint64_t put_bytes; /* since the count */
+    bool counted, full; /* full: nothing is written any more */
 };
 
 /* An entry as the folder lists it. */
@@ -106,7 +106,8 @@ static bool list_one(void *context, const strl_folder_entry *entry)
     strl__cache_name kind = strl__cache_parse_name(entry->name, &key);
     if (kind == STRL__CACHE_FOREIGN)
         return true;
-    bool is_left = kind == STRL__CACHE_PART && entry->used_ns < all->now_ns && all->now_ns - entry->used_ns > PART_AGE_NS;
+    bool is_left =
+        kind == STRL__CACHE_PART && entry->used_ns < all->now_ns && all->now_ns - entry->used_ns > PART_AGE_NS;
     if (is_left && remove_named(all->cache, entry->name))
         return true;
     all->bytes += on_disk(entry->bytes);

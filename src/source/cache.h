@@ -1,6 +1,7 @@
 /* Bytes of models on disk, one file an entry, for another time and for other processes. Nothing here is a failure: what
- * cannot be read is a miss, what cannot be written is not kept. Only files of ours are ever removed, which their name and
- * their signature tell. One thread at a time; several caches, also of other processes, may be over one folder. */
+ * cannot be read is a miss, what cannot be written is not kept. Only files of ours are ever removed, which their
+ * name and their signature tell. One thread at a time; several caches, also of other processes, may be over one
+ * folder. */
 #ifndef STRL_SOURCE_CACHE_H
 #define STRL_SOURCE_CACHE_H
 
@@ -9,8 +10,8 @@
 
 typedef struct strl__cache strl__cache;
 
-/* Makes the folder where it is missing. most_bytes: what our files in it may take. Each process holds to that by what it
- * has last counted: several may together pass it for a while, each by a sixteenth at most. */
+/* Makes the folder where it is missing. most_bytes: what our files in it may take. Each process holds to that by
+ * what it has last counted: several may together pass it for a while, each by a sixteenth at most. */
 strl_status strl__cache_open(const char *folder, uint64_t most_bytes, strl__cache **cache, strl_error *err);
 void strl__cache_close(strl__cache *cache); /* NULL is legal */
 

@@ -25,7 +25,8 @@ void strl__cache_entry_name(const strl__cache_key *key, char name[STRL__CACHE_NA
     char model[33];
     for (unsigned i = 0; i < 16; i++)
         snprintf(model + 2 * i, 3, "%02x", key->model[i]);
-    snprintf(name, STRL__CACHE_NAME_BYTES, "stroll-%s-%016" PRIx64 "-%08" PRIx32 ".page", model, key->offset, key->size);
+    snprintf(name, STRL__CACHE_NAME_BYTES, "stroll-%s-%016" PRIx64 "-%08" PRIx32 ".page", model, key->offset,
+             key->size);
 }
 
 /* Lower-case digits; NULL where there are others. */

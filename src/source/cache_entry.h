@@ -1,8 +1,8 @@
 /* One entry of the cache on disk: its name and its bytes. Pure; what comes from the disk is hostile until checked.
  *
- *     name    stroll-MODEL-OFFSET-SIZE.page, in hex: 32, 16 and 8 digits (a file that is being written: with .XXXXXXXX.part)
- *     bytes   signature[16] model[16] offset:u64 size:u64 checksum:u64 0:u64, little-endian, then `size` bytes of the model,
- *             of which checksum is the XXH3 */
+ *     name    stroll-MODEL-OFFSET-SIZE.page, in hex: 32, 16 and 8 digits; while it is written with .XXXXXXXX.part
+ *     bytes   signature[16] model[16] offset:u64 size:u64 checksum:u64 0:u64, little-endian, then `size` bytes of
+ *             the model, of which checksum is the XXH3 */
 #ifndef STRL_SOURCE_CACHE_ENTRY_H
 #define STRL_SOURCE_CACHE_ENTRY_H
 

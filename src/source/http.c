@@ -43,10 +43,10 @@ static void copy_known(strl__http *http, const uint8_t *known, uint64_t offset, 
 static void look_ahead(strl__http *http, strl__http_read *read)
 {
     uint64_t total = http->base.bytes;
-    bool forward = read->begin >= http->ahead_begin && read->begin <= http->ahead_end + AHEAD_GAP &&
-                   read->end > http->ahead_end;
-    bool backward = read->end <= http->ahead_end && read->end + AHEAD_GAP >= http->ahead_begin &&
-                    read->begin < http->ahead_begin;
+    bool forward =
+        read->begin >= http->ahead_begin && read->begin <= http->ahead_end + AHEAD_GAP && read->end > http->ahead_end;
+    bool backward =
+        read->end <= http->ahead_end && read->end + AHEAD_GAP >= http->ahead_begin && read->begin < http->ahead_begin;
     if (!forward && !backward)
         http->ahead_window = AHEAD_BYTES;
     else if (http->ahead_window < MOST_AHEAD_BYTES)
@@ -311,8 +311,8 @@ static void apply_desc(strl__http *http, const strl_http_desc *desc)
         strl__cache_open(asked->cache, own->cache_bytes, &http->cache, NULL);
 }
 
-/* libcurl wants this once a process, before any other call; where it was done already it counts. It is never undone: other
- * code of the process may use libcurl too. */
+/* libcurl wants this once a process, before any other call; where it was done already it counts. It is never
+ * undone: other code of the process may use libcurl too. */
 static strl_once curl_once = STRL_ONCE_INIT;
 static CURLcode curl_ready = CURLE_FAILED_INIT;
 
@@ -340,10 +340,8 @@ static strl_status make_handles(strl__http *http, strl_error *err)
 
 static strl_status open_address(strl__http *http, strl_error *err)
 {
-    const strl__http_read like = {.size = STRL__HTTP_HEAD_BYTES,
-                                  .end = STRL__HTTP_HEAD_BYTES,
-                                  .urgency = INFINITY,
-                                  .waited = true};
+    const strl__http_read like = {
+        .size = STRL__HTTP_HEAD_BYTES, .end = STRL__HTTP_HEAD_BYTES, .urgency = INFINITY, .waited = true};
     strl_mutex_lock(&http->mutex);
     strl_status status = wait_for(http, &like, NULL, err);
     strl_mutex_unlock(&http->mutex);

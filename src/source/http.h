@@ -2,15 +2,17 @@
  *
  *     the walk's thread   submit, poll, cancel, read                                          http.c
  *     the disk thread     new reads: in the cache, or on to the network; keeps what came      http_disk.c
- *     the network thread  waiting reads -> requests -> answers; all of libcurl                http_network.c, _transfer.c
+ *     the network thread  waiting reads -> requests -> answers; all of libcurl          http_network.c, http_transfer.c
  *
- * Without a cache there is no disk thread. A read moves NEW -> (LOOKED_UP ->) WAITING -> FETCHING -> DONE, back to WAITING where
- * an attempt fails, and from anywhere to DONE where it is cancelled. Its bytes are in its own buffer, so that a transfer does
- * not care who still wants them: it spreads what comes over the reads that are attached to it at the moment.
+ * Without a cache there is no disk thread. A read moves NEW -> (LOOKED_UP ->) WAITING -> FETCHING -> DONE, back to
+ * WAITING where an attempt fails, and from anywhere to DONE where it is cancelled. Its bytes are in its own
+ * buffer, so that a transfer does not care who still wants them: it spreads what comes over the reads that are
+ * attached to it at the moment.
  *
- * Invariants: (1) an accepted read is in `reads` until it is DONE, then in `finished` (or its waiter's hands) until it is
- * taken, so it is answered exactly once; (2) everything under `mutex` is touched with it held, and nothing waits while it
- * is; (3) only the network thread calls libcurl, but for curl_multi_wakeup. */
+ * Invariants: (1) an accepted read is in `reads` until it is DONE, then in `finished` (or its waiter's hands)
+ * until it is taken, so it is answered exactly once; (2) everything under `mutex` is touched with it held, and
+ * nothing waits while it is; (3) while the network thread runs only it calls libcurl,
+ * but for curl_multi_wakeup. */
 #ifndef STRL_SOURCE_HTTP_H
 #define STRL_SOURCE_HTTP_H
 
@@ -57,7 +59,7 @@ typedef struct strl__http_transfer {
     bool active, opening, redirected;
     uint64_t begin, end; /* asked for */
     uint64_t received;
-    uint64_t discarded;  /* of the body of an answer that is of no use */
+    uint64_t discarded; /* of the body of an answer that is of no use */
     bool judged;
     strl__http_verdict verdict;
     strl_error error; /* the reason, without the address */
@@ -78,12 +80,12 @@ typedef struct strl__http_kept {
 typedef struct strl__http {
     strl_source base;
     /* Set before the threads begin. */
-    char *url;        /* as libcurl has normalised it */
-    char *shown;      /* for sentences: without what may be secret in it */
+    char *url;   /* as libcurl has normalised it */
+    char *shown; /* for sentences: without what may be secret in it */
     strl_http_desc desc;
-    bool secure;      /* https */
+    bool secure; /* https */
     strl_thread *network, *disk;
-    CURLM *multi;     /* the network thread's, once it runs */
+    CURLM *multi;       /* the network thread's, once it runs */
     strl__cache *cache; /* the disk thread's; NULL = none */
     /* The network thread's. */
     strl__http_transfer transfers[STRL__HTTP_MOST_CONNECTIONS];
@@ -92,8 +94,8 @@ typedef struct strl__http {
     bool headers_conditional;   /* they name what was opened */
     /* Under the mutex. */
     strl_mutex mutex;
-    strl_condition answered;  /* a waited read is done */
-    strl_condition disk_work; /* a new read, something to keep, or the end */
+    strl_condition answered;            /* a waited read is done */
+    strl_condition disk_work;           /* a new read, something to keep, or the end */
     bool disk_closing, network_closing; /* in this order: the disk thread wakes the network thread */
     bool opened;
     strl__http_read **reads; /* accepted and not done; owned */
@@ -104,15 +106,15 @@ typedef struct strl__http {
     uint8_t model[16]; /* for the cache's keys */
     uint8_t head[STRL__HTTP_HEAD_BYTES];
     size_t head_bytes;
-    uint8_t *ahead; /* what a blocking read fetched beyond itself; owned; NULL = nothing */
+    uint8_t *ahead;                  /* what a blocking read fetched beyond itself; owned; NULL = nothing */
     uint64_t ahead_begin, ahead_end; /* of what the last blocking read fetched, in `ahead` or not */
     uint64_t ahead_window;
     strl__http_kept *kept, **kept_end; /* to be written; owned */
     strl__http_kept *doubted;          /* to be dropped, before anything is looked up; owned */
     size_t kept_bytes;
-    strl_error changed;       /* status not STRL_OK: the model is another one now, and this says so */
-    uint32_t outages;         /* requests in a row that did not reach the server */
-    uint64_t not_before_ns;   /* for all requests */
+    strl_error changed;     /* status not STRL_OK: the model is another one now, and this says so */
+    uint32_t outages;       /* requests in a row that did not reach the server */
+    uint64_t not_before_ns; /* for all requests */
     strl__pace pace;
     strl_network_stats stats;
 } strl__http;

@@ -14,9 +14,9 @@ typedef enum strl__http_verdict {
 } strl__http_verdict;
 
 typedef struct strl__http_asked {
-    uint64_t first, last;  /* bytes, inclusive */
-    bool opening;          /* the first answer: the file may be shorter than that, and its identity is not known yet */
-    bool redirected;       /* sent to where an earlier redirect led */
+    uint64_t first, last; /* bytes, inclusive */
+    bool opening;         /* the first answer: the file may be shorter than that, and its identity is not known yet */
+    bool redirected;      /* sent to where an earlier redirect led */
     strl__http_identity identity; /* of what was opened */
 } strl__http_asked;
 

@@ -1,11 +1,12 @@
-/* The disk thread: looks new reads up in the cache and sends on to the network what is not there; between times writes what
- * the network brought. */
+/* The disk thread: looks new reads up in the cache and sends on to the network what is not there; between times
+ * writes what the network brought. */
 #include <string.h>
 
 #include "base/memory.h"
 #include "source/http.h"
 
-#define MOST_KEPT_BYTES ((size_t)16 << 20) /* that wait to be written: what comes faster than the disk takes it is not kept */
+#define MOST_KEPT_BYTES                                                                                                \
+    ((size_t)16 << 20) /* that wait to be written: what comes faster than the disk takes it is not kept */
 
 static strl__cache_key key_of(const strl__http *http, uint64_t offset, size_t size)
 {

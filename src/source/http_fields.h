@@ -17,9 +17,9 @@ typedef struct strl__http_identity {
 } strl__http_identity;
 
 typedef struct strl__http_fields {
-    unsigned status; /* 0 before the first line */
-    size_t bytes;    /* of header so far */
-    bool has_range;  /* Content-Range is there */
+    unsigned status;  /* 0 before the first line */
+    size_t bytes;     /* of header so far */
+    bool has_range;   /* Content-Range is there */
     bool range_known; /* and is "bytes first-last/total" */
     uint64_t first, last;
     bool total_known; /* of Content-Range, also "bytes * /total" */

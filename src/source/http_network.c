@@ -7,7 +7,7 @@
 #include "base/memory.h"
 #include "source/http.h"
 
-#define LEAST_REQUESTS 2u   /* under way whatever they weigh: while one answer comes the next is asked for */
+#define LEAST_REQUESTS 2u    /* under way whatever they weigh: while one answer comes the next is asked for */
 #define MOST_CANDIDATES 256u /* for sharing a request */
 #define IDLE_NS 1000000000u  /* the longest sleep */
 
@@ -45,7 +45,8 @@ static bool may_send(const strl__http *http, uint64_t bytes)
     uint64_t under_way = bytes_under_way(http, &active);
     if (http->outages > 0) /* one looks whether the server is back */
         return active == 0;
-    return active < LEAST_REQUESTS || (active < http->desc.connections && under_way + bytes <= strl__pace_window(&http->pace));
+    return active < LEAST_REQUESTS ||
+           (active < http->desc.connections && under_way + bytes <= strl__pace_window(&http->pace));
 }
 
 /* Mutex held. The range of the next request; false where there is none to send. */

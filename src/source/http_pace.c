@@ -1,16 +1,17 @@
 #include "source/http_pace.h"
 
-#define QUEUE_S 0.15             /* of bytes ahead of what is more urgent */
-#define ROOM_S 0.3               /* of bytes that a walk has asked for: what is on its way, and as much to choose from */
-#define UNKNOWN_WINDOW 262144.0  /* before the first measurement */
+#define QUEUE_S 0.15            /* of bytes ahead of what is more urgent */
+#define ROOM_S 0.3              /* of bytes that a walk has asked for: what is on its way, and as much to choose from */
+#define UNKNOWN_WINDOW 262144.0 /* before the first measurement */
 #define LEAST_WINDOW 65536.0
 #define LEAST_ROOM 262144.0
 #define MOST_WINDOW 67108864.0
+#define LEAST_GAP 4096.0 /* less than a header and its answer weigh; pages of a container lie some bytes apart */
 #define MOST_GAP 262144.0
-#define SAMPLE_NS 50000000u      /* of bytes coming make a measurement, or so many bytes: */
+#define SAMPLE_NS 50000000u /* of bytes coming make a measurement, or so many bytes: */
 #define SAMPLE_BYTES 1048576u
 #define SMOOTHING 0.3
-#define LATENCY_FORGETTING 0.05  /* how fast a smaller latency is forgotten */
+#define LATENCY_FORGETTING 0.05 /* how fast a smaller latency is forgotten */
 #define LOOKUP_SMOOTHING 0.05
 #define LEAST_MISS_SHARE 0.0625
 
@@ -87,7 +88,7 @@ uint64_t strl__pace_room(const strl__pace *pace, uint64_t waiting)
 
 uint64_t strl__pace_gap(const strl__pace *pace, unsigned connections)
 {
-    return (uint64_t)clamp(bytes_of(pace, 0) / (connections > 0 ? connections : 1), 0, MOST_GAP);
+    return (uint64_t)clamp(bytes_of(pace, 0) / (connections > 0 ? connections : 1), LEAST_GAP, MOST_GAP);
 }
 
 uint64_t strl__backoff_ns(uint64_t base_ns, unsigned failures, uint64_t random)
@@ -105,7 +106,7 @@ strl__span strl__span_grow(strl__span seed, const strl__span *others, size_t cou
         for (size_t i = 0; i < count; i++) {
             strl__span with = {others[i].begin < all.begin ? others[i].begin : all.begin,
                                others[i].end > all.end ? others[i].end : all.end};
-            uint64_t off = others[i].begin > all.end     ? others[i].begin - all.end
+            uint64_t off = others[i].begin > all.end   ? others[i].begin - all.end
                            : others[i].end < all.begin ? all.begin - others[i].end
                                                        : 0;
             bool is_new = with.begin != all.begin || with.end != all.end;

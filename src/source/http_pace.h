@@ -26,16 +26,16 @@ void strl__pace_add_bytes(strl__pace *pace, uint64_t now_ns, size_t bytes);
 void strl__pace_add_latency(strl__pace *pace, uint64_t latency_ns);
 void strl__pace_add_lookup(strl__pace *pace, bool hit);
 
-/* Bytes to have on their way: enough that the link does not run dry while a request travels, and so few that what is more
- * urgent waits behind them for about 150 ms. */
+/* Bytes to have on their way: enough that the link does not run dry while a request travels, and so few that what
+ * is more urgent waits behind them for about 150 ms. */
 uint64_t strl__pace_window(const strl__pace *pace);
 /* Bytes that may be asked for beyond the `waiting` ones; more where the cache is likely to have them. */
 uint64_t strl__pace_room(const strl__pace *pace, uint64_t waiting);
 /* Bytes between two reads that cost no more than a request of their own, `connections` at a time. */
 uint64_t strl__pace_gap(const strl__pace *pace, unsigned connections);
 
-/* How long to wait after the `failures`-th failure in a row (1, 2, ...): base, doubled with each, 16 times that at most;
- * `random` takes up to half of it off, so that many clients do not come back at once. */
+/* How long to wait after the `failures`-th failure in a row (1, 2, ...): base, doubled with each, 16 times that at
+ * most; `random` takes up to half of it off, so that many clients do not come back at once. */
 uint64_t strl__backoff_ns(uint64_t base_ns, unsigned failures, uint64_t random);
 
 /* A read that waits: what may go into one request with others. */
@@ -43,8 +43,8 @@ typedef struct strl__span {
     uint64_t begin, end;
 } strl__span;
 
-/* The range of one request: `seed` and of the other spans those that lie at most `gap` bytes off what is taken already, as
- * long as the whole is at most `most` bytes (the seed is taken whatever its size). */
+/* The range of one request: `seed` and of the other spans those that lie at most `gap` bytes off what is taken
+ * already, as long as the whole is at most `most` bytes (the seed is taken whatever its size). */
 strl__span strl__span_grow(strl__span seed, const strl__span *others, size_t count, uint64_t gap, uint64_t most);
 
 #endif

@@ -1,5 +1,5 @@
-/* The reads that a remote source has accepted, from submission to the answer. Their number is the walk's requests in flight, a
- * few hundred at most: searching is looking at each. All with the mutex held. */
+/* The reads that a remote source has accepted, from submission to the answer. Their number is the walk's requests
+ * in flight, a few hundred at most: searching is looking at each. All with the mutex held. */
 #include <math.h>
 #include <string.h>
 

@@ -1,5 +1,5 @@
-/* One request and its answer: bytes as they come go to the reads that want them; what ends otherwise than it should sends
- * them back to wait, or fails them. */
+/* One request and its answer: bytes as they come go to the reads that want them; what ends otherwise than it
+ * should sends them back to wait, or fails them. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
@@ -9,8 +9,8 @@
 #include "source/http.h"
 #include "stroll/version.h"
 
-#define MOST_DISCARDED 65536u       /* bytes of a useless answer are read on for the sake of the connection, so many */
-#define MOST_RETRY_AFTER_S 30       /* a server that wants more time than that has failed */
+#define MOST_DISCARDED 65536u /* bytes of a useless answer are read on for the sake of the connection, so many */
+#define MOST_RETRY_AFTER_S 30 /* a server that wants more time than that has failed */
 #define STALL_BYTES 1024u
 #define BUFFER_BYTES 65536L
 
@@ -99,7 +99,8 @@ static bool take_body(strl__http_transfer *transfer, const uint8_t *data, size_t
     }
     if (size > asked - transfer->received) {
         transfer->verdict = STRL__HTTP_AGAIN;
-        strl__fail(&transfer->error, STRL_ERR_NETWORK, "the answer is longer than the %" PRIu64 " bytes asked for", asked);
+        strl__fail(&transfer->error, STRL_ERR_NETWORK, "the answer is longer than the %" PRIu64 " bytes asked for",
+                   asked);
         return false;
     }
     if (transfer->receiving)

@@ -134,7 +134,8 @@ static void a_damaged_entry_is_a_miss_and_goes(void **state)
     static uint8_t bytes[STRL__CACHE_HEAD_BYTES + ENTRY_BYTES + 1];
     const strl__cache_key key = key_of(7);
     /* Sizes: cut anywhere, or longer. Bytes: one wrong, in head and content. */
-    const size_t sizes[] = {0, 1, 16, 63, 64, 65, whole - 1, whole + 1}, wrong[] = {16, 32, 40, 47, 48, 55, 56, 63, 64, whole - 1};
+    const size_t sizes[] = {0, 1, 16, 63, 64, 65, whole - 1, whole + 1},
+                 wrong[] = {16, 32, 40, 47, 48, 55, 56, 63, 64, whole - 1};
     for (size_t i = 0; i < 18; i++) {
         strl__cache_entry_head(&key, content_of(7), bytes);
         memcpy(bytes + STRL__CACHE_HEAD_BYTES, data_of, ENTRY_BYTES);

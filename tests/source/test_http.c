@@ -1,5 +1,5 @@
-/* A file behind an address: reads merged and ordered, retried, cancelled, cached; and every way in which a server may be
- * wrong. Times are as short as they can be, and nothing depends on how fast the machine is. */
+/* A file behind an address: reads merged and ordered, retried, cancelled, cached; and every way in which a server
+ * may be wrong. Times are as short as they can be, and nothing depends on how fast the machine is. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -119,8 +119,11 @@ static fault_rule by_number(void *context, unsigned number, const fault_asked *a
     return list->rules[number < list->count ? number : list->count - 1];
 }
 
-#define LISTED(...) \
-    &(listed_rules){(const fault_rule[]){__VA_ARGS__}, sizeof((fault_rule[]){__VA_ARGS__}) / sizeof(fault_rule)}
+#define LISTED(...)                                                                                                    \
+    &(listed_rules)                                                                                                    \
+    {                                                                                                                  \
+        (const fault_rule[]){__VA_ARGS__}, sizeof((fault_rule[]){__VA_ARGS__}) / sizeof(fault_rule)                    \
+    }
 
 static const fault_rule well = {0};
 
@@ -134,7 +137,8 @@ static void every_read_is_answered_once_with_its_bytes(void **state)
     uint8_t answered[300] = {0};
     assert_int_equal(source->bytes, BYTES);
     for (uint64_t i = 0; i < 300; i++)
-        submit(source, i, strl__mix64(i) % (BYTES - 9000), (size_t)(i % 9 == 0 ? 0 : strl__mix64(i + 7) % 9000), (float)(i % 13));
+        submit(source, i, strl__mix64(i) % (BYTES - 9000), (size_t)(i % 9 == 0 ? 0 : strl__mix64(i + 7) % 9000),
+               (float)(i % 13));
     for (unsigned n = 0; n < 300; n++) {
         strl_source_result result = next_answer(source);
         uint64_t i = result.token;
@@ -341,7 +345,8 @@ static void closing_drops_what_is_unanswered(void **state)
     fault_server *server = fault_server_create(&good, by_number, LISTED(well, well, stalls));
     for (unsigned run = 0; run < 8; run++) {
         strl_source *source = NULL;
-        if (strl_source_open_http(fault_server_url(server, "/model"), run == 0 ? &desc : &quick, &source, NULL) != STRL_OK)
+        if (strl_source_open_http(fault_server_url(server, "/model"), run == 0 ? &desc : &quick, &source, NULL) !=
+            STRL_OK)
             continue; /* that one stalled already */
         for (uint64_t i = 0; i < 100; i++)
             submit(source, i, 10000 * i, 9000, 0);
@@ -555,7 +560,8 @@ static void opening_says_what_is_wrong(void **state)
     fault_server *server = fault_server_create(&good, NULL, NULL);
     must_not_open(fault_server_url(server, "/nothing"), STRL_ERR_NETWORK, "there is nothing at this address (404)");
     must_not_open(fault_server_url(server, "/loop"), STRL_ERR_NETWORK, "redirected too often");
-    must_not_open(fault_server_url(server, "/elsewhere"), STRL_ERR_NETWORK, "redirected to where Stroll does not follow");
+    must_not_open(fault_server_url(server, "/elsewhere"), STRL_ERR_NETWORK,
+                  "redirected to where Stroll does not follow");
     fault_server_kill(server);
     must_not_open(fault_server_url(server, "/model"), STRL_ERR_NETWORK, "the server cannot be reached");
     fault_server_destroy(server);

@@ -19,9 +19,13 @@ static strl__http_fields parse(const char *const *lines)
 static void the_fields_of_a_good_answer_are_read_in_any_case_and_spacing(void **state)
 {
     (void)state;
-    const char *const lines[] = {"HTTP/1.1 206 Partial Content\r\n", "CONTENT-RANGE:bytes 0-4095/123456\r\n",
-                                 "etag:   \"abc-1\"  \r\n", "Last-Modified: Sun, 06 Nov 1994 08:49:37 GMT\r\n",
-                                 "Content-Encoding: Identity\r\n", "\r\n", NULL};
+    const char *const lines[] = {"HTTP/1.1 206 Partial Content\r\n",
+                                 "CONTENT-RANGE:bytes 0-4095/123456\r\n",
+                                 "etag:   \"abc-1\"  \r\n",
+                                 "Last-Modified: Sun, 06 Nov 1994 08:49:37 GMT\r\n",
+                                 "Content-Encoding: Identity\r\n",
+                                 "\r\n",
+                                 NULL};
     strl__http_fields fields = parse(lines);
     assert_int_equal(fields.status, 206);
     assert_true(fields.has_range && fields.range_known && fields.total_known);
@@ -36,8 +40,9 @@ static void the_fields_of_a_good_answer_are_read_in_any_case_and_spacing(void **
 static void a_status_line_forgets_the_answer_before_it(void **state)
 {
     (void)state;
-    const char *const lines[] = {"HTTP/1.1 302 Found", "Content-Range: bytes 0-1/2", "ETag: \"a\"", "Content-Encoding: gzip",
-                                 "HTTP/2 206", NULL};
+    const char *const lines[] = {"HTTP/1.1 302 Found", "Content-Range: bytes 0-1/2",
+                                 "ETag: \"a\"",        "Content-Encoding: gzip",
+                                 "HTTP/2 206",         NULL};
     strl__http_fields fields = parse(lines);
     assert_int_equal(fields.status, 206);
     assert_false(fields.has_range);
@@ -48,11 +53,25 @@ static void a_status_line_forgets_the_answer_before_it(void **state)
 static void ranges_that_contradict_themselves_are_not_known(void **state)
 {
     (void)state;
-    static const char *const wrong[] = {
-        "", "bytes", "bytes ", "bytes 0-1", "bytes 0-1/*", "bytes 5-4/10", "bytes 0-10/10", "bytes -1-5/10",
-        "bytes 0-1/10 ", "bytes 0 - 1/10", "items 0-1/10", "bytes 0-1/10,bytes 2-3/10",
-        "bytes 0-1/99999999999999999999", "bytes 0-18446744073709551616/18446744073709551617", "bytes 0x0-1/10",
-        "bytes 0-1/", "bytes /10", "bytes */x", "bytes 0-0/0"};
+    static const char *const wrong[] = {"",
+                                        "bytes",
+                                        "bytes ",
+                                        "bytes 0-1",
+                                        "bytes 0-1/*",
+                                        "bytes 5-4/10",
+                                        "bytes 0-10/10",
+                                        "bytes -1-5/10",
+                                        "bytes 0-1/10 ",
+                                        "bytes 0 - 1/10",
+                                        "items 0-1/10",
+                                        "bytes 0-1/10,bytes 2-3/10",
+                                        "bytes 0-1/99999999999999999999",
+                                        "bytes 0-18446744073709551616/18446744073709551617",
+                                        "bytes 0x0-1/10",
+                                        "bytes 0-1/",
+                                        "bytes /10",
+                                        "bytes */x",
+                                        "bytes 0-0/0"};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         strl__http_fields fields = {0};
         bool trimmed_good = strcmp(wrong[i], "bytes 0-1/10 ") == 0; /* the end of a line is no part of it */
@@ -72,7 +91,8 @@ static void only_strong_entity_tags_that_can_be_sent_back_are_taken(void **state
     char tag[16];
     assert_true(strl__http_parse_etag("\"\"", 2, tag, sizeof tag));
     assert_string_equal(tag, "\"\"");
-    static const char *const wrong[] = {"W/\"a\"", "a", "\"a", "\"", "\"a\"b\"", "\"a b\"", "\"a\nb\"", "\"0123456789abcdef\"", ""};
+    static const char *const wrong[] = {
+        "W/\"a\"", "a", "\"a", "\"", "\"a\"b\"", "\"a b\"", "\"a\nb\"", "\"0123456789abcdef\"", ""};
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {
         assert_false(strl__http_parse_etag(wrong[i], strlen(wrong[i]), tag, sizeof tag));
         assert_string_equal(tag, "");
@@ -104,7 +124,8 @@ static strl__http_fields good_answer(void)
                                .identity = {.total = 1000, .etag = "\"a\"", .modified = "then"}};
 }
 
-static void check(const strl__http_asked *to, const strl__http_fields *answer, strl__http_verdict verdict, const char *words)
+static void check(const strl__http_asked *to, const strl__http_fields *answer, strl__http_verdict verdict,
+                  const char *words)
 {
     strl_error err = {0};
     assert_int_equal(strl__http_judge(to, answer, &err), verdict);

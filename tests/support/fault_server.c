@@ -227,7 +227,8 @@ static bool answer_model(fault_server *server, int socket, fault_request *reques
         return send_text(socket, "HTTP/1.1 200 OK\r\nContent-Length: %zu\r\n\r\n", content.size) &&
                send_body(server, socket, &rule, content.data, content.size);
     if (request->asked.first >= content.size)
-        return send_text(socket, "HTTP/1.1 416 No\r\nContent-Range: bytes */%zu\r\nContent-Length: 0\r\n\r\n", content.size);
+        return send_text(socket, "HTTP/1.1 416 No\r\nContent-Range: bytes */%zu\r\nContent-Length: 0\r\n\r\n",
+                         content.size);
     return send_range(server, socket, &content, &rule, request);
 }
 

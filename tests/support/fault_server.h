@@ -1,5 +1,5 @@
-/* A small web server of one file on 127.0.0.1 that does what a test tells it, well or badly. It answers byte ranges, keeps
- * connections open, knows If-Match and If-Unmodified-Since, and remembers what it was asked for.
+/* A small web server of one file on 127.0.0.1 that does what a test tells it, well or badly. It answers byte
+ * ranges, keeps connections open, knows If-Match and If-Unmodified-Since, and remembers what it was asked for.
  *
  *     /model      the file                     /redirect   302 to /model
  *     /loop       302 to itself                /elsewhere  302 to an address that is not http
@@ -17,17 +17,17 @@ typedef struct fault_server fault_server;
 
 /* What to do with one request. Zero: as it should be. */
 typedef struct fault_rule {
-    unsigned status;        /* instead of 206, without the file */
-    bool whole;             /* 200 and all of the file, as a server does that knows no ranges */
-    bool cut, stall;        /* after `after` bytes of the body: the connection is closed; nothing comes any more */
+    unsigned status; /* instead of 206, without the file */
+    bool whole;      /* 200 and all of the file, as a server does that knows no ranges */
+    bool cut, stall; /* after `after` bytes of the body: the connection is closed; nothing comes any more */
     uint64_t after;
-    unsigned delay_ms;      /* before the answer */
-    int shift;              /* of the range that is said and sent */
-    int longer;             /* bytes behind the range that is asked for */
-    bool wrong_bytes;       /* every byte is another */
-    bool no_range_field;    /* Content-Range is left out */
+    unsigned delay_ms;   /* before the answer */
+    int shift;           /* of the range that is said and sent */
+    int longer;          /* bytes behind the range that is asked for */
+    bool wrong_bytes;    /* every byte is another */
+    bool no_range_field; /* Content-Range is left out */
     bool endless_header;
-    const char *field;      /* a further line of the header, without its end; NULL = none */
+    const char *field; /* a further line of the header, without its end; NULL = none */
 } fault_rule;
 
 /* One request for /model. */
@@ -44,8 +44,8 @@ typedef fault_rule (*fault_script)(void *context, unsigned number, const fault_a
 typedef struct fault_content {
     const uint8_t *data;
     size_t size;
-    const char *etag;     /* with its quotes; NULL = none */
-    const char *modified; /* NULL = none */
+    const char *etag;       /* with its quotes; NULL = none */
+    const char *modified;   /* NULL = none */
     bool ignore_conditions; /* answers 206 whatever If-Match says */
 } fault_content;
 

@@ -1,5 +1,5 @@
-/* The walk over a slow link: what it asks for, in which order, and what it lets go. The link is made of numbers, not of time: a
- * source that says how much it has room for, and brings so many bytes a frame. */
+/* The walk over a slow link: what it asks for, in which order, and what it lets go. The link is made of numbers,
+ * not of time: a source that says how much it has room for, and brings so many bytes a frame. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>

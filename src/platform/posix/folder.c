@@ -26,8 +26,8 @@ uint64_t strl_folder_now_ns(void)
     return nanoseconds(&now);
 }
 
-strl_status strl_folder_visit(const char *path, bool (*visit)(void *context, const strl_folder_entry *entry), void *context,
-                              strl_error *err)
+strl_status strl_folder_visit(const char *path, bool (*visit)(void *context, const strl_folder_entry *entry),
+                              void *context, strl_error *err)
 {
     DIR *folder = opendir(path);
     if (!folder)
@@ -57,7 +57,8 @@ static strl_status write_pieces(strl_file *file, const strl_folder_piece *pieces
 }
 
 /* Writes to `temporary`, whose last 13 characters are XXXXXXXX.part, and renames. */
-static strl_status put(char *temporary, const char *target, const strl_folder_piece *pieces, size_t count, strl_error *err)
+static strl_status put(char *temporary, const char *target, const strl_folder_piece *pieces, size_t count,
+                       strl_error *err)
 {
     strl_file *file = NULL;
     strl_status status = strl__file_create_unique(temporary, strlen(temporary) - 13, target, &file, err);
