@@ -96,7 +96,7 @@ static strl_status walk_once(const strl_bench *bench, walk_bench *self, bool sel
 
 static strl_status open_walk(strl_bench *bench, walk_bench *self, strl_error *err)
 {
-    const strl_render_model_desc desc = {.path = bench->container,
+    const strl_render_model_desc desc = {.location = {.name = bench->container},
                                          .realtime = true,
                                          .error_px = ERROR_PX,
                                          .memory_bytes = MEMORY_BYTES,

@@ -17,6 +17,7 @@
 #include "platform/file.h"
 #include "platform/output.h"
 #include "progress.h"
+#include "remote.h"
 
 #define TRIANGLE_BYTES 13u /* u8 count, 3 u32 */
 
@@ -278,6 +279,8 @@ static int run(strl_cli_args *args)
 {
     extraction self = {0};
     strl_cli_list models;
+    strl_cli_remote remote = {0};
+    strl_location location;
     const strl_cli_option options[] = {
         {.name = "error",
          .letter = 'e',
@@ -295,6 +298,7 @@ static int run(strl_cli_args *args)
          .argument = "FILE.ply",
          .required = true,
          .help = "the PLY file to write"},
+        STRL_CLI_REMOTE_OPTIONS(&remote),
     };
     const strl_cli_usage usage = {
         .positional = "MODEL", .least = 1, .most = 1, .options = options, .option_count = STRL_CLI_COUNT_OF(options)};
@@ -309,7 +313,9 @@ static int run(strl_cli_args *args)
     if (status == STRL_OK)
         status = strl_output_check(self.path, &err);
     if (status == STRL_OK)
-        status = strl_container_open_path(models.items[0], &self.container, &err);
+        status = strl_cli_locate(&remote, models.items[0], &location, &err);
+    if (status == STRL_OK)
+        status = strl_location_open_container(&location, &self.container, &err);
     if (status == STRL_OK)
         status = extract(&self, &err);
     release(&self);

@@ -8,6 +8,7 @@
 #include "base/fail.h"
 #include "container/container.h"
 #include "options.h"
+#include "remote.h"
 
 #define MOST_GROUP_SIZE 32u /* larger groups are counted together */
 
@@ -316,9 +317,12 @@ static strl_status describe(strl_container *container, const char *path, bool as
 static int run(strl_cli_args *args)
 {
     bool as_json = false;
+    strl_cli_remote remote = {0};
+    strl_location location;
     strl_cli_list models;
     const strl_cli_option options[] = {
         {.name = "json", .kind = STRL_CLI_FLAG, .value = &as_json, .help = "print one JSON object"},
+        STRL_CLI_REMOTE_OPTIONS(&remote),
     };
     const strl_cli_usage usage = {
         .positional = "MODEL",
@@ -333,8 +337,10 @@ static int run(strl_cli_args *args)
     if (stop >= 0)
         return stop;
     strl_error err;
-    strl_container *container;
-    strl_status status = strl_container_open_path(models.items[0], &container, &err);
+    strl_container *container = NULL;
+    strl_status status = strl_cli_locate(&remote, models.items[0], &location, &err);
+    if (status == STRL_OK)
+        status = strl_location_open_container(&location, &container, &err);
     if (status == STRL_OK)
         status = describe(container, models.items[0], as_json, &err);
     strl_container_close(container);

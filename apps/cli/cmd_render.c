@@ -10,6 +10,7 @@
 #include "options.h"
 #include "platform/thread.h"
 #include "progress.h"
+#include "remote.h"
 #include "render_model.h"
 #include "render_output.h"
 #include "shared/camera_path.h"
@@ -26,6 +27,7 @@ typedef struct render_options {
     double error_px, splat_px, fps;
     bool full, realtime, depth, wireframe, flat, no_occlusion, frames_given, quiet;
     int backend, debug;
+    strl_cli_remote remote;
 } render_options;
 
 static const char *const backend_words = "auto|gl45|gl3|null|gles";
@@ -185,16 +187,17 @@ static strl_status open_renderer(const render_options *o, strl_renderer **render
 }
 
 /* *camera_wrong: it is the specification of the camera that fails. */
-static strl_status render(const render_options *o, strl_cli_progress *progress, bool *camera_wrong, strl_error *err)
+static strl_status render(render_options *o, strl_cli_progress *progress, bool *camera_wrong, strl_error *err)
 {
     strl_render_model *model = NULL;
     strl_renderer *renderer = NULL;
     strl_camera_path path = {0};
-    const strl_render_model_desc desc = {.path = o->input, .full = o->full, .realtime = o->realtime,
-                                         .error_px = o->error_px, .splat_px = o->splat_px, .memory_bytes = o->memory_bytes,
-                                         .progress = progress};
+    strl_render_model_desc desc = {.full = o->full, .realtime = o->realtime, .error_px = o->error_px, .splat_px = o->splat_px,
+                                   .memory_bytes = o->memory_bytes, .progress = progress};
     strl_cli_catch_interrupts();
     strl_status status = check_outputs(o, err);
+    if (status == STRL_OK)
+        status = strl_cli_locate(&o->remote, o->input, &desc.location, err);
     if (status == STRL_OK)
         status = open_renderer(o, &renderer, err);
     if (status == STRL_OK)
@@ -273,6 +276,7 @@ static int parse(strl_cli_args *args, render_options *o)
          .help = "where images go: frame_00000.png ..., contact.png and path.json in a folder"},
         {.name = "stats", .kind = STRL_CLI_STRING, .value = &o->stats, .argument = "FILE.jsonl",
          .help = "one JSON object a frame"},
+        STRL_CLI_REMOTE_OPTIONS(&o->remote),
         {.name = "backend", .kind = STRL_CLI_ENUM, .value = &o->backend, .argument = backend_words,
          .help = "what draws (auto)"},
         {.name = "debug", .kind = STRL_CLI_ENUM, .value = &o->debug, .argument = "none|cluster|level|error",
@@ -282,7 +286,8 @@ static int parse(strl_cli_args *args, render_options *o)
     };
     const strl_cli_usage usage = {
         .positional = "MODEL", .least = 1, .most = 1, .options = options, .option_count = STRL_CLI_COUNT_OF(options),
-        .notes = "MODEL is a container, or with --full also a PLY, STL, OBJ or glTF file. In the lines of --stats "
+        .notes = "MODEL is a container, as a file or behind http:// or https://, or with --full also a PLY, STL, OBJ or glTF\n"
+                 "file. In the lines of --stats "
                  "max_error_px is the\n"
                  "largest pixel error of what was drawn, and null where the eye is inside a node's box: no pixel "
                  "error\n"

@@ -2,11 +2,12 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 
 #include "coarse.h"
 #include "options.h"
+#include "remote.h"
 #include "stroll/render.h"
+#include "user_folder.h"
 #include "viewer/viewer.h"
 
 /* All frames of a session. */
@@ -43,7 +44,7 @@ static void print_session(const session *all)
 }
 
 /* Fills desc from the command line. Returns as strl_cli_parse does. */
-static int parse(strl_cli_args *args, strl_viewer_desc *desc)
+static int parse(strl_cli_args *args, strl_viewer_desc *desc, strl_cli_remote *remote)
 {
     static const strl_backend backends[] = {STRL_BACKEND_DEFAULT, STRL_BACKEND_GL45, STRL_BACKEND_GL3};
     int backend = 0;
@@ -68,32 +69,19 @@ static int parse(strl_cli_args *args, strl_viewer_desc *desc)
          .help = "write what is opened, picked and measured, one JSON object a line"},
         {.name = "backend", .kind = STRL_CLI_ENUM, .value = &backend, .argument = "auto|gl45|gl3",
          .help = "what draws (auto)"},
+        STRL_CLI_REMOTE_OPTIONS(remote),
     };
     char notes[2048];
-    snprintf(notes, sizeof notes, "MODEL is a container. In the window:\n\n%s", strl_viewer_keys);
+    snprintf(notes, sizeof notes, "MODEL is a container, as a file or behind http:// or https://. In the window:\n\n%s", strl_viewer_keys);
     const strl_cli_usage usage = {.positional = "MODEL", .least = 1, .most = 1, .notes = notes, .options = options,
                                   .option_count = STRL_CLI_COUNT_OF(options)};
     strl_cli_list inputs;
     int stop = strl_cli_parse(args, &usage, &inputs);
     if (stop < 0) {
-        desc->path = inputs.items[0];
+        desc->location.name = inputs.items[0];
         desc->backend = backends[backend];
     }
     return stop;
-}
-
-/* DIR/stroll/NAME in the folder that the variable names, else in its default below the home folder; "" where there is
- * none. */
-static void user_file(char *path, size_t size, const char *variable, const char *below_home, const char *name)
-{
-    const char *folder = getenv(variable), *home = getenv("HOME");
-    int bytes = 0;
-    if (folder && folder[0] == '/') /* others are to be ignored, says the XDG specification */
-        bytes = snprintf(path, size, "%s/stroll%s", folder, name);
-    else if (home && home[0])
-        bytes = snprintf(path, size, "%s/%s/stroll%s", home, below_home, name);
-    if (bytes <= 0 || (size_t)bytes >= size)
-        path[0] = 0;
 }
 
 static int run(strl_cli_args *args)
@@ -101,16 +89,18 @@ static int run(strl_cli_args *args)
     session all = {0};
     strl_error err = {0};
     char settings[4096], cache[4096];
+    strl_cli_remote remote = {0};
     strl_viewer_desc desc = {.shown = add_frame, .context = &all};
-    int stop = parse(args, &desc);
+    int stop = parse(args, &desc, &remote);
     if (stop >= 0)
         return stop;
-    user_file(settings, sizeof settings, "XDG_CONFIG_HOME", ".config", "/viewer.json");
-    user_file(cache, sizeof cache, "XDG_CACHE_HOME", ".cache", "");
+    strl_cli_user_path(settings, sizeof settings, "XDG_CONFIG_HOME", ".config", "/viewer.json");
+    strl_cli_cache_folder(cache, sizeof cache);
     /* A window that closes by itself is a measurement: it depends on nothing that somebody did before. */
     desc.settings = settings[0] && desc.frames == 0 ? settings : NULL;
     desc.cache = cache[0] ? cache : NULL;
-    if (strl_viewer_run(&desc, &err) != STRL_OK)
+    if (strl_cli_locate(&remote, desc.location.name, &desc.location, &err) != STRL_OK ||
+        strl_viewer_run(&desc, &err) != STRL_OK)
         return strl_cli_fail(&err);
     if (args->quiet)
         return 0;

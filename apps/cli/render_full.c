@@ -178,7 +178,7 @@ strl_status strl_render_full_open(const strl_render_model_desc *desc, strl_rende
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a model");
     self->base.klass = &full_class;
     strl_arena_init(&self->arena, 0);
-    strl_status status = strl_container_open_path(desc->path, &self->container, err);
+    strl_status status = strl_location_open_container(&desc->location, &self->container, err);
     if (status == STRL_OK)
         status = strl_render_container_facts(self->container, &self->base, err);
     if (status != STRL_OK) {

@@ -1,35 +1,16 @@
 #include "render_model.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "base/fail.h"
-#include "container/layout.h"
-#include "platform/file.h"
 
 #define LEAST_NEAR 1e-6
-
-static strl_status is_container(const char *path, bool *answer, strl_error *err)
-{
-    strl_file *file = NULL;
-    char magic[8];
-    size_t got = 0;
-    strl_status status = strl_file_open(path, &file, err);
-    if (status == STRL_OK)
-        status = strl_file_read_some(file, 0, magic, sizeof magic, &got, err);
-    *answer = status == STRL_OK && got == sizeof magic && memcmp(magic, STRL__MAGIC, sizeof magic) == 0;
-    strl_file_close(file, NULL);
-    return status;
-}
 
 strl_status strl_render_model_open(const strl_render_model_desc *desc, strl_render_model **model, strl_error *err)
 {
     *model = NULL;
-    if (strstr(desc->path, "://"))
-        return strl__fail(err, STRL_ERR_UNSUPPORTED,
-                          "%s: models behind an address are not supported yet, expected a file", desc->path);
     bool container;
-    strl_status status = is_container(desc->path, &container, err);
+    strl_status status = strl_location_is_container(&desc->location, &container, err);
     if (status != STRL_OK)
         return status;
     if (container)
@@ -38,7 +19,7 @@ strl_status strl_render_model_open(const strl_render_model_desc *desc, strl_rend
         return strl__fail(err, STRL_ERR_ARGUMENT,
                           "%s is not a container: build one first (stroll build), or draw its triangles as read "
                           "with --full",
-                          desc->path);
+                          desc->location.name);
     return strl_render_soup_open(desc, model, err);
 }
 

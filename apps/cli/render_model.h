@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #include "progress.h"
+#include "shared/location.h"
 #include "stroll/error.h"
 #include "stroll/frame.h"
 #include "stroll/render.h"
@@ -23,6 +24,8 @@ typedef struct strl_image_stats {
     uint64_t disk_waits;  /* of the drawing thread between camera and finished pixels, see strl_thread_disk_waits */
     uint64_t faults;      /* reads and pages that failed so far: their nodes stay coarse */
     char last_fault[256]; /* the newest one's sentence; empty = none */
+    bool remote;
+    strl_network_stats network; /* since the model was opened */
 } strl_image_stats;
 
 typedef struct strl_render_model strl_render_model;
@@ -42,7 +45,7 @@ struct strl_render_model {
 };
 
 typedef struct strl_render_model_desc {
-    const char *path;
+    strl_location location;
     bool full;             /* a container's finest level; an input file can be drawn in no other way */
     bool realtime;         /* a walk that never waits */
     double error_px, splat_px;
@@ -50,7 +53,7 @@ typedef struct strl_render_model_desc {
     strl_cli_progress *progress;
 } strl_render_model_desc;
 
-/* Recognises by content what the file is. */
+/* Recognises by content what the file is; an address is taken for a container. */
 strl_status strl_render_model_open(const strl_render_model_desc *desc, strl_render_model **model, strl_error *err);
 
 strl_status strl_render_soup_open(const strl_render_model_desc *desc, strl_render_model **model, strl_error *err);

@@ -164,6 +164,18 @@ static json_t *real_or_null(double value)
     return isfinite(value) ? json_real(value) : json_null();
 }
 
+/* Since the model was opened, like faults: what is of interest are differences and the last line. */
+static int add_network(json_t *line, const strl_network_stats *n)
+{
+    json_t *network = json_pack("{s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:f,s:f}", "requests", (json_int_t)n->requests, "reads",
+                                (json_int_t)n->reads, "merged_reads", (json_int_t)n->merged_reads, "retries",
+                                (json_int_t)n->retries, "failures", (json_int_t)n->failures, "bytes",
+                                (json_int_t)n->bytes, "cache_hits", (json_int_t)n->cache_hits, "cache_bytes",
+                                (json_int_t)n->cache_bytes, "latency_ms", (double)n->latency_ns * 1e-6,
+                                "bytes_per_second", n->bytes_per_second);
+    return json_object_set_new(line, "network", network);
+}
+
 static strl_status write_stats(strl_render_output *output, size_t frame, const strl_image_stats *s, strl_error *err)
 {
     /* cull_ms: frustum culling is part of selecting; occlusion will have a stage of its own. */
@@ -195,6 +207,8 @@ static strl_status write_stats(strl_render_output *output, size_t frame, const s
     failed |= json_object_set_new(line, "max_error_px", real_or_null(s->max_error_px));
     failed |= json_object_set_new(line, "allowed_error_px", real_or_null(s->allowed_error_px));
     failed |= json_object_set_new(line, "last_fault", json_string(s->last_fault));
+    if (s->remote)
+        failed |= add_network(line, &s->network);
     if (!failed)
         failed = json_dumpf(line, output->stats_stream, JSON_COMPACT | JSON_REAL_PRECISION(8)) != 0 ||
                  fputc('\n', output->stats_stream) == EOF;

@@ -242,7 +242,7 @@ static strl_status load_soup(soup_model *model, const strl_render_model_desc *de
     soup_load load = {.model = model, .progress = desc->progress};
     strl_reader_info info;
     const char *scratch = getenv("TMPDIR");
-    const strl_reader_desc reading = {.path = desc->path,
+    const strl_reader_desc reading = {.path = desc->location.name,
                                       .scratch_dir = scratch ? scratch : "/tmp",
                                       .child = {.importer = strl_importer(), .go_on = go_on, .context = desc->progress}};
     strl_status status = strl_reader_open(&reading, &load.reader, err);
@@ -253,7 +253,7 @@ static strl_status load_soup(soup_model *model, const strl_render_model_desc *de
     model->base.up_axis = (unsigned)info.default_up;
     status = read_pass(&load, "read", take_bounds, err);
     if (status == STRL_OK && load.triangles == 0)
-        status = strl__fail(err, STRL_ERR_FORMAT, "%s has no triangle to draw", desc->path);
+        status = strl__fail(err, STRL_ERR_FORMAT, "%s has no triangle to draw", desc->location.name);
     if (status == STRL_OK && load.lacks_normals)
         status = make_normals(&load, err);
     if (status == STRL_OK)

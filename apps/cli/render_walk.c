@@ -15,8 +15,11 @@
 
 #define READ_THREADS 2u
 #define WAIT_NS 200000u
-/* Fronts without any answer after which a settled image is given up: two seconds of nothing. */
-#define MOST_IDLE_FRONTS 10000u
+#define QUIET_FRONTS 16u /* without news double the wait, */
+#define MOST_DOUBLINGS 4u /* so often: a network takes its time */
+/* Fronts after which a settled image is given up where nothing is under way: two seconds of nothing. What is under way is
+ * answered: a source that fails says so in its time. */
+#define MOST_IDLE_FRONTS 650u
 
 typedef struct walk_model {
     strl_render_model base;
@@ -39,11 +42,17 @@ static strl_status fail_unsettled(const strl_walk_stats *stats, strl_error *err)
                       stats->last_fault);
 }
 
+static void wait_for_news(uint32_t quiet)
+{
+    uint32_t doublings = quiet / QUIET_FRONTS;
+    strl_sleep_ns(WAIT_NS << (doublings < MOST_DOUBLINGS ? doublings : MOST_DOUBLINGS));
+}
+
 /* Selects until nothing is missing. */
 static strl_status settle(walk_model *self, const strl_camera *camera, strl_draw_list *list, strl_image_stats *stats,
                           strl_error *err)
 {
-    uint32_t idle = 0;
+    uint32_t quiet = 0, idle = 0;
     for (;;) {
         strl_status status = strl_walk_frame(self->walk, camera, list, err);
         const strl_walk_stats *now = strl_walk_get_stats(self->walk);
@@ -57,11 +66,12 @@ static strl_status settle(walk_model *self, const strl_camera *camera, strl_draw
         if (status != STRL_OK)
             return status;
         bool busy = now->bytes_read || now->splits || now->collapses || now->vertex_splits || now->vertex_collapses;
-        idle = busy ? 0 : idle + 1;
+        quiet = busy ? 0 : quiet + 1;
+        idle = busy || now->requests_pending ? 0 : idle + 1;
         if (idle > MOST_IDLE_FRONTS)
             return fail_unsettled(now, err);
         if (!busy)
-            strl_sleep_ns(WAIT_NS);
+            wait_for_news(quiet);
     }
 }
 
@@ -74,6 +84,8 @@ static void fill_stats(const strl_walk_stats *walk, strl_image_stats *stats)
     stats->max_error_px = walk->max_error_px;
     stats->allowed_error_px = walk->allowed_error_px;
     stats->faults = walk->faults;
+    stats->remote = walk->remote;
+    stats->network = walk->network;
     memcpy(stats->last_fault, walk->last_fault, sizeof stats->last_fault);
 }
 
@@ -114,32 +126,22 @@ static void walk_close(strl_render_model *model)
 
 static const strl_render_model_class walk_class = {.draw = walk_draw, .idle = walk_idle, .close = walk_close};
 
-/* Up axis and unit are not the walk's business: taken from the header by the blocking reader. */
-static strl_status read_facts(const char *path, strl_render_model *model, strl_error *err)
-{
-    strl_container *container = NULL;
-    strl_status status = strl_container_open_path(path, &container, err);
-    if (status == STRL_OK)
-        status = strl_render_container_facts(container, model, err);
-    strl_container_close(container);
-    return status;
-}
-
 static strl_status open_walk(walk_model *self, const strl_render_model_desc *desc, strl_error *err)
 {
     strl_source *source = NULL;
     unsigned processors = strl_cpu_count();
-    strl_status status = read_facts(desc->path, &self->base, err);
+    strl_status status = strl_pool_create(processors > 1 ? processors - 1 : 1, &self->pool, err);
     if (status == STRL_OK)
-        status = strl_pool_create(processors > 1 ? processors - 1 : 1, &self->pool, err);
-    if (status == STRL_OK)
-        status = strl_source_open_file(desc->path, READ_THREADS, &source, err);
+        status = strl_location_open_source(&desc->location, READ_THREADS, &source, err);
     if (status != STRL_OK)
         return status;
     self->executor = (strl_executor){self->pool, submit};
     const strl_walk_desc walk = {
         .memory_bytes = desc->memory_bytes, .error_px = desc->error_px, .splat_px = desc->splat_px, .executor = &self->executor};
-    return strl_walk_open(source, &walk, &self->walk, err);
+    status = strl_walk_open(source, &walk, &self->walk, err);
+    if (status == STRL_OK) /* up axis and unit are not the walk's business */
+        status = strl_render_container_facts(strl_walk_container(self->walk), &self->base, err);
+    return status;
 }
 
 strl_status strl_render_walk_open(const strl_render_model_desc *desc, strl_render_model **model, strl_error *err)
@@ -149,8 +151,8 @@ strl_status strl_render_walk_open(const strl_render_model_desc *desc, strl_rende
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a model");
     self->base.klass = &walk_class;
     self->realtime = desc->realtime;
-    self->path = desc->path;
-    strl_status status = strl_name_file(desc->path, open_walk(self, desc, err), err);
+    self->path = desc->location.name;
+    strl_status status = strl_name_file(self->path, open_walk(self, desc, err), err);
     if (status != STRL_OK) {
         walk_close(&self->base);
         return status;

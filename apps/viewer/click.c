@@ -130,13 +130,14 @@ void strl__viewer_look(strl__viewer *v)
 {
     double bounds[6], share;
     strl_error err = {0};
+    const strl_location location = strl__viewer_locate(v, v->path);
     if (v->parts.selected_count == 0) {
         look_at_pick(v);
     } else if (v->index && strl_part_index_is_done(v->index, &share)) {
         look_by_index(v);
     } else if (strl_pick_style_bounds(&v->list, v->parts.styles, v->parts.tree.part_count, STRL_PART_MARKED, bounds)) {
         look_at(v, bounds);
-    } else if (v->index || strl_part_index_create(v->path, v->parts.tree.part_count, &v->index, &err) == STRL_OK) {
+    } else if (v->index || strl_part_index_create(&location, v->parts.tree.part_count, &v->index, &err) == STRL_OK) {
         v->look_waits = true;
         strl__viewer_say(v, "looking for it in the whole model");
     } else {

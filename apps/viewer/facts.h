@@ -18,6 +18,8 @@ typedef struct strl_gui_facts {
     uint32_t nodes, nodes_culled, draws, requests, missing_nodes;
     double allowed_error_px, max_error_px;
     double speed;            /* of flying and walking, world units a second */
+    bool remote;             /* the model is: then the next two are of its link */
+    double megabits_per_second, latency_ms;
     const char *last_fault;  /* empty = none */
     const char *message;     /* empty = none */
     const char *keys;        /* the help's lines */

@@ -12,13 +12,21 @@ static strl_status name_part(void *context, uint32_t part, char *name, size_t si
     return strl_container_part(context, part, name, size, err);
 }
 
+strl_location strl__viewer_locate(const strl__viewer *v, const char *path)
+{
+    strl_location location = v->desc.location; /* whose cache serves whatever is opened */
+    location.name = path;
+    return location;
+}
+
 static strl_status open_walk(const strl__viewer *v, const char *path, strl_viewer_model **out, strl_error *err)
 {
     strl_viewer_model *model = strl__alloc_zero(1, sizeof *model);
     *out = NULL;
     if (!model)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a model");
-    strl_status status = strl_viewer_model_open(model, path, v->desc.memory_bytes, v->desc.error_px, err);
+    const strl_location location = strl__viewer_locate(v, path);
+    strl_status status = strl_viewer_model_open(model, &location, v->desc.memory_bytes, v->desc.error_px, err);
     if (status == STRL_OK)
         *out = model;
     else

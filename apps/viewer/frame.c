@@ -78,6 +78,9 @@ static void gather_statistics(const strl__viewer *v, const strl_render_stats *dr
     facts->missing_nodes = walk->missing_nodes;
     facts->allowed_error_px = walk->allowed_error_px;
     facts->max_error_px = walk->max_error_px;
+    facts->remote = walk->remote;
+    facts->megabits_per_second = walk->network.bytes_per_second * 8e-6;
+    facts->latency_ms = (double)walk->network.latency_ns * 1e-6;
     facts->last_fault = walk->last_fault;
 }
 

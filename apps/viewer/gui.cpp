@@ -215,6 +215,10 @@ void show_statistics(const strl_gui_facts *facts)
         real_row("largest error", "%.2f px", facts->max_error_px);
     else
         row("largest error", "unbounded"); /* the eye stands in a node's box */
+    if (facts->remote) {
+        real_row("network", "%.1f Mbit/s", facts->megabits_per_second);
+        real_row("latency", "%.1f ms", facts->latency_ms);
+    }
     if (facts->faults)
         count_row("faults", facts->faults);
     ImGui::EndTable();

@@ -27,8 +27,8 @@ typedef struct strl__frame_clock {
 } strl__frame_clock;
 
 typedef struct strl__viewer {
-    strl_viewer_desc desc; /* completed: no defaults left; path is `path` */
-    char path[4096];
+    strl_viewer_desc desc; /* completed: no defaults left */
+    char path[4096]; /* of the model that is open, or its address */
     strl_viewer_desc begun;   /* as completed at the start: what has changed since then is remembered */
     strl_viewer_model *model; /* owned; never NULL while the window is open */
     strl_window *window;
@@ -91,6 +91,7 @@ void strl__viewer_end_recording(strl__viewer *v);
 void strl__viewer_end_replay(strl__viewer *v);
 
 /* files.c */
+strl_location strl__viewer_locate(const strl__viewer *v, const char *path); /* borrows path */
 /* Instead of the model that is open; that stays on failure. The window and its context are there, or not yet. */
 strl_status strl__viewer_open_model(strl__viewer *v, const char *path, strl_error *err);
 void strl__viewer_set_title(strl__viewer *v); /* where there is a window */

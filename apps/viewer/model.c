@@ -1,12 +1,9 @@
 #include "viewer/model.h"
 
 #include <math.h>
-#include <string.h>
 
 #include "base/fail.h"
-#include "container/layout.h"
 #include "frame/view.h"
-#include "platform/file.h"
 #include "platform/thread.h"
 #include "shared/units.h"
 
@@ -14,38 +11,27 @@
 /* A near plane closer than this share of the far one wastes the digits of depth. */
 #define LEAST_NEAR 1e-6
 
-static strl_status check_kind(const char *path, strl_error *err)
+static strl_status check_kind(const strl_location *location, strl_error *err)
 {
-    strl_file *file = NULL;
-    char magic[8];
-    size_t got = 0;
-    if (strstr(path, "://"))
-        return strl__fail(err, STRL_ERR_UNSUPPORTED,
-                          "%s: models behind an address are not supported yet, expected a file", path);
-    strl_status status = strl_file_open(path, &file, err);
-    if (status == STRL_OK)
-        status = strl_file_read_some(file, 0, magic, sizeof magic, &got, err);
-    strl_file_close(file, NULL);
-    if (status == STRL_OK && (got != sizeof magic || memcmp(magic, STRL__MAGIC, sizeof magic) != 0))
+    bool container;
+    strl_status status = strl_location_is_container(location, &container, err);
+    if (status == STRL_OK && !container)
         status = strl__fail(err, STRL_ERR_ARGUMENT,
                             "%s is not a container: build one of it first "
                             "(stroll build %s -o NAME.stroll) and view that",
-                            path, path);
+                            location->name, location->name);
     return status;
 }
 
 /* The walk gives bounds; up axis, unit and counts are the header's. */
-static strl_status read_facts(strl_viewer_model *model, const char *path, strl_error *err)
+static void take_facts(strl_viewer_model *model)
 {
-    strl_status status = strl_container_open_path(path, &model->container, err);
-    if (status != STRL_OK)
-        return status;
+    model->container = strl_walk_container(model->walk);
     const strl_container_info *info = strl_container_get_info(model->container);
     model->up_axis = info->up_axis;
     model->unit_metres = strl_unit_metres(info->unit);
-    for (uint32_t t = 0; t < info->tree_count; t++)
-        model->triangles += strl_container_tree(model->container, t)->triangle_count;
-    return STRL_OK;
+    model->triangles = strl_container_triangle_count(model->container);
+    strl_walk_bounds(model->walk, model->bounds);
 }
 
 static strl_status submit(void *context, void (*run)(void *job), void *job, strl_error *err)
@@ -53,19 +39,17 @@ static strl_status submit(void *context, void (*run)(void *job), void *job, strl
     return strl_pool_submit(context, run, job, err);
 }
 
-strl_status strl_viewer_model_open(strl_viewer_model *model, const char *path, uint64_t memory_bytes, double error_px,
-                                   strl_error *err)
+strl_status strl_viewer_model_open(strl_viewer_model *model, const strl_location *location, uint64_t memory_bytes,
+                                   double error_px, strl_error *err)
 {
     *model = (strl_viewer_model){0};
     strl_source *source = NULL;
     unsigned processors = strl_cpu_count();
-    strl_status status = check_kind(path, err);
-    if (status == STRL_OK)
-        status = read_facts(model, path, err);
+    strl_status status = check_kind(location, err);
     if (status == STRL_OK)
         status = strl_pool_create(processors > 1 ? processors - 1 : 1, &model->pool, err);
     if (status == STRL_OK)
-        status = strl_source_open_file(path, READ_THREADS, &source, err);
+        status = strl_location_open_source(location, READ_THREADS, &source, err);
     if (status == STRL_OK) {
         model->executor = (strl_executor){model->pool, submit};
         const strl_walk_desc desc = {
@@ -73,7 +57,7 @@ strl_status strl_viewer_model_open(strl_viewer_model *model, const char *path, u
         status = strl_walk_open(source, &desc, &model->walk, err);
     }
     if (status == STRL_OK)
-        strl_walk_bounds(model->walk, model->bounds);
+        take_facts(model);
     else
         strl_viewer_model_close(model);
     return status;
@@ -82,7 +66,6 @@ strl_status strl_viewer_model_open(strl_viewer_model *model, const char *path, u
 void strl_viewer_model_close(strl_viewer_model *model)
 {
     strl_walk_close(model->walk);
-    strl_container_close(model->container);
     strl_pool_destroy(model->pool);
     *model = (strl_viewer_model){0};
 }

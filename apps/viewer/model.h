@@ -4,10 +4,11 @@
 
 #include "container/container.h"
 #include "jobs/pool.h"
+#include "shared/location.h"
 #include "stroll/walk.h"
 
 typedef struct strl_viewer_model {
-    strl_container *container; /* for names */
+    strl_container *container; /* the walk's; for names */
     strl_walk *walk;
     strl_pool *pool; /* decodes */
     strl_executor executor;
@@ -17,9 +18,9 @@ typedef struct strl_viewer_model {
     uint64_t triangles; /* of the finest level */
 } strl_viewer_model;
 
-/* The model stays where it is until strl_viewer_model_close. STRL_ERR_ARGUMENT where path is no container. */
-strl_status strl_viewer_model_open(strl_viewer_model *model, const char *path, uint64_t memory_bytes, double error_px,
-                                   strl_error *err);
+/* The model stays where it is until strl_viewer_model_close. STRL_ERR_ARGUMENT where the file is no container. */
+strl_status strl_viewer_model_open(strl_viewer_model *model, const strl_location *location, uint64_t memory_bytes,
+                                   double error_px, strl_error *err);
 void strl_viewer_model_close(strl_viewer_model *model);
 
 /* Near and far of a list as seen by another camera than the walk's. False where nothing visible lies before it. */

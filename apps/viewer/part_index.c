@@ -15,7 +15,8 @@
 
 struct strl_part_index {
     strl_thread *thread;
-    char *path;
+    strl_location location; /* of copies: */
+    char *path, *cache;
     uint32_t part_count;
     double (*bounds)[6];  /* [part_count], world; the thread's until done */
     double (*of_tree)[6]; /* the same in model units, of the tree at work */
@@ -124,7 +125,7 @@ static void run(void *context)
 {
     strl_part_index *index = context;
     strl_container *container = NULL;
-    index->status = strl_container_open_path(index->path, &container, &index->error);
+    index->status = strl_location_open_container(&index->location, &container, &index->error);
     if (index->status == STRL_OK)
         index->status = read_all(index, container, &index->error);
     strl_container_close(container);
@@ -133,17 +134,19 @@ static void run(void *context)
 
 /* ---- life */
 
-strl_status strl_part_index_create(const char *path, uint32_t part_count, strl_part_index **out, strl_error *err)
+strl_status strl_part_index_create(const strl_location *location, uint32_t part_count, strl_part_index **out, strl_error *err)
 {
     strl_part_index *index = strl__alloc_zero(1, sizeof *index);
     *out = NULL;
     if (!index)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to look for parts");
     index->part_count = part_count;
-    index->path = strl__strdup(path);
+    index->location = *location;
+    index->location.name = index->path = strl__strdup(location->name);
+    index->location.cache = index->cache = location->cache ? strl__strdup(location->cache) : NULL;
     index->bounds = strl__alloc(part_count, sizeof *index->bounds);
     index->of_tree = strl__alloc(part_count, sizeof *index->of_tree);
-    strl_status status = index->path && index->bounds && index->of_tree
+    strl_status status = index->path && !location->cache == !index->cache && index->bounds && index->of_tree
                              ? strl_thread_start(&index->thread, run, index, err)
                              : strl__fail(err, STRL_ERR_MEMORY, "no memory to look for %u parts", part_count);
     if (status == STRL_OK)
@@ -160,6 +163,7 @@ void strl_part_index_destroy(strl_part_index *index)
     atomic_store(&index->cancelled, true);
     strl_thread_join(index->thread);
     strl__free(index->path);
+    strl__free(index->cache);
     strl__free(index->bounds);
     strl__free(index->of_tree);
     strl__free(index);

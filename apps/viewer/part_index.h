@@ -7,11 +7,12 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "shared/location.h"
 #include "stroll/error.h"
 
 typedef struct strl_part_index strl_part_index;
 
-strl_status strl_part_index_create(const char *path, uint32_t part_count, strl_part_index **index, strl_error *err);
+strl_status strl_part_index_create(const strl_location *location, uint32_t part_count, strl_part_index **index, strl_error *err);
 void strl_part_index_destroy(strl_part_index *index); /* cancels and waits; NULL is legal */
 
 /* True once it has ended, well or not. share: of the work done, 0 to 1. */

@@ -237,7 +237,7 @@ static strl_status open_viewer(strl__viewer *v, strl_error *err)
     begin_controls(v);
     status = strl_opener_create(v->desc.cache, &v->opener, err);
     if (status == STRL_OK)
-        status = strl__viewer_open_model(v, v->desc.path, err);
+        status = strl__viewer_open_model(v, v->desc.location.name, err);
     if (status == STRL_OK && v->desc.camera_path)
         status = strl_recorder_load(&v->recorder, v->desc.camera_path, err);
     if (status == STRL_OK)

@@ -4,6 +4,7 @@
 
 #include <stdint.h>
 
+#include "shared/location.h"
 #include "stroll/error.h"
 #include "stroll/render.h"
 
@@ -17,10 +18,10 @@ typedef struct strl_viewer_frame {
     double max_error_px;         /* of what was drawn; infinite where the eye is inside a node's box */
 } strl_viewer_frame;
 
-/* Zero-initialise: every 0 but path takes what the settings remember, else its default. Strings are borrowed for the
+/* Zero-initialise: every 0 but location.name takes what the settings remember, else its default. Strings are borrowed for the
  * call. */
 typedef struct strl_viewer_desc {
-    const char *path;        /* a container */
+    strl_location location;  /* of a container */
     const char *screenshots; /* the folder where pictures and paths go, made at the first; NULL = the current one */
     const char *settings;    /* the file that remembers; NULL = nothing is remembered */
     const char *cache;       /* the folder for containers of meshes from folders that cannot be written; NULL = none */

@@ -39,7 +39,8 @@ typedef struct strl_walk_desc {
     double error_px;           /* allowed pixel error; 0 = 1 */
     double splat_px;           /* of sample trees: cells that cover no more than a square of this side are drawn as splats of it;
                                   0 = error_px. Where error_px is changed later, it changes in proportion */
-    uint32_t requests_in_flight; /* 0 = 16; at most 256 */
+    uint32_t requests_in_flight; /* 0 = 16, of a remote source 64; at most 256. Of a remote source fewer, as bandwidth and
+                                    latency want it */
     const strl_executor *executor; /* copied */
     bool labels; /* keep part, material and texture coordinate of each vertex: 12 bytes a vertex more, within memory_bytes */
 } strl_walk_desc;
@@ -63,6 +64,8 @@ typedef struct strl_walk_stats {
     double allowed_error_px;   /* error_px, or more where the budget is tight */
     float max_error_px;        /* largest claimed among visible items; infinite where the eye is inside a node's box */
     uint64_t select_ns;        /* time in strl_walk_frame */
+    bool remote;               /* the source is: then what it has done since it was opened is in `network` */
+    strl_network_stats network;
     uint64_t faults;           /* reads or pages that failed since the walk began */
     char last_fault[256];      /* the newest one's sentence; empty = none */
 } strl_walk_stats;

@@ -43,10 +43,12 @@ static strl_status read_trees(strl_container *container, strl_error *err)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for the %" PRIu32 " bytes of the trees section", ref->bytes);
     strl_status status = strl_source_read(container->source, ref->offset, bytes, ref->bytes, err);
     uint64_t found = status == STRL_OK ? strl__checksum(bytes, ref->bytes) : 0;
-    if (status == STRL_OK && found != ref->checksum)
+    if (status == STRL_OK && found != ref->checksum) {
+        strl_source_doubt(container->source, ref->offset, ref->bytes);
         status = strl__fail(err, STRL_ERR_FORMAT,
                             "section trees at byte %" PRIu64 ": checksum is %016" PRIx64 ", expected %016" PRIx64,
                             ref->offset, found, ref->checksum);
+    }
     if (status == STRL_OK)
         status = decode_trees(container, bytes, err);
     strl__free(bytes);

@@ -25,6 +25,8 @@ static strl_status load_page(strl_container *container, const strl_page_ref *pag
         status = strl_source_read(container->source, page->offset, container->page, page->bytes, err);
     if (status == STRL_OK)
         status = strl_page_check(page, container->page, page->bytes, err);
+    if (status == STRL_ERR_FORMAT)
+        strl_source_doubt(container->source, page->offset, page->bytes);
     if (status == STRL_OK)
         container->page_ref = *page;
     return status;

@@ -47,6 +47,8 @@ static strl_status read_treelet(strl_container *container, uint32_t tree, uint32
     strl_status status = strl_source_read(container->source, ref->offset, bytes, ref->bytes, err);
     if (status == STRL_OK)
         status = strl_treelet_decode(container, tree, index, ref, bytes, ref->bytes, treelet, err);
+    if (status == STRL_ERR_FORMAT)
+        strl_source_doubt(container->source, ref->offset, ref->bytes);
     strl__free(bytes);
     return status;
 }

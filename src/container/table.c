@@ -75,8 +75,10 @@ static strl_status load(strl__table *table, unsigned depth, strl_source *source,
     if (status != STRL_OK)
         return status;
     strl__page_table_page candidate = {page->data, *ref, first, end};
-    if (strl__checksum(page->data, ref->bytes) != ref->checksum)
+    if (strl__checksum(page->data, ref->bytes) != ref->checksum) {
+        strl_source_doubt(source, ref->offset, ref->bytes);
         return page_fault(table, &candidate, "its checksum is not the expected one", err);
+    }
     status = depth ? check_index(table, &candidate, err) : check_leaf(table, &candidate, err);
     if (status == STRL_OK)
         *page = candidate;

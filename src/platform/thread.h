@@ -12,9 +12,14 @@
 typedef struct strl_thread strl_thread;
 typedef pthread_mutex_t strl_mutex;
 typedef pthread_cond_t strl_condition;
+typedef pthread_once_t strl_once;
+#define STRL_ONCE_INIT PTHREAD_ONCE_INIT
 
 strl_status strl_thread_start(strl_thread **thread, void (*run)(void *context), void *context, strl_error *err);
 void strl_thread_join(strl_thread *thread); /* waits and releases; NULL is legal */
+
+/* Runs `run` in the first call of this `once`, a static of the caller's, whichever thread that is; others wait for it. */
+void strl_once_run(strl_once *once, void (*run)(void));
 
 void strl_mutex_init(strl_mutex *mutex);
 void strl_mutex_deinit(strl_mutex *mutex);

@@ -43,7 +43,12 @@ strl_status strl_source_open_callbacks(const strl_source_callbacks *callbacks, u
                                        strl_error *err)
 {
     static const strl_source_class klass = {
-        "callback", strl__fetched_submit, strl__fetched_poll, strl__fetched_cancel, callback_read, callback_close,
+        .kind = "callback",
+        .submit = strl__fetched_submit,
+        .poll = strl__fetched_poll,
+        .cancel = strl__fetched_cancel,
+        .read = callback_read,
+        .close = callback_close,
     };
     *source = NULL;
     if (!callbacks->read)

@@ -110,6 +110,21 @@ static strl_status delayed_read_now(strl_source *source, uint64_t offset, void *
     return strl_source_read(((delayed_source *)source)->inner, offset, data, size, err);
 }
 
+static uint64_t delayed_room(strl_source *source)
+{
+    return strl_source_room(((delayed_source *)source)->inner);
+}
+
+static bool delayed_network_stats(const strl_source *source, strl_network_stats *stats)
+{
+    return strl_source_get_network_stats(((const delayed_source *)source)->inner, stats);
+}
+
+static void delayed_doubt(strl_source *source, uint64_t offset, size_t size)
+{
+    strl_source_doubt(((delayed_source *)source)->inner, offset, size);
+}
+
 static void delayed_close(strl_source *source)
 {
     delayed_source *self = (delayed_source *)source;
@@ -127,7 +142,15 @@ strl_status strl_source_open_delayed(strl_source *inner, uint64_t delay_ns, unsi
                                      strl_error *err)
 {
     static const strl_source_class klass = {
-        "delayed", delayed_submit, delayed_poll, delayed_cancel, delayed_read_now, delayed_close,
+        .kind = "delayed",
+        .submit = delayed_submit,
+        .poll = delayed_poll,
+        .cancel = delayed_cancel,
+        .read = delayed_read_now,
+        .close = delayed_close,
+        .room = delayed_room,
+        .get_network_stats = delayed_network_stats,
+        .doubt = delayed_doubt,
     };
     *source = NULL;
     delayed_source *self = strl__alloc_zero(1, sizeof *self);

@@ -25,7 +25,12 @@ static void file_close(strl_source *source)
 strl_status strl_source_open_file(const char *path, unsigned threads, strl_source **source, strl_error *err)
 {
     static const strl_source_class klass = {
-        "file", strl__fetched_submit, strl__fetched_poll, strl__fetched_cancel, file_read, file_close,
+        .kind = "file",
+        .submit = strl__fetched_submit,
+        .poll = strl__fetched_poll,
+        .cancel = strl__fetched_cancel,
+        .read = file_read,
+        .close = file_close,
     };
     *source = NULL;
     file_source *self = strl__alloc_zero(1, sizeof *self);

@@ -27,7 +27,12 @@ static void memory_close(strl_source *source)
 strl_status strl_source_open_memory(const void *data, size_t size, strl_source **source, strl_error *err)
 {
     static const strl_source_class klass = {
-        "memory", strl__fetched_submit, strl__fetched_poll, strl__fetched_cancel, memory_read, memory_close,
+        .kind = "memory",
+        .submit = strl__fetched_submit,
+        .poll = strl__fetched_poll,
+        .cancel = strl__fetched_cancel,
+        .read = memory_read,
+        .close = memory_close,
     };
     *source = NULL;
     memory_source *self = strl__alloc_zero(1, sizeof *self);

@@ -39,6 +39,23 @@ strl_status strl_source_read(strl_source *source, uint64_t offset, void *data, s
     return status == STRL_OK ? source->klass->read(source, offset, data, size, err) : status;
 }
 
+uint64_t strl_source_room(strl_source *source)
+{
+    return source->klass->room ? source->klass->room(source) : UINT64_MAX;
+}
+
+void strl_source_doubt(strl_source *source, uint64_t offset, size_t size)
+{
+    if (source->klass->doubt)
+        source->klass->doubt(source, offset, size);
+}
+
+bool strl_source_get_network_stats(const strl_source *source, strl_network_stats *stats)
+{
+    *stats = (strl_network_stats){0};
+    return source->klass->get_network_stats && source->klass->get_network_stats(source, stats);
+}
+
 strl_status strl_source_fail(const strl_source *source, strl_status status, strl_error *err)
 {
     if (status == STRL_OK || !err || !source->name || strstr(err->message, source->name))

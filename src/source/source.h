@@ -20,13 +20,17 @@ typedef struct strl_source_result {
 
 /* Implementations fill this in as the first member of their own struct. */
 typedef struct strl_source_class {
-    const char *kind; /* "file", "memory", "callback", "delayed" */
+    const char *kind; /* "file", "memory", "callback", "delayed", "http" */
     strl_status (*submit)(strl_source *source, uint64_t token, uint64_t offset, size_t size, float urgency,
                           strl_error *err);
     bool (*poll)(strl_source *source, strl_source_result *result);
     void (*cancel)(strl_source *source, uint64_t token);
     strl_status (*read)(strl_source *source, uint64_t offset, void *data, size_t size, strl_error *err);
     void (*close)(strl_source *source);
+    /* Where bytes come over a network; all NULL elsewhere. */
+    uint64_t (*room)(strl_source *source);
+    bool (*get_network_stats)(const strl_source *source, strl_network_stats *stats);
+    void (*doubt)(strl_source *source, uint64_t offset, size_t size);
 } strl_source_class;
 
 struct strl_source {
@@ -46,6 +50,12 @@ bool strl_source_poll(strl_source *source, strl_source_result *result);
 void strl_source_cancel(strl_source *source, uint64_t token);
 /* Reads and waits: for opening a container and for tools, never for a frame. */
 strl_status strl_source_read(strl_source *source, uint64_t offset, void *data, size_t size, strl_error *err);
+/* How many bytes may be asked for now so that they come soon, and that what is more urgent a moment later does not have
+ * to wait behind them: follows bandwidth and latency. UINT64_MAX where there is nothing to wait for. What is submitted
+ * beyond it is served all the same. */
+uint64_t strl_source_room(strl_source *source);
+/* What this read gave was not what the reader's checksum expects: it must not come out of a cache again. */
+void strl_source_doubt(strl_source *source, uint64_t offset, size_t size);
 /* Puts the source's name before the sentence of a failure, unless there is none or it is there. Returns status. */
 strl_status strl_source_fail(const strl_source *source, strl_status status, strl_error *err);
 

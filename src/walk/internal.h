@@ -276,6 +276,7 @@ struct strl_walk {
 
     strl__request requests[STRL__MAX_REQUESTS];
     uint32_t requests_in_flight, requests_pending;
+    uint64_t room; /* bytes that the source still has room for in this frame */
     strl__job **jobs; /* owned, in order of submission */
     size_t job_count, job_capacity;
 

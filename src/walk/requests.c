@@ -208,7 +208,10 @@ static void receive_page(strl_walk *walk, strl__request *request, strl_source_re
     strl_error error = {0};
     uint32_t count = request->node_count;
     strl__page *page = NULL;
-    strl_status status = strl_page_check(&request->nodes[0]->record->page, result->data, result->size, &error);
+    const strl_page_ref *ref = &request->nodes[0]->record->page;
+    strl_status status = strl_page_check(ref, result->data, result->size, &error);
+    if (status != STRL_OK)
+        strl_source_doubt(walk->source, ref->offset, ref->bytes);
     if (status == STRL_OK && !(page = strl__alloc_zero(1, sizeof *page)))
         status = strl__fail(&error, STRL_ERR_MEMORY, "no memory for a page");
     if (status != STRL_OK) {
@@ -231,10 +234,12 @@ static void receive_page(strl_walk *walk, strl__request *request, strl_source_re
 static void receive_treelet(strl_walk *walk, strl__request *request, const strl_source_result *result)
 {
     strl_error error = {0};
-    if (strl__treelet_load(walk, request->treelet, result->data, result->size, &error) == STRL_OK)
+    if (strl__treelet_load(walk, request->treelet, result->data, result->size, &error) == STRL_OK) {
         free_slot(walk, request);
-    else
-        treelet_failed(walk, request, &error);
+        return;
+    }
+    strl_source_doubt(walk->source, request->treelet->ref.offset, request->treelet->ref.bytes);
+    treelet_failed(walk, request, &error);
 }
 
 static void receive(strl_walk *walk, strl__request *request, strl_source_result *result)
@@ -285,10 +290,15 @@ static strl__request *unanswered_page(strl_walk *walk, uint64_t offset)
     return NULL;
 }
 
-static strl__request *take_slot(strl_walk *walk, uint32_t in_flight)
+/* On a slow link the source has room for less than the slots: what could not come soon is not asked for, so that it cannot
+ * be in the way of what the camera wants by then. */
+static bool has_slot(const strl_walk *walk, uint32_t in_flight)
 {
-    if (walk->requests_pending >= in_flight)
-        return NULL;
+    return walk->requests_pending < in_flight && walk->room > 0;
+}
+
+static strl__request *take_slot(strl_walk *walk)
+{
     uint32_t i = 0;
     while (walk->requests[i].used)
         i++;
@@ -303,8 +313,10 @@ static strl_status submit(strl_walk *walk, strl__request *request, uint64_t offs
                           strl_error *err)
 {
     strl_status status = strl_source_submit(walk->source, request->token, offset, size, urgency, err);
-    if (status == STRL_OK)
+    if (status == STRL_OK) {
         walk->stats.requests++;
+        walk->room -= size < walk->room ? size : walk->room;
+    }
     return status;
 }
 
@@ -328,7 +340,7 @@ static bool ask_for_node(strl_walk *walk, const strl__candidate *candidate, uint
     if (node->residency != STRL__ABSENT)
         return true;
     strl__request *request = unanswered_page(walk, node->record->page.offset);
-    if (!request && walk->requests_pending >= in_flight)
+    if (!request && !has_slot(walk, in_flight))
         return true;
     if (!strl__node_hold(walk, node))
         return true;
@@ -337,7 +349,7 @@ static bool ask_for_node(strl_walk *walk, const strl__candidate *candidate, uint
         return false;
     }
     if (!request) {
-        request = take_slot(walk, in_flight);
+        request = take_slot(walk);
         request->prefetch = prefetch;
         submit_page(walk, request, node, candidate->urgency);
         return true;
@@ -353,8 +365,8 @@ static void ask_for_treelet(strl_walk *walk, const strl__candidate *candidate, u
 {
     const strl__treelet *parent = candidate->node->treelet;
     strl__treelet *treelet = strl__treelets_find(&walk->treelets, parent->tree, candidate->treelet);
-    if (walk->requests_pending >= in_flight ||
-        (treelet && (treelet->residency != STRL__ABSENT || treelet->retry.frame > walk->frame)))
+    if ((treelet && (treelet->residency != STRL__ABSENT || treelet->retry.frame > walk->frame)) ||
+        !has_slot(walk, in_flight))
         return;
     /* Decoding has checked that a treelet names those of all children of its nodes. */
     const strl_treelet_ref *ref = &parent->data.child_refs[candidate->treelet - parent->data.first_child_treelet];
@@ -363,7 +375,7 @@ static void ask_for_treelet(strl_walk *walk, const strl__candidate *candidate, u
     if (!treelet)
         return;
     strl_error error = {0};
-    strl__request *request = take_slot(walk, in_flight);
+    strl__request *request = take_slot(walk);
     request->treelet = treelet;
     treelet->residency = STRL__PENDING;
     if (submit(walk, request, ref->offset, ref->bytes, candidate->urgency, &error) != STRL_OK)
@@ -399,6 +411,7 @@ static void forget_stale(strl_walk *walk)
 
 void strl__requests_submit(strl_walk *walk)
 {
+    walk->room = strl_source_room(walk->source);
     ask_for_all(walk, &walk->missing, walk->requests_in_flight, walk->frame + 1, false);
     uint64_t idle_since = walk->frame > SPARE_FRAMES ? walk->frame - SPARE_FRAMES : 0;
     if (walk->missing.count == 0)

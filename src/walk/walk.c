@@ -9,6 +9,7 @@
 
 #define DEFAULT_MEMORY_BYTES ((uint64_t)512 << 20)
 #define DEFAULT_REQUESTS 16u
+#define DEFAULT_REMOTE_REQUESTS 64u /* the source says how many of them are of use now */
 #define MAX_PLACEMENTS (1u << 24) /* what a draw item's key can tell apart */
 #define AHEAD_FRAMES 15           /* how far the eye's motion is carried on for prefetching */
 #define AHEAD_EVERY 4             /* frames between two looks ahead */
@@ -101,8 +102,11 @@ static strl_status load_root_records(strl_walk *walk, uint32_t tree, strl_error 
                           " bytes",
                           tree, walk->memory_bytes);
     status = read_range(walk, ref.offset, ref.bytes, &data, err);
-    if (status == STRL_OK)
+    if (status == STRL_OK) {
         status = strl__treelet_load(walk, treelet, data, ref.bytes, err);
+        if (status == STRL_ERR_FORMAT)
+            strl_source_doubt(walk->source, ref.offset, ref.bytes);
+    }
     if (status == STRL_OK)
         walk->trees[tree].root = &treelet->nodes[0];
     strl__free(data);
@@ -127,8 +131,8 @@ static strl_status load_root(strl_walk *walk, uint32_t tree, strl_error *err)
     walk->root_bytes += bytes;
     const strl_page_ref *page = &root->record->page;
     status = read_range(walk, page->offset, page->bytes, &data, err);
-    if (status == STRL_OK)
-        status = strl_page_check(page, data, page->bytes, err);
+    if (status == STRL_OK && (status = strl_page_check(page, data, page->bytes, err)) != STRL_OK)
+        strl_source_doubt(walk->source, page->offset, page->bytes);
     if (status == STRL_OK)
         status = strl__mesh_create(root->record, data, page->bytes, NULL, walk->labels, &mesh, err);
     if (status == STRL_OK)
@@ -167,12 +171,13 @@ static void find_bounds(strl_walk *walk)
     }
 }
 
-static void apply_desc(strl_walk *walk, const strl_walk_desc *desc)
+static void apply_desc(strl_walk *walk, const strl_walk_desc *desc, strl_source *source)
 {
     const strl_walk_desc defaults = {0};
+    uint32_t requests = strl_source_room(source) == UINT64_MAX ? DEFAULT_REQUESTS : DEFAULT_REMOTE_REQUESTS;
     desc = desc ? desc : &defaults;
     walk->memory_bytes = desc->memory_bytes ? desc->memory_bytes : DEFAULT_MEMORY_BYTES;
-    walk->requests_in_flight = desc->requests_in_flight ? desc->requests_in_flight : DEFAULT_REQUESTS;
+    walk->requests_in_flight = desc->requests_in_flight ? desc->requests_in_flight : requests;
     if (walk->requests_in_flight > STRL__MAX_REQUESTS)
         walk->requests_in_flight = STRL__MAX_REQUESTS;
     if (desc->executor)
@@ -191,7 +196,7 @@ strl_status strl_walk_open(strl_source *source, const strl_walk_desc *desc, strl
         strl_source_close(source);
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a walk");
     }
-    apply_desc(walk, desc);
+    apply_desc(walk, desc, source);
     strl_status status = strl_container_open(source, &walk->container, err);
     if (status == STRL_OK) {
         walk->source = strl_container_source(walk->container);
@@ -313,6 +318,7 @@ strl_status strl_walk_frame(strl_walk *walk, const strl_camera *camera, strl_dra
         walk->camera = *camera;
     }
     walk->stats.requests_pending = walk->requests_pending;
+    walk->stats.remote = strl_source_get_network_stats(walk->source, &walk->stats.network);
     walk->stats.resident_bytes = walk->resident_bytes;
     walk->stats.select_ns = strl_clock_ns() - start;
     return status;

@@ -196,7 +196,7 @@ static void counting_close(strl_source *source)
 
 static uint64_t bytes_read_to_open(const char *path)
 {
-    static const strl_source_class klass = {"counting", NULL, NULL, NULL, counting_read, counting_close};
+    static const strl_source_class klass = {.kind = "counting", .read = counting_read, .close = counting_close};
     strl_error err;
     uint64_t read_bytes = 0;
     counting_source *source = calloc(1, sizeof *source);

@@ -87,7 +87,7 @@ static void cut_close(strl_source *source)
 static void a_source_that_ends_early_gives_its_own_sentence(void **state)
 {
     (void)state;
-    static const strl_source_class klass = {"cut", NULL, NULL, NULL, cut_read, cut_close};
+    static const strl_source_class klass = {.kind = "cut", .read = cut_read, .close = cut_close};
     size_t size;
     uint8_t *bytes = small_container(&size);
     for (size_t cut = 0; cut < size; cut++) {

@@ -108,7 +108,8 @@ static void check_index(strl_container *container, const char *path)
 {
     strl_part_index *index = NULL;
     double share;
-    assert_int_equal(strl_part_index_create(path, BALLS, &index, NULL), STRL_OK);
+    const strl_location location = {.name = path};
+    assert_int_equal(strl_part_index_create(&location, BALLS, &index, NULL), STRL_OK);
     while (!strl_part_index_is_done(index, &share))
         strl_sleep_ns(1000000);
     assert_int_equal(strl_part_index_status(index, NULL), STRL_OK);
@@ -122,7 +123,7 @@ static void check_index(strl_container *container, const char *path)
     double bounds[6];
     assert_false(strl_part_index_widen(index, BALLS, bounds));
     strl_part_index_destroy(index);
-    assert_int_equal(strl_part_index_create(path, BALLS, &index, NULL), STRL_OK); /* gone before it has ended */
+    assert_int_equal(strl_part_index_create(&location, BALLS, &index, NULL), STRL_OK); /* gone before it has ended */
     strl_part_index_destroy(index);
 }
 

@@ -18,20 +18,52 @@
 static strl_status watched_submit(strl_source *source, uint64_t token, uint64_t offset, size_t size, float urgency,
                                   strl_error *err)
 {
-    return strl_source_submit(((watched_source *)source)->inner, token, offset, size, urgency, err);
+    watched_source *self = (watched_source *)source;
+    strl_status status = strl_source_submit(self->inner, token, offset, size, urgency, err);
+    if (status == STRL_OK) {
+        self->asked[token % 256] = (uint32_t)size;
+        self->wanted_bytes += size;
+    }
+    if (self->wanted_bytes > self->most_wanted_bytes)
+        self->most_wanted_bytes = self->wanted_bytes;
+    return status;
+}
+
+/* One answer waits until the link has carried it. */
+static bool link_brings(watched_source *self)
+{
+    if (!self->holds && !strl_source_poll(self->inner, &self->held))
+        return false;
+    self->holds = true;
+    if (self->room_bytes && self->held.size > self->link_bytes)
+        return false;
+    self->link_bytes -= self->room_bytes ? self->held.size : 0;
+    return true;
 }
 
 static bool watched_poll(strl_source *source, strl_source_result *result)
 {
     watched_source *self = (watched_source *)source;
-    if (next_random(&self->random) * 100 < self->hold_percent)
+    if (next_random(&self->random) * 100 < self->hold_percent || !link_brings(self))
         return false;
-    return strl_source_poll(self->inner, result);
+    *result = self->held;
+    self->holds = false;
+    self->wanted_bytes -= self->asked[result->token % 256];
+    self->came_bytes += result->size;
+    return true;
 }
 
 static void watched_cancel(strl_source *source, uint64_t token)
 {
     strl_source_cancel(((watched_source *)source)->inner, token);
+}
+
+static uint64_t watched_room(strl_source *source)
+{
+    const watched_source *self = (watched_source *)source;
+    if (!self->room_bytes)
+        return UINT64_MAX;
+    return self->wanted_bytes < self->room_bytes ? self->room_bytes - self->wanted_bytes : 0;
 }
 
 static strl_status watched_read(strl_source *source, uint64_t offset, void *data, size_t size, strl_error *err)
@@ -44,14 +76,22 @@ static strl_status watched_read(strl_source *source, uint64_t offset, void *data
 
 static void watched_close(strl_source *source)
 {
-    strl_source_close(((watched_source *)source)->inner);
+    watched_source *self = (watched_source *)source;
+    if (self->holds)
+        strl__free(self->held.data);
+    strl_source_close(self->inner);
     strl__free(source);
 }
 
 watched_source *watched_source_open(strl_source *inner)
 {
-    static const strl_source_class klass = {"watched",      watched_submit, watched_poll,
-                                            watched_cancel, watched_read,   watched_close};
+    static const strl_source_class klass = {.kind = "watched",
+                                            .submit = watched_submit,
+                                            .poll = watched_poll,
+                                            .cancel = watched_cancel,
+                                            .read = watched_read,
+                                            .close = watched_close,
+                                            .room = watched_room};
     watched_source *self = strl__alloc_zero(1, sizeof *self);
     assert_non_null(self);
     self->base = (strl_source){.klass = &klass, .bytes = inner->bytes};

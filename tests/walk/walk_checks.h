@@ -18,6 +18,13 @@ typedef struct watched_source {
     bool walking;
     unsigned hold_percent; /* of polls that find nothing, whatever has arrived */
     uint64_t random;
+    uint64_t room_bytes; /* as a slow link says; 0 = there is nothing to wait for */
+    uint64_t link_bytes; /* that still come before the test sets it anew; of a slow link alone */
+    uint64_t wanted_bytes, most_wanted_bytes; /* asked for and not answered: now, and at most */
+    uint32_t asked[256]; /* bytes, by the token's last byte, which is the walk's slot */
+    uint64_t came_bytes;
+    strl_source_result held; /* waits for the link */
+    bool holds;
 } watched_source;
 
 watched_source *watched_source_open(strl_source *inner);

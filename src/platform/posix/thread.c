@@ -64,6 +64,11 @@ static void must(int code)
     (void)code;
 }
 
+void strl_once_run(strl_once *once, void (*run)(void))
+{
+    must(pthread_once(once, run));
+}
+
 void strl_mutex_init(strl_mutex *mutex)
 {
     must(pthread_mutex_init(mutex, NULL));

@@ -1,0 +1,392 @@
+/* A file on a web server as a source: see source/http.h for its threads. */
+#include "source/http.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <string.h>
+
+#include "base/fail.h"
+#include "base/memory.h"
+
+#define DEFAULT_CACHE_BYTES ((uint64_t)1 << 30)
+#define DEFAULT_CONNECTIONS 6u
+#define DEFAULT_ATTEMPTS 4u
+#define DEFAULT_CONNECT_MS 10000u
+#define DEFAULT_STALL_MS 15000u
+#define DEFAULT_BACKOFF_MS 250u
+/* A blocking read brings as much: of a container's end all that a first image needs but the root's mesh. */
+#define AHEAD_BYTES ((uint64_t)48 << 10)
+#define MOST_AHEAD_BYTES ((uint64_t)2 << 20) /* where one blocking read follows the other */
+#define AHEAD_GAP ((uint64_t)4 << 10)        /* between two that follow each other */
+
+/* ---- blocking reads */
+
+/* Mutex held. Where the range is in memory already; NULL = nowhere. */
+static const uint8_t *find_known(const strl__http *http, uint64_t offset, size_t size)
+{
+    if (offset + size <= http->head_bytes)
+        return http->head + offset;
+    if (http->ahead && offset >= http->ahead_begin && offset + size <= http->ahead_end)
+        return http->ahead + (offset - http->ahead_begin);
+    return NULL;
+}
+
+/* Mutex held. What came along with another read is new to the cache. */
+static void copy_known(strl__http *http, const uint8_t *known, uint64_t offset, void *data, size_t size)
+{
+    memcpy(data, known, size);
+    if (offset + size > http->head_bytes)
+        strl__http_keep(http, offset, known, size);
+}
+
+/* Mutex held. What to fetch for a blocking read: more than it asks for, because the next one asks for what is near. */
+static void look_ahead(strl__http *http, strl__http_read *read)
+{
+    uint64_t total = http->base.bytes;
+    bool forward =
+        read->begin >= http->ahead_begin && read->begin <= http->ahead_end + AHEAD_GAP && read->end > http->ahead_end;
+    bool backward =
+        read->end <= http->ahead_end && read->end + AHEAD_GAP >= http->ahead_begin && read->begin < http->ahead_begin;
+    if (!forward && !backward)
+        http->ahead_window = AHEAD_BYTES;
+    else if (http->ahead_window < MOST_AHEAD_BYTES)
+        http->ahead_window *= 2;
+    uint64_t window = http->ahead_window;
+    if (read->size >= window)
+        return;
+    if (backward)
+        read->begin = read->end > window ? read->end - window : 0;
+    else
+        read->end = total - read->begin > window ? read->begin + window : total;
+    if (read->end == total && read->end - read->begin < window)
+        read->begin = total > window ? total - window : 0;
+}
+
+/* Mutex held. Takes the read's bytes over. */
+static void keep_ahead(strl__http *http, strl__http_read *read)
+{
+    http->ahead_begin = read->begin;
+    http->ahead_end = read->end;
+    strl__free(http->ahead);
+    http->ahead = NULL;
+    if (read->end - read->begin > read->size) {
+        http->ahead = read->result.data;
+        read->result.data = NULL;
+    }
+}
+
+static void wake(strl__http *http, const strl__http_read *read)
+{
+    if (read->state == STRL__HTTP_NEW)
+        strl_condition_signal(&http->disk_work);
+    else
+        curl_multi_wakeup(http->multi);
+}
+
+/* Mutex held. Submits and waits; data may be NULL. The result's error is copied to err. */
+static strl_status wait_for(strl__http *http, const strl__http_read *like, void *data, strl_error *err)
+{
+    strl__http_read *read;
+    strl_status status = strl__http_read_add(http, like, &read, err);
+    if (status != STRL_OK)
+        return status;
+    wake(http, read);
+    while (read->state != STRL__HTTP_DONE)
+        strl_condition_wait(&http->answered, &http->mutex);
+    status = read->result.status;
+    if (status == STRL_OK && data) {
+        memcpy(data, read->result.data + (read->offset - read->begin), read->size);
+        keep_ahead(http, read);
+    } else if (status != STRL_OK && err) {
+        *err = read->result.error;
+    }
+    strl__free(read->result.data);
+    strl__free(read);
+    return status;
+}
+
+static strl_status fail_changed(const strl__http *http, strl_error *err)
+{
+    if (err)
+        *err = http->changed;
+    return http->changed.status;
+}
+
+static strl_status http_read(strl_source *source, uint64_t offset, void *data, size_t size, strl_error *err)
+{
+    strl__http *http = (strl__http *)source;
+    strl__http_read like = {
+        .offset = offset, .size = size, .begin = offset, .end = offset + size, .urgency = INFINITY, .waited = true};
+    strl_status status = STRL_OK;
+    strl_mutex_lock(&http->mutex);
+    const uint8_t *known = find_known(http, offset, size);
+    if (http->changed.status != STRL_OK) {
+        status = fail_changed(http, err);
+    } else if (known) {
+        copy_known(http, known, offset, data, size);
+    } else if (size > 0) {
+        look_ahead(http, &like);
+        status = wait_for(http, &like, data, err);
+    }
+    strl_mutex_unlock(&http->mutex);
+    return status;
+}
+
+/* ---- reads that are polled for */
+
+/* Mutex held. Whether the read could be answered without a request. */
+static bool answer_known(strl__http *http, strl__http_read *read)
+{
+    const uint8_t *known = find_known(http, read->offset, read->size);
+    strl_error error = http->changed;
+    if (error.status == STRL_OK && !known && read->size > 0)
+        return false;
+    if (error.status == STRL_OK && !(read->result.data = strl__alloc(read->size, 1)))
+        strl__fail(&error, STRL_ERR_MEMORY, "no memory for a read of %zu bytes", read->size);
+    if (error.status != STRL_OK) {
+        strl__http_read_fail(http, read, &error);
+        return true;
+    }
+    if (known)
+        copy_known(http, known, read->offset, read->result.data, read->size);
+    strl__http_read_finish(http, read);
+    return true;
+}
+
+static strl_status http_submit(strl_source *source, uint64_t token, uint64_t offset, size_t size, float urgency,
+                               strl_error *err)
+{
+    strl__http *http = (strl__http *)source;
+    const strl__http_read like = {.offset = offset,
+                                  .size = size,
+                                  .begin = offset,
+                                  .end = offset + size,
+                                  .urgency = urgency,
+                                  .result = {.token = token}};
+    strl__http_read *read;
+    strl_mutex_lock(&http->mutex);
+    strl_status status = strl__http_read_add(http, &like, &read, err);
+    if (status == STRL_OK && !answer_known(http, read))
+        wake(http, read);
+    strl_mutex_unlock(&http->mutex);
+    return status;
+}
+
+static bool http_poll(strl_source *source, strl_source_result *result)
+{
+    strl__http *http = (strl__http *)source;
+    strl_mutex_lock(&http->mutex);
+    strl__http_read *read = http->first_done;
+    if (read)
+        http->first_done = read->next;
+    strl_mutex_unlock(&http->mutex);
+    if (!read)
+        return false;
+    *result = read->result;
+    strl__free(read);
+    return true;
+}
+
+static void http_cancel(strl_source *source, uint64_t token)
+{
+    strl__http *http = (strl__http *)source;
+    strl_error error;
+    bool any = false;
+    strl__fail(&error, STRL_ERR_CANCELLED, "cancelled");
+    strl_mutex_lock(&http->mutex);
+    for (size_t i = http->read_count; i-- > 0;) {
+        strl__http_read *read = http->reads[i];
+        if (read->waited || read->result.token != token)
+            continue;
+        strl__http_read_fail(http, read, &error);
+        any = true;
+    }
+    if (any)
+        curl_multi_wakeup(http->multi); /* a transfer may have lost the last read that wanted it */
+    strl_mutex_unlock(&http->mutex);
+}
+
+/* ---- what only a remote source has */
+
+static uint64_t http_room(strl_source *source)
+{
+    strl__http *http = (strl__http *)source;
+    strl_mutex_lock(&http->mutex);
+    uint64_t room = strl__pace_room(&http->pace, strl__http_bytes_wanted(http));
+    strl_mutex_unlock(&http->mutex);
+    return room;
+}
+
+static bool http_network_stats(const strl_source *source, strl_network_stats *stats)
+{
+    strl__http *http = (strl__http *)(uintptr_t)source;
+    strl_mutex_lock(&http->mutex);
+    *stats = http->stats;
+    stats->latency_ns = (uint64_t)(http->pace.latency_s * 1e9);
+    stats->bytes_per_second = http->pace.bytes_per_s;
+    strl_mutex_unlock(&http->mutex);
+    return true;
+}
+
+static void http_doubt(strl_source *source, uint64_t offset, size_t size)
+{
+    strl__http *http = (strl__http *)source;
+    strl_mutex_lock(&http->mutex);
+    if (http->ahead && offset < http->ahead_end && offset + size > http->ahead_begin) {
+        strl__free(http->ahead);
+        http->ahead = NULL;
+    }
+    strl__http_forget(http, offset, size);
+    strl_mutex_unlock(&http->mutex);
+}
+
+/* ---- life */
+
+static void free_reads(strl__http *http)
+{
+    for (size_t i = 0; i < http->read_count; i++) {
+        strl__free(http->reads[i]->result.data);
+        strl__free(http->reads[i]);
+    }
+    while (http->first_done) {
+        strl__http_read *next = http->first_done->next;
+        strl__free(http->first_done->result.data);
+        strl__free(http->first_done);
+        http->first_done = next;
+    }
+    strl__free(http->reads);
+}
+
+static void http_close(strl_source *source)
+{
+    strl__http *http = (strl__http *)source;
+    strl_mutex_lock(&http->mutex);
+    http->disk_closing = true;
+    strl_condition_signal(&http->disk_work);
+    strl_mutex_unlock(&http->mutex);
+    strl_thread_join(http->disk);
+    strl_mutex_lock(&http->mutex);
+    http->network_closing = true;
+    if (http->multi)
+        curl_multi_wakeup(http->multi);
+    strl_mutex_unlock(&http->mutex);
+    strl_thread_join(http->network);
+    for (uint32_t i = 0; i < http->desc.connections; i++)
+        curl_easy_cleanup(http->transfers[i].easy);
+    if (http->multi)
+        curl_multi_cleanup(http->multi);
+    curl_slist_free_all(http->headers);
+    strl__cache_close(http->cache);
+    strl__http_disk_deinit(http);
+    free_reads(http);
+    strl__free(http->ahead);
+    strl__free(http->target);
+    strl__free(http->url);
+    strl__free(http->shown);
+    strl_condition_deinit(&http->answered);
+    strl_condition_deinit(&http->disk_work);
+    strl_mutex_deinit(&http->mutex);
+    strl__free(http);
+}
+
+static uint32_t or_default(uint32_t value, uint32_t otherwise)
+{
+    return value ? value : otherwise;
+}
+
+static void apply_desc(strl__http *http, const strl_http_desc *desc)
+{
+    const strl_http_desc defaults = {0};
+    const strl_http_desc *asked = desc ? desc : &defaults;
+    strl_http_desc *own = &http->desc;
+    own->cache_bytes = asked->cache_bytes ? asked->cache_bytes : DEFAULT_CACHE_BYTES;
+    own->connections = or_default(asked->connections, DEFAULT_CONNECTIONS);
+    if (own->connections > STRL__HTTP_MOST_CONNECTIONS)
+        own->connections = STRL__HTTP_MOST_CONNECTIONS;
+    own->attempts = or_default(asked->attempts, DEFAULT_ATTEMPTS);
+    own->connect_ms = or_default(asked->connect_ms, DEFAULT_CONNECT_MS);
+    own->stall_ms = or_default(asked->stall_ms, DEFAULT_STALL_MS);
+    own->backoff_ms = or_default(asked->backoff_ms, DEFAULT_BACKOFF_MS);
+    if (asked->cache) /* one that cannot be used is done without */
+        strl__cache_open(asked->cache, own->cache_bytes, &http->cache, NULL);
+}
+
+/* libcurl wants this once a process, before any other call; where it was done already it counts. It is never
+ * undone: other code of the process may use libcurl too. */
+static strl_once curl_once = STRL_ONCE_INIT;
+static CURLcode curl_ready = CURLE_FAILED_INIT;
+
+static void init_curl(void)
+{
+    curl_ready = curl_global_init(CURL_GLOBAL_DEFAULT);
+}
+
+static strl_status make_handles(strl__http *http, strl_error *err)
+{
+    http->multi = curl_ready == CURLE_OK ? curl_multi_init() : NULL;
+    bool good = http->multi != NULL;
+    for (uint32_t i = 0; good && i < http->desc.connections; i++) {
+        http->transfers[i].http = http;
+        http->transfers[i].easy = curl_easy_init();
+        good = http->transfers[i].easy != NULL;
+    }
+    http->headers = good ? curl_slist_append(NULL, "Accept-Encoding: identity") : NULL;
+    if (!http->headers)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for connections");
+    curl_multi_setopt(http->multi, CURLMOPT_MAX_HOST_CONNECTIONS, (long)http->desc.connections);
+    curl_multi_setopt(http->multi, CURLMOPT_MAXCONNECTS, (long)http->desc.connections);
+    return STRL_OK;
+}
+
+static strl_status open_address(strl__http *http, strl_error *err)
+{
+    const strl__http_read like = {
+        .size = STRL__HTTP_HEAD_BYTES, .end = STRL__HTTP_HEAD_BYTES, .urgency = INFINITY, .waited = true};
+    strl_mutex_lock(&http->mutex);
+    strl_status status = wait_for(http, &like, NULL, err);
+    strl_mutex_unlock(&http->mutex);
+    return status;
+}
+
+strl_status strl_source_open_http(const char *url, const strl_http_desc *desc, strl_source **source, strl_error *err)
+{
+    static const strl_source_class klass = {
+        .kind = "http",
+        .submit = http_submit,
+        .poll = http_poll,
+        .cancel = http_cancel,
+        .read = http_read,
+        .close = http_close,
+        .room = http_room,
+        .get_network_stats = http_network_stats,
+        .doubt = http_doubt,
+    };
+    *source = NULL;
+    strl__http *http = strl__alloc_zero(1, sizeof *http);
+    if (!http)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory to open an address");
+    strl_mutex_init(&http->mutex);
+    strl_condition_init(&http->answered);
+    strl_condition_init(&http->disk_work);
+    http->kept_end = &http->kept;
+    http->ahead_begin = http->ahead_end = UINT64_MAX / 2; /* near to nothing */
+    strl_once_run(&curl_once, init_curl);
+    strl_status status = strl__http_url(url, &http->url, &http->shown, &http->secure, err);
+    if (status == STRL_OK) {
+        apply_desc(http, desc);
+        status = make_handles(http, err);
+    }
+    if (status == STRL_OK)
+        status = strl_thread_start(&http->network, strl__http_network_run, http, err);
+    if (status == STRL_OK)
+        status = open_address(http, err);
+    if (status == STRL_OK && http->cache)
+        status = strl_thread_start(&http->disk, strl__http_disk_run, http, err);
+    if (status != STRL_OK) {
+        http_close(&http->base);
+        return status;
+    }
+    http->base = (strl_source){.klass = &klass, .bytes = http->base.bytes, .name = http->shown};
+    *source = &http->base;
+    return STRL_OK;
+}
