@@ -23,7 +23,7 @@ typedef struct render_options {
     const char *input, *camera, *path, *save_path, *output, *stats;
     uint64_t frames, seed, supersample, memory_bytes, gpu_memory_bytes;
     uint32_t size[2];
-    double error_px, fps;
+    double error_px, splat_px, fps;
     bool full, realtime, depth, wireframe, flat, no_occlusion, frames_given, quiet;
     int backend, debug;
 } render_options;
@@ -191,7 +191,7 @@ static strl_status render(const render_options *o, strl_cli_progress *progress, 
     strl_renderer *renderer = NULL;
     strl_camera_path path = {0};
     const strl_render_model_desc desc = {.path = o->input, .full = o->full, .realtime = o->realtime,
-                                         .error_px = o->error_px, .memory_bytes = o->memory_bytes,
+                                         .error_px = o->error_px, .splat_px = o->splat_px, .memory_bytes = o->memory_bytes,
                                          .progress = progress};
     strl_cli_catch_interrupts();
     strl_status status = check_outputs(o, err);
@@ -252,6 +252,9 @@ static int parse(strl_cli_args *args, render_options *o)
         {.name = "size", .kind = STRL_CLI_SIZE, .value = o->size, .help = "pixels of an image (1280x720)"},
         {.name = "error", .kind = STRL_CLI_REAL, .value = &o->error_px, .argument = "PX",
          .help = "allowed pixel error (1)", .least = 1e-6, .most = 1e6},
+        {.name = "splat", .kind = STRL_CLI_REAL, .value = &o->splat_px, .argument = "PX",
+         .help = "of sample trees: cells that cover no more than PX x PX pixels are drawn as splats of that size (as --error)",
+         .least = 1, .most = 64},
         {.name = "full", .kind = STRL_CLI_FLAG, .value = &o->full,
          .help = "the finest level of a container; the triangles of a mesh file as read, held in memory"},
         {.name = "realtime", .kind = STRL_CLI_REAL, .value = &o->fps, .argument = "FPS", .given = &o->realtime,

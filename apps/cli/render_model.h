@@ -45,7 +45,7 @@ typedef struct strl_render_model_desc {
     const char *path;
     bool full;             /* a container's finest level; an input file can be drawn in no other way */
     bool realtime;         /* a walk that never waits */
-    double error_px;
+    double error_px, splat_px;
     uint64_t memory_bytes; /* of the walk's decoded nodes */
     strl_cli_progress *progress;
 } strl_render_model_desc;

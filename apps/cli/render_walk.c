@@ -138,7 +138,7 @@ static strl_status open_walk(walk_model *self, const strl_render_model_desc *des
         return status;
     self->executor = (strl_executor){self->pool, submit};
     const strl_walk_desc walk = {
-        .memory_bytes = desc->memory_bytes, .error_px = desc->error_px, .executor = &self->executor};
+        .memory_bytes = desc->memory_bytes, .error_px = desc->error_px, .splat_px = desc->splat_px, .executor = &self->executor};
     return strl_walk_open(source, &walk, &self->walk, err);
 }
 

@@ -8,13 +8,13 @@
 
 #define PREFETCH_SHARE 1e-3 /* what may be wanted later comes after all that is wanted now */
 
-static strl_status add_active(strl__descent *c, strl__node *node)
+static strl_status add_active(strl__descent *c, strl__node *node, bool open)
 {
     strl__front *front = &c->walk->front;
     if (!strl__grow(&front->items, &front->capacity, front->count + 1, sizeof *front->items))
         return strl__no_memory(c->err);
     strl__active *active = &front->items[front->count++];
-    *active = (strl__active){.node = node, .placement = c->index};
+    *active = (strl__active){.node = node, .placement = c->index, .open = open};
     active->box = strl__world_box(c->tree, c->placement, node->record->box_min, node->record->box_max);
     active->sight = strl_view_sight(c->cut->view, &active->box);
     return STRL_OK;
@@ -48,21 +48,26 @@ static uint32_t count_inactive(const strl_walk *walk, const strl__group *group)
     return inactive;
 }
 
-/* The group is not split: those of its members that are active are the front. `missing` of the
- * wanted nodes are not there. */
-static strl_status stay(strl__descent *c, const strl__group *group, uint32_t missing)
+static strl_status add_members(strl__descent *c, const strl__group *group, bool open)
 {
     strl_walk *walk = c->walk;
-    c->cut->missing += missing;
     if (c->cut->kind != STRL__CUT_FRONT)
         return STRL_OK;
     for (uint32_t i = group->first; i != STRL_NONE; i = walk->level.items[i].next) {
         const strl__visit *visit = &walk->level.items[i];
-        strl_status status = visit->active ? add_active(c, visit->node) : STRL_OK;
+        strl_status status = visit->active ? add_active(c, visit->node, open) : STRL_OK;
         if (status != STRL_OK)
             return status;
     }
     return STRL_OK;
+}
+
+/* The group is not split: those of its members that are active are the front. `missing` of the
+ * wanted nodes are not there. */
+static strl_status stay(strl__descent *c, const strl__group *group, uint32_t missing)
+{
+    c->cut->missing += missing;
+    return add_members(c, group, false);
 }
 
 /* Bytes of the group's children that this traversal has not counted yet. */
@@ -134,7 +139,7 @@ static strl_status descend(strl__descent *c, const strl__group *group, double px
     }
     if (!ready)
         return stay(c, group, 0);
-    strl_status status = c->tree->structure == STRL_STRUCTURE_SAMPLES ? stay(c, group, 0) : STRL_OK; /* drawn with what is below */
+    strl_status status = c->tree->structure == STRL_STRUCTURE_SAMPLES ? add_members(c, group, true) : STRL_OK; /* drawn with what is below */
     return status ? status : note_split(c, group);
 }
 

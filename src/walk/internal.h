@@ -99,7 +99,8 @@ typedef struct strl__treelets {
 typedef struct strl__placement {
     uint32_t tree;
     double transform[12];
-    double length_scale; /* world units per lattice unit, at most */
+    double length_scale; /* world units per lattice unit, at most; of sample trees by the pixels that a splat may have for each of the
+                            allowed error, so that sizes and errors are compared alike */
 } strl__placement;
 
 typedef struct strl__walk_tree {
@@ -217,6 +218,7 @@ typedef struct strl__demands {
 typedef struct strl__active {
     strl__node *node;
     uint32_t placement;
+    bool open;        /* of a sample tree: drawn with what is below it */
     strl_box box;     /* world */
     strl_sight sight; /* of the box */
 } strl__active;
@@ -254,6 +256,7 @@ struct strl_walk {
     strl_executor executor;    /* submit NULL: inline */
     uint64_t memory_bytes;
     double error_px;
+    double splat_ratio; /* pixels of a splat for each of the allowed error */
     bool labels; /* kept for each vertex */
     double bounds[6];
     strl__walk_tree *trees;

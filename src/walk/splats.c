@@ -1,19 +1,36 @@
 /* The splats of a frame: of all bricks whose cells are small enough, merged into items of points, one or more a placement. */
 #include "walk/internal.h"
 
+#include <math.h>
 #include <string.h>
 
 #define MOST_POINTS 65535u /* of an item: indices have 16 bits */
+#define MOST_POINT_PX 64.0 /* what every GL draws */
 
-/* Of the state that the brick is drawn in. */
-static uint32_t shown_splats(const strl__active *active, const strl_splat **splats)
+typedef struct shown {
+    const strl_splat *splats;
+    uint32_t count;
+} shown;
+
+/* Of the state that the brick is drawn in. Of one whose children are wanted and not there yet, none: see missing_splats. */
+static shown shown_splats(const strl__active *active)
 {
     const strl__mesh *mesh = &active->node->mesh;
     if (!active->sight.seen || !mesh->splat_end || mesh->state >= mesh->step_count)
-        return 0;
+        return (shown){0};
     uint32_t first = mesh->state ? mesh->splat_end[mesh->state - 1] : 0;
-    *splats = mesh->splats + first;
-    return mesh->splat_end[mesh->state] - first;
+    return (shown){mesh->splats + first, mesh->splat_end[mesh->state] - first};
+}
+
+/* What is below has not arrived: the finest splats of the brick close its holes, as large as their cells. */
+static shown missing_splats(const strl__active *active)
+{
+    const strl__mesh *mesh = &active->node->mesh;
+    if (!active->sight.seen || !mesh->splat_end || mesh->state < mesh->step_count || active->open ||
+        active->node->record->child_count == 0)
+        return (shown){0};
+    uint32_t first = mesh->step_count > 1 ? mesh->splat_end[mesh->step_count - 2] : 0;
+    return (shown){mesh->splats + first, mesh->splat_end[mesh->step_count - 1] - first};
 }
 
 /* Relative to the least corner of the tree's box, which all cells lie near. */
@@ -30,15 +47,13 @@ static strl_vertex make_point(const strl_node *record, const strl_splat *splat, 
     return point;
 }
 
-static strl_status add_points(strl_walk *walk, const strl__active *active, strl_error *err)
+static strl_status add_points(strl_walk *walk, const strl__active *active, shown added, strl_error *err)
 {
     const strl_tree *tree = walk->trees[walk->placements[active->placement].tree].tree;
-    const strl_splat *splats;
-    uint32_t count = shown_splats(active, &splats);
-    if (!strl__grow(&walk->points, &walk->point_capacity, walk->point_count + count, sizeof *walk->points))
+    if (!strl__grow(&walk->points, &walk->point_capacity, walk->point_count + added.count, sizeof *walk->points))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu splats", walk->point_count);
-    for (uint32_t i = 0; i < count; i++)
-        walk->points[walk->point_count++] = make_point(active->node->record, &splats[i], tree->box_min);
+    for (uint32_t i = 0; i < added.count; i++)
+        walk->points[walk->point_count++] = make_point(active->node->record, &added.splats[i], tree->box_min);
     return STRL_OK;
 }
 
@@ -52,13 +67,14 @@ static bool fill_numbers(strl_walk *walk)
     return walk->numbers != NULL;
 }
 
-/* Points first..end, all of one placement. Where they lie is set when there are all. */
-static strl_status add_items(strl_walk *walk, uint32_t placement_index, size_t first, size_t end, strl_draw_list *list, strl_error *err)
+/* The next `count` points, all of one placement. */
+static strl_status add_items(strl_walk *walk, uint32_t placement_index, double px, size_t first, size_t count, strl_draw_list *list,
+                             strl_error *err)
 {
     const strl__placement *placement = &walk->placements[placement_index];
     const strl_tree *tree = walk->trees[placement->tree].tree;
-    for (; first < end; first += MOST_POINTS) {
-        uint32_t count = end - first < MOST_POINTS ? (uint32_t)(end - first) : MOST_POINTS;
+    for (size_t end = first + count; first < end; first += MOST_POINTS) {
+        uint32_t part = end - first < MOST_POINTS ? (uint32_t)(end - first) : MOST_POINTS;
         if (!strl__grow(&walk->items, &walk->item_capacity, (size_t)list->count + 1, sizeof *walk->items))
             return strl__fail(err, STRL_ERR_MEMORY, "no memory for a draw list of %u items", list->count);
         strl_draw_item *item = &walk->items[list->count++];
@@ -66,21 +82,50 @@ static strl_status add_items(strl_walk *walk, uint32_t placement_index, size_t f
                                  .placement = placement_index,
                                  .visible = true,
                                  .vertices = walk->points + first,
-                                 .vertex_count = count,
+                                 .vertex_count = part,
                                  .indices = walk->numbers,
-                                 .index_count = count,
-                                 .dirty_count = count,
+                                 .index_count = part,
+                                 .dirty_count = part,
                                  .step = tree->step,
-                                 .point_px = (float)(walk->stats.allowed_error_px > 1 ? walk->stats.allowed_error_px : 1),
-                                 .error_px = (float)walk->stats.allowed_error_px};
+                                 .point_px = (float)fmin(fmax(px, 1), MOST_POINT_PX),
+                                 .error_px = (float)px};
         memcpy(item->anchor, tree->box_min, sizeof item->anchor);
         memcpy(item->box_min, tree->box_min, sizeof item->box_min);
         memcpy(item->box_max, tree->box_max, sizeof item->box_max);
         memcpy(item->origin, tree->origin, sizeof item->origin);
         memcpy(item->transform, placement->transform, sizeof item->transform);
-        walk->stats.splats += count;
+        walk->stats.splats += part;
     }
     return STRL_OK;
+}
+
+static double missing_px(const strl_walk *walk, const strl__active *active)
+{
+    const strl__mesh *mesh = &active->node->mesh;
+    double size = (double)mesh->errors[mesh->step_count - 1] * walk->placements[active->placement].length_scale;
+    return walk->splat_ratio * strl_sight_error_px(&active->sight, size);
+}
+
+/* Items are made when all points are there: the array has its place only then. */
+static strl_status list_splats(strl_walk *walk, strl_draw_list *list, strl_error *err)
+{
+    const strl__front *front = &walk->front;
+    strl_status status = STRL_OK;
+    size_t at = 0;
+    for (size_t i = 0, next; i < front->count && !status; i = next) {
+        size_t first = at;
+        for (next = i; next < front->count && front->items[next].placement == front->items[i].placement; next++)
+            at += shown_splats(&front->items[next]).count;
+        status = add_items(walk, front->items[i].placement, walk->splat_ratio * walk->stats.allowed_error_px, first, at - first, list,
+                           err);
+    }
+    for (size_t i = 0; i < front->count && !status; i++) {
+        uint32_t count = missing_splats(&front->items[i]).count;
+        if (count)
+            status = add_items(walk, front->items[i].placement, missing_px(walk, &front->items[i]), at, count, list, err);
+        at += count;
+    }
+    return status;
 }
 
 strl_status strl__draw_splats(strl_walk *walk, strl_draw_list *list, strl_error *err)
@@ -88,21 +133,14 @@ strl_status strl__draw_splats(strl_walk *walk, strl_draw_list *list, strl_error 
     strl_status status = STRL_OK;
     walk->point_count = 0;
     for (size_t i = 0; i < walk->front.count && !status; i++)
-        status = add_points(walk, &walk->front.items[i], err);
+        status = add_points(walk, &walk->front.items[i], shown_splats(&walk->front.items[i]), err);
+    for (size_t i = 0; i < walk->front.count && !status; i++)
+        status = add_points(walk, &walk->front.items[i], missing_splats(&walk->front.items[i]), err);
     if (status || walk->point_count == 0)
         return status;
     if (!fill_numbers(walk))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for splats");
-    /* Once more: the array of points has its place only now. */
-    size_t at = 0;
-    for (size_t i = 0, next; i < walk->front.count && !status; i = next) {
-        uint32_t placement = walk->front.items[i].placement;
-        size_t first = at;
-        const strl_splat *splats;
-        for (next = i; next < walk->front.count && walk->front.items[next].placement == placement; next++)
-            at += shown_splats(&walk->front.items[next], &splats);
-        status = add_items(walk, placement, first, at, list, err);
-    }
+    status = list_splats(walk, list, err);
     list->items = walk->items;
     return status;
 }

@@ -69,6 +69,8 @@ static strl_status load_placements(strl_walk *walk, strl_error *err)
         placement->tree = stored.tree;
         memcpy(placement->transform, stored.transform, sizeof placement->transform);
         placement->length_scale = largest_scale(stored.transform) * tree->step;
+        if (tree->structure == STRL_STRUCTURE_SAMPLES)
+            placement->length_scale /= walk->splat_ratio;
         if (!isfinite(placement->length_scale))
             return strl__fail(err, STRL_ERR_FORMAT, "placement %" PRIu32 ": its transform is not finite",
                               walk->placement_count);
@@ -177,6 +179,7 @@ static void apply_desc(strl_walk *walk, const strl_walk_desc *desc)
         walk->executor = *desc->executor;
     walk->labels = desc->labels;
     strl_walk_set_error_px(walk, desc->error_px);
+    walk->splat_ratio = isfinite(desc->splat_px) && desc->splat_px > 0 ? desc->splat_px / walk->error_px : 1;
     walk->stats.allowed_error_px = walk->error_px;
 }
 

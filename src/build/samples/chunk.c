@@ -5,7 +5,7 @@
 #include "base/fail.h"
 #include "build/ingest/normals.h"
 
-#define LEAF_TRIANGLES 128u
+#define LEAF_TRIANGLES 256u
 /* Of one bucket, more than these stay where they are, and the cells there count as so large: what is at the top is held in memory. */
 #define MOST_RISEN 2048u
 /* What a bucket takes in memory while it is worked on, in the size of its records: these, triangles, keys twice, cells, payloads. */
