@@ -125,7 +125,7 @@ static int compare(const void *a, const void *b)
     return 0;
 }
 
-static void normalise(sample_tree_triangle *triangle, uint64_t count)
+void sample_tree_sort(sample_tree_triangle *triangle, uint64_t count)
 {
     for (uint64_t t = 0; t < count; t++) {
         sample_tree_triangle best, turned;
@@ -159,7 +159,7 @@ sample_tree_triangle *sample_tree_triangles(const char *name, uint64_t *count)
             }
     }
     built_close(&model);
-    normalise(triangle, *count);
+    sample_tree_sort(triangle, *count);
     return triangle;
 }
 
@@ -182,7 +182,7 @@ static sample_tree_triangle *expected_triangles(const mesh_file *mesh, const str
             kept &= memcmp(to[c], to[(c + 1) % 3], 3 * sizeof **to) != 0;
         *count += kept;
     }
-    normalise(triangle, *count);
+    sample_tree_sort(triangle, *count);
     return triangle;
 }
 

@@ -22,6 +22,7 @@ strl_build_result sample_tree_prove(const mesh_file *mesh);
 /* All triangles of all bricks, sorted, each turned so that its least corner is first: x, y, z, colour of each. malloc. */
 typedef int64_t sample_tree_triangle[3][4];
 sample_tree_triangle *sample_tree_triangles(const char *name, uint64_t *count);
+void sample_tree_sort(sample_tree_triangle *triangle, uint64_t count);
 bool sample_trees_equal(const char *a, const char *b);
 
 #endif
