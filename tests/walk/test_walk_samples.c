@@ -255,7 +255,7 @@ static void what_is_near_is_open(void **state)
 {
     (void)state;
     uint64_t random = 4;
-    strl_walk *walk = open_model((strl_walk_desc){.error_px = 8});
+    strl_walk *walk = open_model((strl_walk_desc){.error_px = 32});
     uint32_t looked_at = 0;
     const double pixels = 600 / 2 / tan(30 * 3.14159265358979 / 180);
     for (uint32_t i = 0; i < CAMERAS; i++) {
@@ -279,7 +279,7 @@ static void what_is_near_is_open(void **state)
                 }
                 far = fmax(far, sqrt(sum));
             }
-            if ((double)item->error * pixels / far > 8.001)
+            if ((double)item->error * pixels / far > 32.001)
                 fail_msg("brick %u of %u children in state %u with %u of %u triangles: its cells of %g are %.2f pixels, or as it says %.2f", item->node, model.node[item->node].child_count, item->state,
                          item->index_count / 3, model.mesh[item->node].triangle_count, (double)item->error, (double)item->error * pixels / far, (double)item->error_px);
         }
