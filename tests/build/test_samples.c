@@ -429,7 +429,7 @@ static void a_higher_probability_stores_more_above(void **state)
     const double probabilities[] = {0.05, 0.5, 0.99, 1 - 1e-6, 1 - 1e-12};
     uint32_t before = 0;
     mesh_file mesh = {0};
-    add_soup(&mesh, 40000 / SMALLER, (const double[3]){0, 0, 0}, 1, 0.05);
+    add_soup(&mesh, 40000, (const double[3]){0, 0, 0}, 1, 0.05);
     mesh_file_write_ply(&mesh, built_path("asked.ply"));
     for (size_t i = 0; i < sizeof probabilities / sizeof *probabilities; i++) {
         strl_build_result result = sample_tree_build("asked.ply", "asked.stroll", (strl_build_desc){.probability = probabilities[i]});
