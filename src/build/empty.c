@@ -3,9 +3,10 @@
 #include "base/fail.h"
 #include "build/container_facts.h"
 #include "geometry/payload.h"
+#include "geometry/sample_payload.h"
 
 /* A mesh without a vertex still has one palette entry, of the unnamed part and material. */
-static strl_status encode_nothing(strl_arena *arena, strl_writer *payload, strl_error *err)
+static strl_status encode_nothing(strl_structure structure, strl_arena *arena, strl_writer *payload, strl_error *err)
 {
     strl_pm pm = {.palette_count = 1};
     if (!strl_pm_create(&pm, false, false, false, arena))
@@ -13,6 +14,9 @@ static strl_status encode_nothing(strl_arena *arena, strl_writer *payload, strl_
     pm.vertex_end[0] = pm.triangle_end[0] = 0;
     pm.geometric_error[0] = pm.appearance_error[0] = 0;
     pm.palette[0] = (strl_palette_entry){.rgba = 0xffffffffu};
+    const strl_brick_head head = {.level_count = 1};
+    if (structure == STRL_STRUCTURE_SAMPLES)
+        strl_brick_head_write(&head, payload);
     return strl_payload_encode(&pm, NULL, arena, payload, NULL, err);
 }
 
@@ -20,10 +24,14 @@ static strl_status add_tree(strl_container_writer *writer, strl_structure struct
 {
     const strl_tree tree = {
         .structure = structure, .step = 1, .node_count = 1, .level_count = 1, .group_count = 1};
-    const strl_node node = {.parent = STRL_NONE, .first_child = STRL_NONE, .decode_parent = STRL_NONE, .group_size = 1};
+    const strl_node node = {.parent = STRL_NONE,
+                            .first_child = STRL_NONE,
+                            .decode_parent = STRL_NONE,
+                            .group_size = 1,
+                            .rung = structure == STRL_STRUCTURE_SAMPLES ? STRL_RUNG_SAMPLED : STRL_RUNG_TOPOLOGY};
     strl_arena arena = {0};
     strl_writer payload = {0};
-    strl_status status = encode_nothing(&arena, &payload, err);
+    strl_status status = encode_nothing(structure, &arena, &payload, err);
     if (!status)
         status = strl_container_writer_begin_tree(writer, &tree, err);
     if (!status)

@@ -181,6 +181,10 @@ static strl_status check_counts(const strl_node *node, uint32_t id, const strl_t
         if (status != STRL_OK)
             return status;
     }
+    if ((node->rung == STRL_RUNG_SAMPLED) != (tree->structure == STRL_STRUCTURE_SAMPLES))
+        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": the rung is %" PRIu32 ", expected %d %s in a tree of structure %d", id,
+                          node->rung, STRL_RUNG_SAMPLED, tree->structure == STRL_STRUCTURE_SAMPLES ? "alone" : "never",
+                          (int)tree->structure);
     if (node->group_size == 0)
         return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": the group's size is 0, expected at least 1", id);
     if (node->decode_parent != STRL_NONE && node->decode_parent != node->parent)

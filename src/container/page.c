@@ -73,6 +73,35 @@ static strl_status check_mesh(const strl_node *record, const strl_pm *mesh, strl
     return status;
 }
 
+/* What the head alone cannot say: its record bounds it. */
+static strl_status check_head(const strl_node *record, const strl_brick_head *head, strl_error *err)
+{
+    if (head->error[0] > record->geometric_max)
+        return strl__fail(err, STRL_ERR_FORMAT, "a brick has cells of the size %g, expected at most %g from its node's record",
+                          (double)head->error[0], (double)record->geometric_max);
+    for (uint32_t i = 0; i < strl_brick_splats(head); i++)
+        for (int axis = 0; axis < 3; axis++) {
+            int64_t at = record->anchor[axis] + head->splat[i].centre[axis];
+            if (at < record->box_min[axis] || at > record->box_max[axis])
+                return strl__fail(err, STRL_ERR_FORMAT,
+                                  "splat %" PRIu32 " lies at %" PRId64
+                                  " on axis %d, expected within its node's box, %" PRId64 " to %" PRId64,
+                                  i, at, axis, record->box_min[axis], record->box_max[axis]);
+        }
+    return STRL_OK;
+}
+
+static strl_status read_head(const strl_node *record, const uint8_t *payload, strl_arena *arena, strl_brick_head *head, size_t *bytes,
+                             strl_error *err)
+{
+    *head = (strl_brick_head){0};
+    *bytes = 0;
+    if (record->rung != STRL_RUNG_SAMPLED)
+        return STRL_OK;
+    strl_status status = strl_brick_head_read(payload, record->payload_bytes, record->triangle_count, arena, head, bytes, err);
+    return status ? status : check_head(record, head, err);
+}
+
 strl_status strl_page_head(const strl_node *record, const void *page, size_t size, strl_arena *arena, strl_brick_head *head,
                            strl_error *err)
 {
@@ -81,10 +110,7 @@ strl_status strl_page_head(const strl_node *record, const void *page, size_t siz
     if (record->payload_bytes == 0 || record->payload_offset > size || record->payload_bytes > size - record->payload_offset)
         return strl__fail(err, STRL_ERR_FORMAT, "its %" PRIu32 " bytes pass the end of a page of %zu bytes",
                           record->payload_bytes, size);
-    const uint8_t *payload = (const uint8_t *)page + record->payload_offset;
-    return record->rung == STRL_RUNG_SAMPLED
-               ? strl_brick_head_read(payload, record->payload_bytes, record->triangle_count, arena, head, &bytes, err)
-               : STRL_OK;
+    return read_head(record, (const uint8_t *)page + record->payload_offset, arena, head, &bytes, err);
 }
 
 void strl_page_place(strl_payload_reference *reference, const int64_t anchor[3], const strl_node *record)
@@ -100,11 +126,9 @@ static strl_status decode(const strl_node *record, const uint8_t *page, size_t s
         return strl__fail(err, STRL_ERR_FORMAT, "its %" PRIu32 " bytes pass the end of a page of %zu bytes",
                           record->payload_bytes, size);
     const uint8_t *payload = page + record->payload_offset;
-    size_t head_bytes = 0;
+    size_t head_bytes;
     strl_brick_head head;
-    strl_status status = STRL_OK;
-    if (record->rung == STRL_RUNG_SAMPLED)
-        status = strl_brick_head_read(payload, record->payload_bytes, record->triangle_count, arena, &head, &head_bytes, err);
+    strl_status status = read_head(record, payload, arena, &head, &head_bytes, err);
     if (status == STRL_OK)
         status = check_sizes(record, payload + head_bytes, record->payload_bytes - head_bytes, err);
     if (status == STRL_OK)

@@ -98,6 +98,8 @@ static strl_status read_runs(strl_cursor *cursor, uint32_t triangles, strl_arena
         sum += head->run[i].count;
         if (head->run[i].level > head->level_count)
             return strl__fail(err, STRL_ERR_FORMAT, "a brick of %u levels has triangles of level %u", head->level_count, head->run[i].level);
+        if (head->run[i].count == 0)
+            return strl__fail(err, STRL_ERR_FORMAT, "run %u of a brick has no triangle, expected at least one", i);
     }
     return sum == triangles ? STRL_OK
                             : strl__fail(err, STRL_ERR_FORMAT, "the runs of a brick have %llu triangles, its mesh has %u",

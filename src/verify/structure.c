@@ -50,6 +50,10 @@ static void check_errors(strl__model *model, const strl__vtree *tree, uint32_t i
         RULE(ERRORS, n->geometric_min >= tree->leaf_geometric, id,
              "tree %u node %u: a leaf claims %g, less than quantisation (%g)", tree->index, id,
              (double)n->geometric_min, (double)tree->leaf_geometric);
+    if (tree->structure == 3)
+        RULE(ERRORS, n->geometric_min == n->geometric_max && n->geometric_max == n->group_geometric && n->step_count == 0 && n->group_size == 1, id,
+             "tree %u node %u: a brick has the sizes %g, %g and %g, %u steps and %u members, expected one size, no step and no other member",
+             tree->index, id, (double)n->geometric_min, (double)n->geometric_max, (double)n->group_geometric, n->step_count, n->group_size);
     if (id == 0)
         return;
     const strl__vnode *p = &tree->nodes[n->parent];

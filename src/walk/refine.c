@@ -54,7 +54,8 @@ static void choose_state(strl_walk *walk, const strl__active *active)
     strl__node *node = active->node;
     const projector p = {&active->sight, node->mesh.errors, walk->placements[active->placement].length_scale,
                          walk->stats.allowed_error_px};
-    uint32_t state = coarsest_state(&p, node->mesh.state, node->mesh.step_count);
+    /* Beside what is below it a brick shows no splats: its record may open it before its own, smaller cells ask for that. */
+    uint32_t state = active->open ? node->mesh.step_count : coarsest_state(&p, node->mesh.state, node->mesh.step_count);
     if (node->front_frame != walk->frame) {
         node->was_drawn = node->drawn_frame > 0 && node->drawn_frame + 1 == walk->frame;
         node->front_frame = walk->frame;

@@ -16,7 +16,7 @@ typedef struct shown {
 static shown shown_splats(const strl__active *active)
 {
     const strl__mesh *mesh = &active->node->mesh;
-    if (!active->sight.seen || !mesh->splat_end || mesh->state >= mesh->step_count)
+    if (active->sight.empty || !mesh->splat_end || mesh->state >= mesh->step_count)
         return (shown){0};
     uint32_t first = mesh->state ? mesh->splat_end[mesh->state - 1] : 0;
     return (shown){mesh->splats + first, mesh->splat_end[mesh->state] - first};
@@ -26,7 +26,7 @@ static shown shown_splats(const strl__active *active)
 static shown missing_splats(const strl__active *active)
 {
     const strl__mesh *mesh = &active->node->mesh;
-    if (!active->sight.seen || !mesh->splat_end || mesh->state < mesh->step_count || active->open ||
+    if (active->sight.empty || !mesh->splat_end || mesh->state < mesh->step_count || active->open ||
         active->node->record->child_count == 0)
         return (shown){0};
     uint32_t first = mesh->step_count > 1 ? mesh->splat_end[mesh->step_count - 2] : 0;

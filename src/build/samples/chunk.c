@@ -5,7 +5,7 @@
 #include "base/fail.h"
 #include "build/ingest/normals.h"
 
-#define LEAF_TRIANGLES 128u
+#define LEAF_TRIANGLES 256u
 /* Of one bucket, more than these stay where they are, and the cells there count as so large: what is at the top is held in memory. */
 #define MOST_RISEN 2048u
 /* What a bucket takes in memory while it is worked on, in the size of its records: these, triangles, keys twice, cells, payloads. */
@@ -286,8 +286,10 @@ static strl_status finish(void *context, uint64_t index, unsigned slot, unsigned
                     !strl__grow(&all->risen, &all->risen_capacity, all->risen_count + made->chunks.risen_count, sizeof *all->risen)))
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu pieces", all->count);
     if (!status) {
-        memcpy(all->chunk + all->count, made->chunks.chunk, made->chunks.count * sizeof *all->chunk);
-        memcpy(all->risen + all->risen_count, made->chunks.risen, made->chunks.risen_count * sizeof *all->risen);
+        if (made->chunks.count)
+            memcpy(all->chunk + all->count, made->chunks.chunk, made->chunks.count * sizeof *all->chunk);
+        if (made->chunks.risen_count)
+            memcpy(all->risen + all->risen_count, made->chunks.risen, made->chunks.risen_count * sizeof *all->risen);
         all->count += made->chunks.count;
         all->risen_count += made->chunks.risen_count;
         for (size_t i = 0; i < made->chunks.count; i++)

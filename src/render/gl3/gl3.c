@@ -61,6 +61,12 @@ static strl_status make_room(gl3_draw *draw, uint64_t bytes, strl_error *err)
     return STRL_OK;
 }
 
+/* Splats are points in a wireframe too. */
+static bool drawn_as_lines(const gl3_draw *draw, const strl_draw_item *item)
+{
+    return draw->lines && !(item->point_px > 0);
+}
+
 /* Room for a quarter more indices than now, so that refining does not mean a new buffer each time. */
 static uint32_t index_room(const strl_draw_item *item, bool lines)
 {
@@ -71,7 +77,8 @@ static uint32_t index_room(const strl_draw_item *item, bool lines)
 static strl_status add(gl3_draw *draw, const strl_draw_item *item, strl_cache_entry **entry, strl_error *err)
 {
     gl3_renderer *self = draw->self;
-    uint32_t room = index_room(item, draw->lines);
+    bool lines = drawn_as_lines(draw, item);
+    uint32_t room = index_room(item, lines);
     uint64_t vertex_bytes = item->vertex_count * sizeof(strl_vertex), index_bytes = room * sizeof(uint16_t);
     strl_status status = make_room(draw, vertex_bytes + index_bytes, err);
     if (status != STRL_OK)
@@ -81,7 +88,7 @@ static strl_status add(gl3_draw *draw, const strl_draw_item *item, strl_cache_en
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for the renderer's table of nodes");
     made->bytes = vertex_bytes + index_bytes;
     made->index_capacity = room;
-    made->lines = draw->lines;
+    made->lines = lines;
     made->translucent = strl__item_is_translucent(item);
     self->node_bytes += made->bytes;
     glGenVertexArrays(1, &made->place.names.array);
@@ -133,7 +140,7 @@ static strl_status upload_indices(gl3_draw *draw, const strl_draw_item *item, st
     if (upload.index_count == 0)
         return STRL_OK;
     draw->stats->uploaded_indices += upload.index_count;
-    if (draw->lines)
+    if (drawn_as_lines(draw, item))
         return upload_lines(draw, item, upload.first_index, upload.index_count, err);
     glBufferSubData(GL_ELEMENT_ARRAY_BUFFER, (GLintptr)(upload.first_index * sizeof(uint16_t)),
                     (GLsizeiptr)(upload.index_count * sizeof(uint16_t)), item->indices + upload.first_index);
@@ -144,8 +151,9 @@ static strl_status upload_indices(gl3_draw *draw, const strl_draw_item *item, st
 static strl_status make_resident(gl3_draw *draw, const strl_draw_item *item, strl_cache_entry **out, strl_error *err)
 {
     strl_cache_entry *entry = strl__cache_find(&draw->self->gl.cache, item->key);
-    uint32_t needed = draw->lines ? item->index_count * 2 : item->index_count;
-    if (entry && (entry->lines != draw->lines || entry->vertex_count != item->vertex_count || entry->index_capacity < needed)) {
+    bool lines = drawn_as_lines(draw, item);
+    uint32_t needed = lines ? item->index_count * 2 : item->index_count;
+    if (entry && (entry->lines != lines || entry->vertex_count != item->vertex_count || entry->index_capacity < needed)) {
         release(draw->self, entry);
         entry = NULL;
     }
@@ -186,7 +194,7 @@ static strl_status draw_item(gl3_draw *draw, const strl_draw_item *item, const s
     glUniform4fv(program->rows, 6, record->rows[0]);
     glUniform4iv(program->base, 2, record->base[0]);
     GLsizei count = (GLsizei)item->index_count;
-    bool lines = draw->lines && !points;
+    bool lines = drawn_as_lines(draw, item);
     glDrawElements(points ? GL_POINTS : lines ? GL_LINES : GL_TRIANGLES, lines ? 2 * count : count, GL_UNSIGNED_SHORT, NULL);
     draw->stats->triangles += points ? 0 : item->index_count / 3;
     draw->stats->items++;

@@ -153,7 +153,7 @@ static strl_status null_draw(strl_renderer *renderer, const strl_draw_setup *set
         status = strl__check_item_counts(item, err);
         if (status == STRL_OK)
             status = strl__check_item_contents(item, err);
-        if (status != STRL_OK || !item->visible)
+        if (status != STRL_OK || !item->visible || item->index_count == 0)
             continue;
         status = check_keys(self, item, in_this_list, err);
         if (status == STRL_OK)
@@ -161,7 +161,7 @@ static strl_status null_draw(strl_renderer *renderer, const strl_draw_setup *set
         if (status != STRL_OK)
             continue;
         self->cache.newest->batch = in_this_list;
-        stats->triangles += item->index_count / 3;
+        stats->triangles += item->point_px > 0 ? 0 : item->index_count / 3;
         stats->items++;
         stats->draws++;
     }

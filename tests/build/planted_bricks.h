@@ -1,0 +1,14 @@
+/* Copies of a sample tree's container with a lie in it, written anew by the container's writer, so that all checksums are right. */
+#ifndef STRL_TESTS_BUILD_PLANTED_BRICKS_H
+#define STRL_TESTS_BUILD_PLANTED_BRICKS_H
+
+#include "build/sample_tree.h"
+
+/* What a lie sees of each node; it may change all three, the mesh by returning true. Triangles then lie in one run of level 1. */
+typedef bool (*brick_lie)(void *context, uint32_t id, strl_node *record, test_brick *brick, strl_pm *mesh);
+
+/* Names are of files in the folder of built.h. */
+void plant_bricks(const char *good, const char *bad, brick_lie lie, void *context);
+bool no_brick_lie(void *context, uint32_t id, strl_node *record, test_brick *brick, strl_pm *mesh);
+
+#endif

@@ -1,0 +1,148 @@
+#!/usr/bin/env python3
+"""stroll on sample trees, from outside: what is refused, what is told of them, and images that end where `--full` is.
+
+usage: test_samples_command.py PROGRAM"""
+import json
+import os
+import sys
+from random import Random
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "build"))
+sys.dont_write_bytecode = True
+from building import assert_refused, build, must, run, run_tests, sanitizers  # noqa: E402
+
+TRIANGLES = "12K" if sanitizers() else "60K"
+CAMERAS = ("eye 9 -7 6 target 0 0 4 up 0 0 1 fov 50", "eye 1 -2 3 target 0 3 5 up 0 0 1 fov 70",
+           "eye 60 40 30 target 0 0 0 up 0 0 1 fov 40")
+BACKENDS = ("gl45", "gl3", "gles")
+
+
+def read(path):
+    with open(path, "rb") as file:
+        return file.read()
+
+
+def plant(folder):
+    source, out = os.path.join(folder, "in.ply"), os.path.join(folder, "out.stroll")
+    must("scene", "plant", "--triangles", TRIANGLES, "-o", source, "--quiet")
+    return source, out, build(source, out, "--structure", "samples")
+
+
+def faces(path):
+    """Triangles of a binary PLY, each as the places of its corners."""
+    data = read(path)
+    head, body = data.split(b"end_header\n", 1)
+    counts = {words[1]: int(words[2]) for words in (line.split() for line in head.decode().split("\n")) if words[:1] == ["element"]}
+    return counts["vertex"], counts["face"], len(body)
+
+
+def what_samples_cannot_do_is_refused(folder):
+    source, out = os.path.join(folder, "in.ply"), os.path.join(folder, "out.stroll")
+    must("scene", "boxes", "--triangles", "1K", "-o", source, "--quiet")
+    for words, part in ((("--certify",), "--certify"), (("--resume",), "--resume"), (("--no-dependencies",), "--no-dependencies"),
+                        (("--probability", "0"), "probability"), (("--probability", "1"), "probability"),
+                        (("--probability", "-0.5"), "probability"), (("--probability", "nan"), "probability"),
+                        (("--memory", "63M"), "memory")):
+        done = run("build", source, "-o", out, "--structure", "samples", *words)
+        assert done.code != 0 and done.error.count("\n") == 1 and len(done.error) > 20 and part in done.error, done
+        assert os.listdir(folder) == ["in.ply"], done
+    assert_refused(run("build", os.path.join(folder, "absent.ply"), "-o", out, "--structure", "samples"), "absent.ply")
+    for probability in ("0.01", "0.5", "0.999999999999"):
+        assert build(source, out, "--structure", "samples", "--probability", probability)["triangles_leaf"] > 900
+
+
+def info_tells_what_it_is(folder):
+    _, out, result = plant(folder)
+    tree = json.loads(must("info", out, "--json").output)["trees"][0]
+    assert tree["structure"] == "samples" and tree["triangles"] == result["triangles_leaf"] == result["triangles_in"], tree
+    assert tree["nodes"] == tree["groups"] == result["nodes"] and tree["root_triangles"] == result["root_triangles"] <= 16384
+    assert sum(level["nodes"] for level in tree["per_level"]) == tree["nodes"]
+    for level in tree["per_level"]:
+        assert level["rungs"]["sampled"] == level["nodes"] and level["steps"] == 0, level
+    assert sum(level["triangles"] for level in tree["per_level"]) == tree["triangles"]
+    assert "samples" in must("info", out).output
+
+
+def verify_proves_it_and_not_against_another(folder):
+    source, out, _ = plant(folder)
+    assert json.loads(must("verify", out, "--json", "--against", source).output)["ok"]
+    other = os.path.join(folder, "other.ply")
+    must("scene", "plant", "--triangles", TRIANGLES, "--seed", "2", "-o", other, "--quiet")
+    done = run("verify", out, "--json", "--against", other)
+    assert done.code == 1 and not json.loads(done.output)["ok"], done
+
+
+def extract_gives_what_is_above_a_front(folder):
+    _, out, result = plant(folder)
+    mesh, counts = os.path.join(folder, "out.ply"), []
+    for error in ("0", "0.1", "0.5", "2", "1000"):
+        must("extract", out, "--error", error, "-o", mesh)
+        counts.append(faces(mesh)[1])
+    assert counts[0] == result["triangles_leaf"], counts
+    assert counts == sorted(counts, reverse=True) and counts[-1] >= result["root_triangles"] and counts[-1] < counts[0] / 2, counts
+
+
+def render(model, folder, *words):
+    """Bytes of the image, and what its one line of statistics says."""
+    image, stats = os.path.join(folder, "image.png"), os.path.join(folder, "stats.jsonl")
+    drawn = () if "null" in words else ("-o", image)
+    must("render", model, "--size", "240x180", "--stats", stats, "--quiet", *drawn, *words)
+    with open(stats, encoding="utf-8") as file:
+        return read(image) if drawn else None, json.loads(file.readlines()[-1])
+
+
+def as_the_error_goes_to_nothing_the_image_is_the_full_one(folder):
+    _, out, result = plant(folder)
+    for number, camera in enumerate(CAMERAS):
+        for backend in BACKENDS if number == 0 else BACKENDS[:1]:
+            words = ("--camera", camera, "--backend", backend)
+            full, _ = render(out, folder, "--full", *words)
+            image, stats = render(out, folder, "--error", "1e-6", *words)
+            assert image == full, (backend, camera)
+            assert stats["missing_nodes"] == stats["splats"] == stats["faults"] == 0, stats
+            assert stats["triangles"] == result["triangles_leaf"] or stats["nodes_culled"] > 0, stats
+
+
+def other_errors_draw_fewer_triangles_and_splats(folder):
+    _, out, result = plant(folder)
+    before = result["triangles_leaf"] + 1
+    for error in ("1", "4", "16"):
+        image, stats = render(out, folder, "--error", error, "--camera", CAMERAS[2])
+        again, _ = render(out, folder, "--error", error, "--camera", CAMERAS[2])
+        assert image == again
+        assert stats["missing_nodes"] == 0 and stats["triangles"] < before and stats["splats"] > 0, stats
+        before = stats["triangles"]
+        _, null = render(out, folder, "--error", error, "--camera", CAMERAS[2], "--backend", "null")
+        assert (null["triangles"], null["splats"], null["nodes"]) == (stats["triangles"], stats["splats"], stats["nodes"]), null
+
+
+def a_wireframe_shows_splats_as_they_are(folder):
+    """ES draws its own lines."""
+    _, out, _ = plant(folder)
+    for backend in BACKENDS:
+        _, stats = render(out, folder, "--error", "4", "--camera", CAMERAS[2], "--wireframe", "--backend", backend)
+        assert stats["splats"] > 0 and stats["faults"] == 0, stats
+
+
+def within_little_memory_it_coarsens(folder):
+    _, out, _ = plant(folder)
+    _, ample = render(out, folder, "--error", "0.5", "--camera", CAMERAS[0])
+    assert ample["resident_bytes"] > 5 << 18, ample
+    for memory in (ample["resident_bytes"] * 3 // 4, 1 << 20):
+        _, stats = render(out, folder, "--error", "0.5", "--camera", CAMERAS[0], "--memory", str(memory))
+        assert stats["missing_nodes"] == stats["faults"] == 0 and stats["resident_bytes"] <= memory, stats
+        assert stats["allowed_error_px"] > 0.5 and 0 < stats["triangles"] < ample["triangles"], stats
+
+
+def any_order_of_the_input_gives_the_same_triangles(folder):
+    source, _, _ = plant(folder)
+    shuffled, out = os.path.join(folder, "shuffled.ply"), os.path.join(folder, "shuffled.stroll")
+    must("scene", "plant", "--triangles", TRIANGLES, "--shuffle", "-o", shuffled, "--quiet")
+    build(shuffled, out, "--structure", "samples", "--jobs", str(Random(1).randint(1, 4)))
+    assert json.loads(must("verify", out, "--json", "--against", source).output)["ok"]
+
+
+run_tests(what_samples_cannot_do_is_refused, info_tells_what_it_is, verify_proves_it_and_not_against_another,
+          extract_gives_what_is_above_a_front, as_the_error_goes_to_nothing_the_image_is_the_full_one,
+          a_wireframe_shows_splats_as_they_are, other_errors_draw_fewer_triangles_and_splats, within_little_memory_it_coarsens,
+          any_order_of_the_input_gives_the_same_triangles)
