@@ -86,6 +86,23 @@ static bool is_rest_empty(const strl__gltf *gltf)
     return true;
 }
 
+/* Known at once, because trees of the pieces before need the tables of names to be whole. */
+static strl_status list_names(strl__gltf *gltf, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    for (uint32_t i = 0; i < gltf->reader->piece_count && !status; i++) {
+        const strl__gltf_mesh *mesh = &gltf->meshes[gltf->pieces[i]];
+        uint32_t part, material;
+        status = strl__gltf_name_piece(gltf, gltf->pieces[i], &part, err);
+        for (uint32_t p = 0; p < mesh->primitive_count && !status; p++) {
+            const strl__gltf_primitive *primitive = &gltf->primitives[mesh->first_primitive + p];
+            if (primitive->mode >= 4 && primitive->position != STRL__NO_ITEM)
+                status = strl__gltf_list_material(gltf, primitive->material, &material, err);
+        }
+    }
+    return status;
+}
+
 strl_status strl__gltf_find_pieces(strl__gltf *gltf, strl_error *err)
 {
     size_t count = 0;
@@ -106,7 +123,7 @@ strl_status strl__gltf_find_pieces(strl__gltf *gltf, strl_error *err)
             gltf->rest_triangles = UINT64_MAX;
     }
     gltf->rest_is_empty = is_rest_empty(gltf);
-    return STRL_OK;
+    return list_names(gltf, err);
 }
 
 void strl__gltf_piece_get(const strl_reader *reader, uint32_t piece, strl_reader_piece *facts)

@@ -110,6 +110,7 @@ typedef struct strl_reader_placement {
 
 uint32_t strl_reader_piece_count(const strl_reader *reader); /* with piece 0, at least 1 */
 void strl_reader_piece_get(const strl_reader *reader, uint32_t piece, strl_reader_piece *facts);
+/* Parts and materials of the pieces other than 0 are known from opening on. */
 /* To the first triangle of a piece, as rewind. Drops are then those of a pass over the piece. */
 strl_status strl_reader_select(strl_reader *reader, uint32_t piece, strl_error *err);
 /* The placements of all pieces in the order of the file, as a stream: begin -> (next)* until *found is false. Then select or
