@@ -9,7 +9,7 @@
 
 #define DEFAULT_MEMORY_BYTES ((uint64_t)512 << 20)
 #define DEFAULT_REQUESTS 16u
-#define MAX_PLACEMENTS (1u << 24) /* what a draw item's key can tell apart */
+#define MAX_PLACEMENTS (1u << 24)
 #define AHEAD_FRAMES 15           /* how far the eye's motion is carried on for prefetching */
 #define AHEAD_EVERY 4             /* frames between two looks ahead */
 
