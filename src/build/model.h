@@ -44,6 +44,8 @@ strl_status strl__model_run(strl_build_context *context, strl_error *err);
 strl_status strl__model_open(strl_build_context *context, strl_error *err);
 /* One tree, of all that the inputs have, once. Only of such a model are finished stages kept. */
 bool strl__model_is_plain(const strl_build_context *context);
+/* Whether the tree is one that placements put into the model's coordinates. */
+bool strl__model_has_placements(const strl_build_context *context);
 bool strl__model_is_last_tree(const strl_build_context *context);
 /* Whether the tree is made of this input. */
 bool strl__model_reads(const strl_build_context *context, uint32_t input);

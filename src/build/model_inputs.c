@@ -299,6 +299,12 @@ bool strl__model_is_plain(const strl_build_context *context)
     return model->tree_count == 1 && (!model->trees || model->trees[0].input == STRL_EVERY_INPUT);
 }
 
+bool strl__model_has_placements(const strl_build_context *context)
+{
+    const strl_build_model *model = context->model;
+    return model->trees && model->trees[model->tree].input != STRL_EVERY_INPUT;
+}
+
 bool strl__model_is_last_tree(const strl_build_context *context)
 {
     return context->model->tree + 1 == context->model->tree_count;

@@ -56,6 +56,13 @@ static strl_status check_root(const strl_hierarchy *hierarchy, strl_error *err)
                             root->base_triangle_count, STRL_ROOT_MAX_TRIANGLES);
 }
 
+/* Of the root, which has no neighbour whose error it should share. */
+static void go_on_to_the_end(strl_hierarchy *hierarchy)
+{
+    hierarchy->most_target = hierarchy->soft_triangles = STRL_PLACED_ROOT_TRIANGLES;
+    hierarchy->even_error = 0;
+}
+
 static strl_status simplify_levels(strl_hierarchy *hierarchy, const strl_position *from, strl_error *err)
 {
     static const char *const names[] = {"level 0", "level 1", "level 2", "level 3", "level 4", "level 5", "level 6",
@@ -64,6 +71,8 @@ static strl_status simplify_levels(strl_hierarchy *hierarchy, const strl_positio
     for (uint32_t level = from->level; level <= hierarchy->partition->depth && !status; level++) {
         uint32_t first = level == from->level ? from->done : 0;
         strl__build_stage(hierarchy->context, names[level < 10 ? level : 10]);
+        if (level == hierarchy->partition->depth && strl__model_has_placements(hierarchy->context))
+            go_on_to_the_end(hierarchy);
         if (first == 0)
             status = strl_level_open(hierarchy, level, err);
         if (!status)
@@ -171,7 +180,7 @@ strl_status strl__clusters_run(strl_build_context *context, strl_error *err)
     strl_ingest ingest = {0};
     strl_partition partition = {0};
     strl_hierarchy hierarchy = {.context = context, .ingest = &ingest, .partition = &partition, .growth = FIRST_GROWTH,
-                                .soft_triangles = STRL_SOFT_TRIANGLES};
+                                .soft_triangles = STRL_SOFT_TRIANGLES, .most_target = UINT32_MAX};
     strl_status status = run_stages(&hierarchy, &partition, err);
     if (!status && ingest.triangle_count) {
         fill_result(&hierarchy, context->result);
