@@ -101,6 +101,14 @@ typedef struct strl__placement {
     double length_scale; /* world units per lattice unit, at most */
 } strl__placement;
 
+/* Boxes over runs of placements, or of the boxes of the level below (placements.c). */
+typedef struct strl__bound_level {
+    strl_box *boxes; /* [count], owned */
+    uint32_t count;
+} strl__bound_level;
+
+#define STRL__BOUND_LEVELS 7u /* for 2^24 placements in runs of 16 */
+
 typedef struct strl__walk_tree {
     const strl_tree *tree; /* borrowed from the container */
     strl__node *root;      /* NULL where no placement uses the tree */
@@ -259,6 +267,8 @@ struct strl_walk {
     uint32_t tree_count;
     strl__placement *placements;
     uint32_t placement_count;
+    strl__bound_level bound_levels[STRL__BOUND_LEVELS];
+    uint32_t bound_level_count;
     uint64_t root_bytes; /* meshes of the roots */
 
     uint64_t frame, pass, loads, tokens;
@@ -304,6 +314,12 @@ void strl__mesh_deinit(strl__mesh *mesh);
 /* Moves to another state in time proportional to the corners that change; widens [*first, *end) to
  * hold them. */
 void strl__mesh_set_state(strl__mesh *mesh, uint32_t state, uint32_t *first, uint32_t *end);
+
+/* placements.c */
+strl_status strl__placements_load(strl_walk *walk, strl_error *err);
+void strl__placements_deinit(strl_walk *walk);
+/* The first placement from `from` on that the camera may see; placement_count where there is none. */
+uint32_t strl__placements_next(const strl_walk *walk, const strl_view *view, uint32_t from);
 
 /* treelets.c */
 strl__treelet *strl__treelets_find(const strl__treelets *treelets, uint32_t tree, uint32_t index);
