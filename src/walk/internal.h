@@ -277,6 +277,7 @@ struct strl_walk {
 
     strl__treelets treelets;
     uint64_t treelet_bytes; /* part of resident_bytes */
+    uint64_t placement_bytes; /* the same; 0 where there are few */
     uint64_t resident_bytes;
     strl__node *oldest, *newest;
 

@@ -1,7 +1,8 @@
 /* The placements of a model, and boxes over them: a frame looks at those whose boxes the camera sees.
  *
  * A file has placements that are near each other in order (build/place.c). Boxes are over runs of them as they come, so they need
- * no table in the file; where a file has another order they are only larger. All placements are in memory, under memory_bytes. */
+ * no table in the file; where a file has another order they are only larger. All placements are in memory: at most half of
+ * memory_bytes, and where they are many counted with the records. */
 #include "walk/internal.h"
 
 #include <inttypes.h>
@@ -10,6 +11,7 @@
 
 #define MAX_PLACEMENTS (1u << 24)
 #define RUN 16u /* items under one box */
+#define PLACEMENT_BYTES (sizeof(strl__placement) + sizeof(strl_box) / (RUN - 1) + 1) /* with its share of the boxes */
 
 /* The largest singular value of a placement: the root of the largest eigenvalue of its transposed
  * times itself, by Jacobi rotations; a little more for rounding, because errors must stay bounds.
@@ -43,7 +45,7 @@ static double largest_scale(const double transform[12])
 static strl_status load_all(strl_walk *walk, strl_error *err)
 {
     uint64_t count = strl_container_get_info(walk->container)->placement_count;
-    if (count == 0 || count > MAX_PLACEMENTS || count > walk->memory_bytes / sizeof(strl__placement))
+    if (count == 0 || count > MAX_PLACEMENTS || count > walk->memory_bytes / 2 / PLACEMENT_BYTES)
         return strl__fail(err, count ? STRL_ERR_LIMIT : STRL_ERR_FORMAT,
                           "the container has %" PRIu64
                           " placements, expected at least 1 and no more than memory for walking allows",
@@ -89,6 +91,12 @@ static void include(strl_box *box, const strl_box *other)
     }
 }
 
+/* A model of few placements is looked at whole, so that its draw lists tell of all of them. */
+static bool is_small(const strl_walk *walk)
+{
+    return walk->placement_count <= RUN;
+}
+
 /* One box for each run of the level below, or of placements. */
 static strl_status add_level(strl_walk *walk, const strl__bound_level *below, uint32_t items, strl_error *err)
 {
@@ -117,6 +125,10 @@ strl_status strl__placements_load(strl_walk *walk, strl_error *err)
         below = &walk->bound_levels[walk->bound_level_count - 1];
         items = below->count;
     }
+    if (status == STRL_OK && !is_small(walk)) {
+        walk->placement_bytes += walk->placement_count * PLACEMENT_BYTES;
+        walk->resident_bytes += walk->placement_count * PLACEMENT_BYTES;
+    }
     return status;
 }
 
@@ -128,12 +140,6 @@ void strl__placements_deinit(strl_walk *walk)
 }
 
 /* ---- looking */
-
-/* A model of few placements is looked at whole, so that its draw lists tell of all of them. */
-static bool is_small(const strl_walk *walk)
-{
-    return walk->placement_count <= RUN;
-}
 
 uint32_t strl__placements_next(const strl_walk *walk, const strl_view *view, uint32_t from)
 {

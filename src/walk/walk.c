@@ -192,7 +192,7 @@ static strl_status look_ahead(strl_walk *walk, const strl_camera *camera, strl_e
     strl__cut cut = {.kind = STRL__CUT_PREFETCH,
                      .view = &view,
                      .allowed_px = walk->stats.allowed_error_px,
-                     .capacity_bytes = walk->memory_bytes - walk->treelet_bytes,
+                     .capacity_bytes = walk->memory_bytes - walk->treelet_bytes - walk->placement_bytes,
                      .stop_at_capacity = true};
     return strl__cut_run(walk, &cut, err);
 }
