@@ -6,7 +6,7 @@ import math
 import os
 import sys
 
-from building import assert_refused, build, check_result, must, run, run_tests
+from building import build, check_result, must, run, run_tests
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "readers"))
 import gltf_writer as w  # noqa: E402
@@ -56,6 +56,17 @@ def assembly(path, is_shared, shift=0.0):
     model.glb(path)
 
 
+def check_images(reference, folder):
+    """Coverage is exact; of depth only little differs, at silhouettes (as it does for the expansion)."""
+    found = json.loads(run("compare", reference, folder, "--json").output)
+    assert (found["uncovered_pixels"], found["overcovered_pixels"]) == (0, 0), found
+    assert found["depth_within"] > 0.997 and found["psnr_median_db"] > 38, found
+
+
+def assert_flawed(done, part):
+    assert done.code == 1 and part in done.error and "NOT good" in done.output, done
+
+
 def a_model_and_its_expansion_look_the_same(folder):
     assembly(f"{folder}/shared.glb", True)
     assembly(f"{folder}/whole.glb", False)
@@ -76,12 +87,12 @@ def a_model_and_its_expansion_look_the_same(folder):
         must("render", f"{folder}/shared.stroll", "-o", f"{folder}/{backend}", "--backend", backend, "--stats", f"{folder}/{backend}.jsonl",
              *again)
         for reference in ("full", "whole"):
-            must("compare", f"{folder}/{reference}", f"{folder}/{backend}", "--psnr", "35")
+            check_images(f"{folder}/{reference}", f"{folder}/{backend}")
         frames = [json.loads(line) for line in open(f"{folder}/{backend}.jsonl", encoding="utf-8")]
         assert all(frame["nodes"] + frame["nodes_culled"] >= 40 for frame in frames), frames
         # 49 balls are uploaded once, not 49 times: 24 bytes a vertex and its share of indices.
         assert sum(frame["uploaded_bytes"] for frame in frames) < 3 * 60 * shared["vertices"], frames
-    must("render", f"{folder}/shared.stroll", "-o", f"{folder}/null", "--backend", "null", "--path", f"{folder}/whole/path.json", "--quiet")
+    must("render", f"{folder}/shared.stroll", "--backend", "null", "--path", f"{folder}/whole/path.json", "--quiet")
     assert info["placements"] == 50, info
 
 
@@ -103,9 +114,9 @@ def other_placements_are_found_out(folder):
     assembly(f"{folder}/whole.glb", False)
     build(f"{folder}/a.glb", f"{folder}/a.stroll")
     build(f"{folder}/whole.glb", f"{folder}/whole.stroll")
-    assert_refused(run("verify", f"{folder}/a.stroll", "--against", f"{folder}/moved.glb"), "placements are not those of the input")
-    assert_refused(run("verify", f"{folder}/whole.stroll", "--against", f"{folder}/a.glb"), "the input makes 2 trees, the container has 1")
-    assert_refused(run("verify", f"{folder}/a.stroll", "--against", f"{folder}/whole.glb"), "the input makes 1 trees, the container has 2")
+    assert_flawed(run("verify", f"{folder}/a.stroll", "--against", f"{folder}/moved.glb"), "placements are not those of the input")
+    assert_flawed(run("verify", f"{folder}/whole.stroll", "--against", f"{folder}/a.glb"), "the input makes 2 trees, the container has 1")
+    assert_flawed(run("verify", f"{folder}/a.stroll", "--against", f"{folder}/whole.glb"), "the input makes 1 trees, the container has 2")
 
 
 def several_inputs_share_what_each_uses_often(folder):
