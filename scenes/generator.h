@@ -23,7 +23,12 @@ strl_status strl__scene_isosurface(strl__scene_run *run, strl_error *err);
 strl_status strl__scene_painted_plane(strl__scene_run *run, strl_error *err);
 strl_status strl__scene_plain_plane(strl__scene_run *run, strl_error *err);
 strl_status strl__scene_boxes(strl__scene_run *run, strl_error *err);
+strl_status strl__scene_chessboard(strl__scene_run *run, strl_error *err);
+strl_status strl__scene_landscape(strl__scene_run *run, strl_error *err);
 strl_status strl__scene_plant(strl__scene_run *run, strl_error *err);
+
+/* Copies of the model desc->of, whatever it is, onto one .gltf: not through a writer of meshes or parts (array.c). */
+strl_status strl__scene_array(const strl__scene_run *run, strl_scene_result *result, strl_error *err);
 
 /* Everything about an isosurface's extraction that does not depend on the tile. */
 typedef struct strl__isosurface {

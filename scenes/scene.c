@@ -6,43 +6,41 @@
 
 #include "base/fail.h"
 #include "scenes/generator.h"
+#include "scenes/landscape/landscape.h"
 #include "scenes/plant/plant.h"
 
 typedef struct scene_entry {
     strl_scene_info info;
     strl_status (*generate)(strl__scene_run *run, strl_error *err);
     strl__scene_mesh_layout layout;
-    bool in_parts; /* writes to run->parts, not to run->writer */
+    const strl__material *materials; /* [material_count] of a scene in parts: it writes to run->parts, not to run->writer */
+    unsigned material_count;
 } scene_entry;
 
+#define SCENE(scene, text, least, most) .info = {.name = (scene), .summary = (text), .triangles_min = (least), .triangles_max = (most)}
+
 static const scene_entry scenes[] = {
-    {{"isosurface",
-      "turbulent mixing layer: high genus, many layers, open at its four side walls only (count within 2 %)", 1000,
-      4000000000},
-     strl__scene_isosurface,
-     STRL__SCENE_MESH_POSITION_NORMAL,
-     false},
-    {{"painted-plane",
-      "square of jittered triangles with a pattern of sharp edges in vertex colours (count within 2 %)", 1000,
-      4000000000},
-     strl__scene_painted_plane,
-     STRL__SCENE_MESH_POSITION_COLOUR,
-     false},
-    {{"plain-plane", "the same square in one colour", 1000, 4000000000},
-     strl__scene_plain_plane,
-     STRL__SCENE_MESH_POSITION_COLOUR,
-     false},
-    {{"boxes", "separate boxes of any orientation and size in a cube (count rounded down to whole boxes)", 12,
-      3200000000},
-     strl__scene_boxes,
-     STRL__SCENE_MESH_POSITION,
-     false},
-    {{"plant",
-      "power plant of named parts, 12 to 100,000 triangles each: pipes, vessels, steel, bolts; also as glTF and OBJ",
-      10000, 4000000000},
-     strl__scene_plant,
-     STRL__SCENE_MESH_POSITION_NORMAL,
-     true},
+    {SCENE("isosurface", "turbulent mixing layer: high genus, many layers, open at its four side walls only (count within 2 %)",
+           1000, 4000000000),
+     .generate = strl__scene_isosurface, .layout = STRL__SCENE_MESH_POSITION_NORMAL},
+    {SCENE("painted-plane", "square of jittered triangles with a pattern of sharp edges in vertex colours (count within 2 %)", 1000,
+           4000000000),
+     .generate = strl__scene_painted_plane, .layout = STRL__SCENE_MESH_POSITION_COLOUR},
+    {SCENE("plain-plane", "the same square in one colour", 1000, 4000000000),
+     .generate = strl__scene_plain_plane, .layout = STRL__SCENE_MESH_POSITION_COLOUR},
+    {SCENE("boxes", "separate boxes of any orientation and size in a cube (count rounded down to whole boxes)", 12, 3200000000),
+     .generate = strl__scene_boxes, .layout = STRL__SCENE_MESH_POSITION},
+    {SCENE("plant", "power plant of named parts, 12 to 100,000 triangles each: pipes, vessels, steel, bolts; also as glTF and OBJ",
+           10000, 4000000000),
+     .generate = strl__scene_plant, .materials = strl__plant_materials, .material_count = STRL__PLANT_MATERIALS},
+    {SCENE("chessboard", "square of fixed size whose fields are black and white pairs of triangles (whole rows of fields)", 2,
+           1000000000),
+     .generate = strl__scene_chessboard, .layout = STRL__SCENE_MESH_POSITION_COLOUR},
+    {SCENE("landscape", "hills, houses, a forest of detailed trees; in glTF each kind is there once and has copies, other formats have "
+           "the copies' triangles (count within 2 %)", 500000, 4000000000),
+     .generate = strl__scene_landscape, .materials = strl__landscape_materials, .material_count = STRL__LANDSCAPE_MATERIALS},
+    {.info = {.name = "array", .summary = "--copies of the model --of FILE on a square grid, turned at random, as glTF with one mesh",
+              .triangles_max = UINT64_MAX, .copies = true}},
 };
 
 enum { SCENE_COUNT = sizeof scenes / sizeof scenes[0] };
@@ -89,8 +87,8 @@ static strl_status generate_parts(const scene_entry *entry, strl__scene_run *run
 {
     const strl_scene_desc *desc = run->desc;
     const strl__parts_desc parts = {.path = desc->path,
-                                    .materials = strl__plant_materials,
-                                    .material_count = STRL__PLANT_MATERIALS,
+                                    .materials = entry->materials,
+                                    .material_count = entry->material_count,
                                     .no_normals = desc->no_normals,
                                     .shuffle = desc->shuffle,
                                     .seed = desc->seed,
@@ -153,8 +151,10 @@ strl_status strl_scene_write(const strl_scene_desc *desc, const strl_scene_progr
         full.pool = own_pool;
     }
     strl__scene_run run = {.desc = &full, .progress = progress};
-    if (status == STRL_OK)
-        status = (entry->in_parts ? generate_parts : generate)(entry, &run, result, err);
+    if (status == STRL_OK && entry->info.copies)
+        status = strl__scene_array(&run, result, err);
+    else if (status == STRL_OK)
+        status = (entry->materials ? generate_parts : generate)(entry, &run, result, err);
     strl_pool_destroy(own_pool);
     return status;
 }

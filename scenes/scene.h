@@ -18,6 +18,9 @@ typedef struct strl_scene_desc {
         *path; /* the output, .ply or .stl, of parts .gltf or .obj too; appears, or replaces an older file, when it is
                 * whole (platform/output.h). NAME.gltf comes with NAME_000.bin and so on, NAME.obj with NAME.mtl; the
                 * file that names the others is renamed last */
+    const char *of;        /* of the array: the file that is copied, of any kind that readers know */
+    uint64_t copies;       /* of the array; 0 = 100 */
+    const char *importer;  /* of the array: the program that reads foreign formats (readers/reader.h) */
     uint64_t triangles; /* wanted; 0 = 1,000,000. strl_scene_info says how closely a scene keeps to it */
     uint64_t seed;
     uint64_t memory_bytes; /* budget of the buffers; 0 = 256 MiB */
@@ -40,6 +43,7 @@ typedef struct strl_scene_info {
     const char *summary;
     uint64_t triangles_min;
     uint64_t triangles_max; /* PLY's vertex index is a 32-bit int */
+    bool copies;            /* has copies of a model, and as many triangles as these */
 } strl_scene_info;
 
 /* The index-th scene, NULL past the last one. */

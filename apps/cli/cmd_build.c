@@ -60,7 +60,7 @@ static int print_json(const strl_build_result *r)
 {
     uint64_t dropped = r->dropped_nonfinite + r->dropped_degenerate;
     json_t *object = json_pack(
-        "{s:I, s:I, s:{s:I, s:I, s:I, s:I, s:I}, s:f, s:{s:I, s:I, s:I}, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:f, s:f, s:f, s:o, s:I, s:I, s:b}",
+        "{s:I, s:I, s:{s:I, s:I, s:I, s:I, s:I}, s:f, s:{s:I, s:I, s:I}, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:I, s:f, s:f, s:f, s:f, s:o, s:I, s:I, s:b, s:I, s:I}",
         "triangles_in", (json_int_t)r->triangles_in, "triangles_leaf", (json_int_t)r->triangles_leaf, "dropped",
         "triangles", (json_int_t)dropped, "nonfinite", (json_int_t)r->dropped_nonfinite, "degenerate",
         (json_int_t)r->dropped_degenerate, "lines", (json_int_t)r->dropped_lines, "points",
@@ -70,7 +70,8 @@ static int print_json(const strl_build_result *r)
         (json_int_t)r->groups, "levels", (json_int_t)r->levels, "root_triangles", (json_int_t)r->root_triangles,
         "bytes_out", (json_int_t)r->bytes_out, "step", r->step, "quantisation_error", r->quantisation_error, "seconds",
         r->seconds, "cpu_seconds", r->cpu_seconds, "stages", stages_json(r), "peak_rss_bytes", (json_int_t)r->peak_rss_bytes, "scratch_bytes",
-        (json_int_t)r->scratch_bytes, "resumed", r->resumed);
+        (json_int_t)r->scratch_bytes, "resumed", r->resumed, "trees", (json_int_t)r->trees, "triangles_placed",
+        (json_int_t)(r->triangles_placed < INT64_MAX ? r->triangles_placed : INT64_MAX));
     if (!object)
         return strl_cli_fail(&(strl_error){STRL_ERR_MEMORY, "no memory to print the result"});
     json_dumpf(object, stdout, JSON_COMPACT);
@@ -100,6 +101,9 @@ static void print_text(const strl_build_result *r, const char *output)
     if (r->triangles_leaf)
         printf(" (%.2f bytes a triangle)", (double)r->bytes_out / (double)r->triangles_leaf);
     putchar('\n');
+    if (r->trees > 1 || r->placements != 1)
+        printf("%u tree%s in %llu placement%s: %llu triangles to be seen\n", r->trees, strl_cli_plural(r->trees),
+               (unsigned long long)r->placements, strl_cli_plural(r->placements), (unsigned long long)r->triangles_placed);
     if (r->dropped_nonfinite + r->dropped_degenerate + r->dropped_lines + r->dropped_points)
         printf("left out: %llu triangle%s not finite, %llu without area on the lattice, %llu line%s, %llu point%s\n",
                (unsigned long long)r->dropped_nonfinite, strl_cli_plural(r->dropped_nonfinite),

@@ -9,6 +9,7 @@
 #include "platform/thread.h"
 #include "progress.h"
 #include "scenes/scene.h"
+#include "shared/importer.h"
 
 static bool show_progress(void *context, const char *phase, uint64_t done, uint64_t total)
 {
@@ -57,7 +58,7 @@ static void describe_scenes(char *text, size_t size)
 
 static int run(strl_cli_args *args)
 {
-    char notes[1024];
+    char notes[2048];
     describe_scenes(notes, sizeof notes);
     strl_scene_desc desc = {.triangles = 1000000};
     uint64_t jobs = strl_cpu_count();
@@ -68,7 +69,7 @@ static int run(strl_cli_args *args)
          .kind = STRL_CLI_STRING,
          .value = &desc.path,
          .argument = "FILE.ply|.stl|.gltf|.obj",
-         .help = "the file to write; its ending says the format; .gltf and .obj are for plant",
+         .help = "the file to write; its ending says the format; .gltf is for array, it and .obj for plant and landscape",
          .required = true},
         {.name = "triangles",
          .letter = 'n',
@@ -77,6 +78,12 @@ static int run(strl_cli_args *args)
          .help = "how many, K M G are powers of 1000 (1M)",
          .least = 1,
          .most = 4e9},
+        {.name = "of",
+         .kind = STRL_CLI_STRING,
+         .value = &desc.of,
+         .argument = "FILE",
+         .help = "of array: the mesh file that is copied"},
+        {.name = "copies", .kind = STRL_CLI_COUNT, .value = &desc.copies, .help = "of array: how many (100)", .least = 1, .most = 16000000},
         {.name = "seed", .kind = STRL_CLI_COUNT, .value = &desc.seed, .help = "another one is another model (0)"},
         {.name = "no-normals", .kind = STRL_CLI_FLAG, .value = &desc.no_normals, .help = "positions only"},
         {.name = "shuffle",
@@ -105,6 +112,9 @@ static int run(strl_cli_args *args)
     const strl_scene_info *info = find_scene(desc.name);
     if (!info)
         return strl_cli_usage_error(args, "there is no scene \"%s\"", desc.name);
+    if (info->copies != (desc.of != NULL))
+        return strl_cli_usage_error(args, info->copies ? "scene %s needs --of FILE" : "scene %s takes no --of", info->name);
+    desc.importer = strl_importer();
     if (desc.triangles < info->triangles_min || desc.triangles > info->triangles_max)
         return strl_cli_usage_error(args, "scene %s has %" PRIu64 " to %" PRIu64 " triangles, not %" PRIu64, info->name,
                                     info->triangles_min, info->triangles_max, desc.triangles);

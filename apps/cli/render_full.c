@@ -78,7 +78,7 @@ static strl_status add_leaf(full_draw *draw, const strl_tree *tree, const strl_c
     if (status != STRL_OK)
         return status;
     strl_draw_item *item = &model->items[model->item_count];
-    *item = (strl_draw_item){.key = (placement << 40 | (uint64_t)cut->tree << 32 | id) + 1,
+    *item = (strl_draw_item){.key = ((uint64_t)cut->tree << 32 | id) + 1,
                              .placement = (uint32_t)placement,
                              .node = id,
                              .level = record->level,

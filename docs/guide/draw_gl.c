@@ -206,6 +206,8 @@ static void upload_indices(drawer *d, gpu_node *node, const strl_draw_item *item
 {
     uint32_t first = item->dirty_first, count = item->dirty_count;
     bool whole = frame == 0 || node->frame + 1 != frame;
+    if (frame != 0 && node->frame == frame)
+        return; /* another placement of the node: in one list all have one state */
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, node->indices);
     if (item->index_count > node->index_capacity) {
         node->index_capacity = item->index_count + item->index_count / 2;

@@ -86,9 +86,13 @@ typedef struct strl_build_result {
     uint64_t missing_images;    /* images of materials that could not be used: these have their colours alone */
     uint32_t coarse_lattices;   /* 1 where the step had to be more than a sixteenth of the 1st-percentile edge */
     uint64_t vertices, nodes, groups, bytes_out, scratch_bytes;
-    uint32_t parts, materials, levels, root_triangles, inputs;
+    uint32_t parts, materials, inputs;
+    uint32_t trees;          /* what is used again and again is a tree of its own, whose triangles are counted once above */
+    uint32_t levels;         /* of the tree that has most */
+    uint32_t root_triangles; /* of all roots */
     uint64_t placements;
-    double step, quantisation_error; /* of the lattice; how far it moves a point at most; model units */
+    uint64_t triangles_placed; /* of the trees, as often as each is placed */
+    double step, quantisation_error; /* of the coarsest lattice; how far it moves a point at most; model units */
     double seconds, cpu_seconds;
     strl_build_stage stages[STRL_BUILD_STAGES];
     uint64_t peak_rss_bytes;

@@ -40,7 +40,8 @@ typedef enum strl_positions {
 
 /* One active node of one placement. All pointers are borrowed from the walk until its next frame. */
 typedef struct strl_draw_item {
-    uint64_t key;          /* (placement, node, load): equal keys have equal vertices */
+    uint64_t key;          /* (node, load): equal keys have equal vertices, in one list also equal states: all placements of a node
+                              share what is on the GPU */
     uint32_t placement, node, level, group;
     uint32_t state;        /* refinement step; the indices are a function of (key, state) */
     bool visible;          /* intersects the view frustum (and is not known to be hidden) */

@@ -4,7 +4,8 @@
  * accessors in another: each array grows in a file without a name and is put in its place at the end, so that no list
  * of parts is ever in memory. A node comes after its children, hence an open group holds the numbers of its children,
  * except for the outermost one, whose children wait in a file too. Vertices and indices are collected to batches of
- * some megabytes; each kind of a batch is one bufferView, which keeps the JSON short. */
+ * some megabytes; each kind of a batch is one bufferView, which keeps the JSON short. Copies of a part are one node with
+ * EXT_mesh_gpu_instancing. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
@@ -21,8 +22,10 @@ enum {
     BATCH_BYTES = 4u << 20,  /* of vertices; one part may have more */
     SHORT_VERTICES = 0xffff, /* most vertices of a part with 16-bit indices: 65535 itself is no index */
     FLOAT = 5126,
+    FLOATS = -FLOAT, /* four of them */
     UNSIGNED_SHORT = 5123,
-    UNSIGNED_INT = 5125
+    UNSIGNED_INT = 5125,
+    COPIED_MOST = 64 /* meshes with copies */
 };
 
 /* In the first bytes of each file. */
@@ -32,7 +35,7 @@ enum { OWN_HEAD_BYTES = 256 };
 /* JSON arrays that are written beside each other. */
 enum { NODES, MESHES, ACCESSORS, VIEWS, BUFFERS, ROOTS, ARRAYS };
 
-enum { VERTICES, SHORTS, INTS, KINDS };
+enum { VERTICES, SHORTS, INTS, COPIES, KINDS };
 
 /* What one bufferView of the batch will hold. */
 typedef struct batch_kind {
@@ -48,6 +51,12 @@ typedef struct open_node {
     size_t capacity, count;
 } open_node;
 
+/* A mesh that is written already. */
+typedef struct copied_mesh {
+    const strl__part_mesh *mesh; /* borrowed, only compared */
+    uint64_t number;
+} copied_mesh;
+
 typedef struct gltf_writer {
     strl__parts_writer base;
     strl__parts_desc desc;
@@ -61,6 +70,8 @@ typedef struct gltf_writer {
     batch_kind batch[KINDS];
     open_node groups[STRL__GROUP_DEPTH_MOST];
     int depth;
+    copied_mesh copied[COPIED_MOST];
+    int copied_count;
 } gltf_writer;
 
 /* ---- buffers ---- */
@@ -129,7 +140,7 @@ static strl_status put_view(gltf_writer *self, int kind, strl_error *err)
     if (status == STRL_OK && kind == VERTICES)
         status = strl__json_print(json, err, ",\"byteStride\":%d,\"target\":34962}", self->desc.no_normals ? 12 : 24);
     else if (status == STRL_OK)
-        status = strl__json_print(json, err, ",\"target\":34963}");
+        status = strl__json_print(json, err, kind == COPIES ? "}" : ",\"target\":34963}");
     return status;
 }
 
@@ -142,12 +153,10 @@ static strl_status flush_batch(gltf_writer *self, strl_error *err)
     uint64_t written = self->bin.offset + self->bin.used;
     if (total && written && written + total > self->desc.buffer_bytes)
         status = begin_bin(self, err);
-    /* In the order of their numbers: vertices always have the first one. */
-    bool ints_first = self->batch[INTS].used && self->batch[INTS].view < self->batch[SHORTS].view;
-    const int order[KINDS] = {VERTICES, ints_first ? INTS : SHORTS, ints_first ? SHORTS : INTS};
-    for (int i = 0; i < KINDS && status == STRL_OK; i++)
-        if (self->batch[order[i]].used)
-            status = put_view(self, order[i], err);
+    for (uint64_t view = self->counts[VIEWS] > KINDS ? self->counts[VIEWS] - KINDS : 0; view < self->counts[VIEWS]; view++)
+        for (int kind = 0; kind < KINDS && status == STRL_OK; kind++) /* in the order of their numbers */
+            if (self->batch[kind].used && self->batch[kind].view == view)
+                status = put_view(self, kind, err);
     for (int kind = 0; kind < KINDS; kind++)
         self->batch[kind].used = 0;
     return status;
@@ -210,7 +219,8 @@ static strl_status put_accessor(gltf_writer *self, const batch_kind *kind, size_
         status = strl__json_print(&self->arrays[ACCESSORS], err,
                                   "{\"bufferView\":%" PRIu64
                                   ",\"byteOffset\":%zu,\"componentType\":%d,\"count\":%" PRIu32 ",\"type\":\"%s\"",
-                                  kind->view, kind->used - bytes, type, count, type == FLOAT ? "VEC3" : "SCALAR");
+                                  kind->view, kind->used - bytes, type == FLOATS ? FLOAT : type, count,
+                                  type == FLOAT ? "VEC3" : type == FLOATS ? "VEC4" : "SCALAR");
     return status;
 }
 
@@ -278,18 +288,24 @@ static strl_status adopt_node(gltf_writer *self, strl_error *err)
     return STRL_OK;
 }
 
-static strl_status put_part(strl__parts_writer *base, const strl__part *part, strl_error *err)
+/* Vertices, indices, accessors and the element. */
+static strl_status write_mesh(gltf_writer *self, const strl__part *part, strl_error *err)
 {
-    gltf_writer *self = (gltf_writer *)base;
     const strl__part_mesh *mesh = part->mesh;
-    strl__stream *nodes = &self->arrays[NODES];
     int kind = mesh->vertex_count <= SHORT_VERTICES ? SHORTS : INTS;
     uint64_t first = self->counts[ACCESSORS];
     strl_status status = put_mesh(self, mesh, kind, err);
     if (status == STRL_OK)
         status = put_accessors(self, mesh, kind, err);
-    if (status == STRL_OK)
-        status = put_mesh_element(self, part, first, err);
+    return status == STRL_OK ? put_mesh_element(self, part, first, err) : status;
+}
+
+static strl_status put_part(strl__parts_writer *base, const strl__part *part, strl_error *err)
+{
+    gltf_writer *self = (gltf_writer *)base;
+    const strl__part_mesh *mesh = part->mesh;
+    strl__stream *nodes = &self->arrays[NODES];
+    strl_status status = write_mesh(self, part, err);
     if (status == STRL_OK)
         status = begin_element(self, NODES, err);
     if (status == STRL_OK)
@@ -302,6 +318,66 @@ static strl_status put_part(strl__parts_writer *base, const strl__part *part, st
     base->vertices += mesh->vertex_count;
     base->triangles += mesh->triangle_count;
     base->parts++;
+    return status == STRL_OK ? adopt_node(self, err) : status;
+}
+
+static strl_status find_copied(gltf_writer *self, const strl__part *part, uint64_t *number, strl_error *err)
+{
+    for (int i = 0; i < self->copied_count; i++)
+        if (self->copied[i].mesh == part->mesh) {
+            *number = self->copied[i].number;
+            return STRL_OK;
+        }
+    if (self->copied_count == COPIED_MOST)
+        return strl__fail(err, STRL_ERR_INTERNAL, "part %s: more than %d meshes have copies", part->name, COPIED_MOST);
+    strl_status status = write_mesh(self, part, err);
+    *number = self->counts[MESHES] - 1;
+    self->copied[self->copied_count++] = (copied_mesh){part->mesh, *number};
+    return status;
+}
+
+/* Moves, then turns, then scales. */
+static strl_status put_places(gltf_writer *self, const strl__copy *copies, uint32_t count, strl_error *err)
+{
+    static const int types[] = {FLOAT, FLOATS, FLOAT};
+    strl_status status = STRL_OK;
+    if (self->batch[COPIES].used && self->batch[COPIES].used + count * sizeof *copies > BATCH_BYTES)
+        status = flush_batch(self, err);
+    for (int i = 0; i < 3 && status == STRL_OK; i++) {
+        const size_t each = (types[i] == FLOAT ? 3 : 4) * sizeof(float);
+        uint8_t *to = extend_batch(self, COPIES, count * each);
+        if (!to)
+            return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for %" PRIu32 " copies", self->desc.path, count);
+        for (uint32_t k = 0; k < count; k++, to += each) {
+            const float scale[3] = {copies[k].scale, copies[k].scale, copies[k].scale};
+            memcpy(to, i == 0 ? copies[k].move : i == 1 ? copies[k].turn : scale, each);
+        }
+        status = put_accessor(self, &self->batch[COPIES], count * each, types[i], count, err);
+        if (status == STRL_OK)
+            status = strl__json_print(&self->arrays[ACCESSORS], err, "}");
+    }
+    return status;
+}
+
+static strl_status put_copies(strl__parts_writer *base, const strl__part *part, const strl__copy *copies, uint32_t count,
+                              strl_error *err)
+{
+    gltf_writer *self = (gltf_writer *)base;
+    uint64_t mesh = 0;
+    strl_status status = find_copied(self, part, &mesh, err);
+    const uint64_t first = self->counts[ACCESSORS];
+    if (status == STRL_OK)
+        status = put_places(self, copies, count, err);
+    if (status == STRL_OK)
+        status = begin_element(self, NODES, err);
+    if (status == STRL_OK)
+        status = strl__json_print(&self->arrays[NODES], err,
+                                  "{\"name\":\"%s\",\"mesh\":%" PRIu64 ",\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":"
+                                  "{\"TRANSLATION\":%" PRIu64 ",\"ROTATION\":%" PRIu64 ",\"SCALE\":%" PRIu64 "}}}}",
+                                  part->name, mesh, first, first + 1, first + 2);
+    base->vertices += (uint64_t)count * part->mesh->vertex_count;
+    base->triangles += (uint64_t)count * part->mesh->triangle_count;
+    base->parts += count;
     return status == STRL_OK ? adopt_node(self, err) : status;
 }
 
@@ -358,8 +434,9 @@ static strl_status write_head(gltf_writer *self, strl_error *err)
 {
     strl__stream *text = &self->bin;
     strl_status status = strl__json_print(text, err,
-                                          "{\"asset\":{\"version\":\"2.0\"," GENERATOR "},\"scene\":0,\"scenes\":"
+                                          "{\"asset\":{\"version\":\"2.0\"," GENERATOR "},%s\"scene\":0,\"scenes\":"
                                           "[{\"nodes\":[%" PRIu64 "]}],\n\"materials\":[",
+                                          self->copied_count ? "\"extensionsUsed\":[\"EXT_mesh_gpu_instancing\"]," : "",
                                           self->counts[NODES]);
     for (unsigned i = 0; status == STRL_OK && i < self->desc.material_count; i++) {
         status = strl__json_print(text, err, "%s\n", i ? "," : "");
@@ -477,7 +554,7 @@ strl_status strl__gltf_writer_create(const strl__parts_desc *desc, strl__parts_w
     gltf_writer *self = strl__alloc_zero(1, sizeof *self);
     if (!self)
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for the writer", desc->path);
-    self->base = (strl__parts_writer){open_group, put_part, close_group, finish, destroy, 0, 0, 0, 0};
+    self->base = (strl__parts_writer){open_group, put_part, close_group, put_copies, finish, destroy, 0, 0, 0, 0};
     self->desc = *desc;
     self->replaces_own = is_own_model(desc->path);
     strl_status status = open_files(self, err);

@@ -230,7 +230,7 @@ strl_status strl__obj_writer_create(const strl__parts_desc *desc, strl__parts_wr
     if (!self)
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for the writer", desc->path);
     *self = (obj_writer){
-        .base = {open_group, put_part, close_group, finish, destroy, 0, 0, 0, 0},
+        .base = {open_group, put_part, close_group, strl__parts_write_out, finish, destroy, 0, 0, 0, 0},
         .desc = *desc,
         .mtl_path = strl__path_sibling(desc->path, ENDING, ".mtl"),
     };

@@ -17,7 +17,7 @@ strl_status strl_write_names(const strl_ingest *ingest, strl_container_writer *w
     return status;
 }
 
-static bool shows_colour(const strl_ingest *ingest)
+bool strl__shows_colour(const strl_ingest *ingest)
 {
     bool coloured = ingest->has_colours;
     for (size_t i = 0; i < ingest->materials.count; i++)
@@ -32,7 +32,7 @@ strl_container_writer_desc strl_describe_container(const strl_build_context *con
                                        .part_dir = context->part_dir};
     memcpy(desc.info.unit, ingest->unit, sizeof desc.info.unit);
     desc.info.up_axis = (uint32_t)ingest->up;
-    desc.info.has_colour = shows_colour(ingest);
+    desc.info.has_colour = strl__shows_colour(ingest);
     desc.info.triangles_in = result->triangles_in;
     desc.info.dropped_nonfinite = result->dropped_nonfinite;
     desc.info.dropped_degenerate = result->dropped_degenerate;

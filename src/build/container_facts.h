@@ -10,8 +10,9 @@ strl_container_writer_desc strl_describe_container(const strl_build_context *con
 strl_status strl_write_names(const strl_ingest *ingest, strl_container_writer *writer, strl_error *err);
 /* Every triangle that came in is stored or was counted when it was dropped. */
 strl_status strl_check_counts(const strl_build_result *result, strl_error *err);
-/* The whole container of a model without a triangle. */
-strl_status strl_write_empty(const strl_container_writer_desc *desc, strl_structure structure, strl_build_result *result,
-                             strl_error *err);
+/* Whether some vertex or material of the tree is not white. */
+bool strl__shows_colour(const strl_ingest *ingest);
+/* The tree of a model without a triangle. */
+strl_status strl_write_empty_tree(strl_container_writer *writer, strl_structure structure, strl_error *err);
 
 #endif

@@ -10,10 +10,13 @@
 #include "store/spill.h"
 #include "stroll/build.h"
 
+struct strl_build_model;
+
 typedef struct strl_build_context {
     const strl_build_desc *desc;
     strl_build_result *result;
-    strl_status (*run)(struct strl_build_context *context, strl_error *err); /* the builder's stages */
+    strl_status (*run)(struct strl_build_context *context, strl_error *err); /* the builder's stages, of one tree */
+    struct strl_build_model *model; /* of which the tree is (model.h) */
     strl_pool *pool;
     strl_spill_set *spills;
     const char *scratch_dir;
@@ -43,7 +46,7 @@ strl_status strl__build_open_stream(strl_build_context *context, const char *nam
 /* So much scratch was taken at once until now, what readers hold included. */
 void strl__build_note_scratch(strl_build_context *context);
 
-/* The stages of each builder. */
+/* The stages of each builder, for the tree context->model->tree. */
 strl_status strl__clusters_run(strl_build_context *context, strl_error *err);
 strl_status strl__samples_run(strl_build_context *context, strl_error *err);
 

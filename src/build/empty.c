@@ -1,4 +1,4 @@
-/* The container of a model without a triangle: one node that holds nothing, at the origin. What readers have skipped is counted in its
+/* The tree of a model without a triangle: one node that holds nothing, at the origin. What readers have skipped is counted in the
  * header, which is all that such a model has to tell. */
 #include "base/fail.h"
 #include "build/container_facts.h"
@@ -20,7 +20,7 @@ static strl_status encode_nothing(strl_structure structure, strl_arena *arena, s
     return strl_payload_encode(&pm, NULL, arena, payload, NULL, err);
 }
 
-static strl_status add_tree(strl_container_writer *writer, strl_structure structure, strl_error *err)
+strl_status strl_write_empty_tree(strl_container_writer *writer, strl_structure structure, strl_error *err)
 {
     const strl_tree tree = {
         .structure = structure, .step = 1, .node_count = 1, .level_count = 1, .group_count = 1};
@@ -40,20 +40,5 @@ static strl_status add_tree(strl_container_writer *writer, strl_structure struct
         status = strl_container_writer_end_tree(writer, err);
     strl__free(payload.data);
     strl_arena_deinit(&arena);
-    return status;
-}
-
-strl_status strl_write_empty(const strl_container_writer_desc *desc, strl_structure structure, strl_build_result *result,
-                             strl_error *err)
-{
-    strl_container_writer *writer = NULL;
-    strl_status status = strl_container_writer_create(desc, &writer, err);
-    if (!status)
-        status = add_tree(writer, structure, err);
-    if (!status)
-        status = strl_container_writer_finish(writer, &result->bytes_out, err);
-    strl_container_writer_destroy(writer);
-    result->nodes = result->groups = result->levels = result->parts = result->materials = result->placements = 1;
-    result->step = 1;
     return status;
 }

@@ -7,6 +7,7 @@
 #include "base/memory.h"
 #include "build/checkpoint.h"
 #include "build/context.h"
+#include "build/model.h"
 #include "platform/file.h"
 #include "platform/output.h"
 #include "platform/scratch.h"
@@ -211,7 +212,7 @@ static strl_status run_in_scratch(strl_build_context *context, strl_scratch *scr
     if (!status && desc->resume)
         status = resume(context, scratch, err);
     if (!status)
-        status = context->run(context, err);
+        status = strl__model_run(context, err);
     end_stage(context);
     if (context->spills)
         strl__build_note_scratch(context);

@@ -52,7 +52,13 @@ double strl__estimate_seconds(uint64_t triangles, unsigned workers, bool certifi
 
 void strl__estimate_start(strl_estimate *estimate, uint64_t now_ns)
 {
-    *estimate = (strl_estimate){.started_ns = now_ns, .updated_ns = now_ns};
+    *estimate = (strl_estimate){.started_ns = now_ns, .updated_ns = now_ns, .tree_share = 1};
+}
+
+void strl__estimate_tree(strl_estimate *estimate, double first, double share)
+{
+    estimate->tree_first = first;
+    estimate->tree_share = share;
 }
 
 static void set_seconds_left(strl_estimate *estimate)
@@ -82,14 +88,14 @@ void strl__estimate_stage(strl_estimate *estimate, const char *stage)
         estimate->stage_share = stages[i].share;
         return;
     }
-    estimate->stage_first = estimate->share;
+    estimate->stage_first = estimate->tree_share > 0 ? (estimate->share - estimate->tree_first) / estimate->tree_share : 0;
     estimate->stage_share = 0;
 }
 
 void strl__estimate_update(strl_estimate *estimate, uint64_t done, uint64_t total, uint64_t now_ns)
 {
     double part = total ? (done < total ? (double)done / (double)total : 1) : 0;
-    double reached = fmin(estimate->stage_first + part * estimate->stage_share, 1);
+    double reached = fmin(estimate->tree_first + estimate->tree_share * (estimate->stage_first + part * estimate->stage_share), 1);
     double grown = reached - estimate->share;
     /* Without progress time only adds up, so that a stage that stands still is seen in the end. */
     if (grown > 0) {

@@ -17,6 +17,7 @@ typedef struct strl_estimate {
     double seconds, work;            /* of late: the older, the less they count */
     double stage_first, stage_share; /* of the stage under way */
     double first_share;              /* where this run began: 0 unless it resumed */
+    double tree_first, tree_share;   /* of the tree under way, of all; 0 and 1 of a model of one tree */
     uint64_t started_ns, updated_ns;
     uint32_t stage_index; /* of STRL_BUILD_STAGES, 0 before the first */
 } strl_estimate;
@@ -28,6 +29,8 @@ void strl__estimate_start(strl_estimate *estimate, uint64_t now_ns);
 void strl__estimate_guess(strl_estimate *estimate, double seconds);
 /* An unknown name leaves share and index as they are. */
 void strl__estimate_stage(strl_estimate *estimate, const char *stage);
+/* The stages of another tree follow, which begin anew. */
+void strl__estimate_tree(strl_estimate *estimate, double first, double share);
 /* Items of the stage; total 0 = unknown. */
 void strl__estimate_update(strl_estimate *estimate, uint64_t done, uint64_t total, uint64_t now_ns);
 /* Triangles of the whole model a second, on average since this run began; 0 = not known yet. */

@@ -204,6 +204,17 @@ strl_status strl_container_writer_add_image(strl_container_writer *writer, const
     return add_image(writer, head, sizeof head, image->reference, err);
 }
 
+void strl_container_writer_describe(strl_container_writer *writer, const strl_container_info *info)
+{
+    strl_container_info *own = &writer->header.info;
+    own->has_colour = info->has_colour;
+    own->triangles_in = info->triangles_in;
+    own->dropped_nonfinite = info->dropped_nonfinite;
+    own->dropped_degenerate = info->dropped_degenerate;
+    own->dropped_lines = info->dropped_lines;
+    own->dropped_points = info->dropped_points;
+}
+
 static strl_status add_defaults(strl_container_writer *writer, strl_error *err)
 {
     strl_status status = STRL_OK;

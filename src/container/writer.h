@@ -37,6 +37,8 @@ strl_status strl_container_writer_add_material(strl_container_writer *writer, co
 /* Of the next material, in their order; of none, or of each one (a zeroed one where it has no image). */
 strl_status strl_container_writer_add_image(strl_container_writer *writer, const strl_material_image *image,
                                             strl_error *err);
+/* Of info what the desc could not know yet: colour, the counts of input and drops. Before finish. */
+void strl_container_writer_describe(strl_container_writer *writer, const strl_container_info *info);
 /* Completes the file and renames it into place. *bytes_out: its size. Refused after any call that failed. */
 strl_status strl_container_writer_finish(strl_container_writer *writer, uint64_t *bytes_out, strl_error *err);
 /* After finish, or instead of it (then nothing is left behind). NULL is legal. */

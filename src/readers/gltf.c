@@ -218,14 +218,12 @@ static strl_status gltf_prepare(strl_reader *reader, strl_error *err)
 
 static strl_status gltf_start(strl_reader *reader, strl_error *err)
 {
+    strl__gltf *gltf = strl__gltf_of(reader);
     (void)err;
-    strl__gltf_rewind(strl__gltf_of(reader));
+    strl__gltf_rewind(gltf);
+    gltf->pass.is_alone = reader->piece > 0;
+    gltf->pass.mesh = reader->piece ? gltf->pieces[reader->piece - 1] : STRL__NO_ITEM;
     return STRL_OK;
-}
-
-static uint64_t instance_count(const strl__gltf_node *node)
-{
-    return node->instances ? node->instances->count : 1;
 }
 
 /* What of a primitive becomes no triangle. */
@@ -252,23 +250,36 @@ static bool has_triangles(const strl__gltf *gltf, const strl__gltf_primitive *pr
            strl__gltf_triangle_count(primitive->mode, strl__gltf_element_count(gltf, primitive)) > 0;
 }
 
-/* To the next primitive of triangles, node by node, and in each instance by instance. NULL: the
- * end. */
+/* To the next primitive of triangles of the mesh at hand, instance by instance. NULL: its end. */
+static const strl__gltf_primitive *find_in_mesh(strl__gltf *gltf, uint64_t instances)
+{
+    strl__gltf_pass *pass = &gltf->pass;
+    const strl__gltf_mesh *mesh = &gltf->meshes[pass->mesh];
+    for (; pass->primitive < mesh->primitive_count; pass->primitive++) {
+        const strl__gltf_primitive *primitive =
+            &gltf->primitives[mesh->first_primitive + pass->primitive];
+        if (pass->instance == 0)
+            count_drops(gltf, primitive, instances);
+        if (pass->instance < instances && has_triangles(gltf, primitive))
+            return primitive;
+        pass->instance = 0;
+    }
+    return NULL;
+}
+
+/* Node by node. NULL: the end. */
 static const strl__gltf_primitive *find_placement(strl__gltf *gltf)
 {
     strl__gltf_pass *pass = &gltf->pass;
+    if (pass->is_alone)
+        return find_in_mesh(gltf, 1);
     for (;;) {
         const strl__gltf_node *node = pass->has_node ? &gltf->nodes[pass->node] : NULL;
-        const strl__gltf_mesh *mesh =
-            node && node->mesh != STRL__NO_ITEM ? &gltf->meshes[node->mesh] : NULL;
-        for (; mesh && pass->primitive < mesh->primitive_count; pass->primitive++) {
-            const strl__gltf_primitive *primitive =
-                &gltf->primitives[mesh->first_primitive + pass->primitive];
-            if (pass->instance == 0)
-                count_drops(gltf, primitive, instance_count(node));
-            if (pass->instance < instance_count(node) && has_triangles(gltf, primitive))
-                return primitive;
-            pass->instance = 0;
+        if (node && node->mesh != STRL__NO_ITEM && gltf->meshes[node->mesh].piece == 0) {
+            pass->mesh = node->mesh;
+            const strl__gltf_primitive *found = find_in_mesh(gltf, strl__gltf_instance_count(node));
+            if (found)
+                return found;
         }
         pass->primitive = 0;
         pass->instance = 0;
@@ -290,7 +301,7 @@ static strl_status gltf_fill(strl_reader *reader, strl_error *err)
         status = strl__gltf_begin_placement(gltf, primitive, err);
         pass->has_placement = !status;
     }
-    const strl__gltf_mesh *mesh = &gltf->meshes[gltf->nodes[pass->node].mesh];
+    const strl__gltf_mesh *mesh = &gltf->meshes[pass->mesh];
     if (!status)
         status = strl__gltf_add_triangles(
             gltf, &gltf->primitives[mesh->first_primitive + pass->primitive], err);
@@ -304,9 +315,11 @@ static strl_status gltf_fill(strl_reader *reader, strl_error *err)
 static uint64_t gltf_bytes_done(const strl_reader *reader)
 {
     const strl__gltf *gltf = strl__gltf_of(reader);
-    if (reader->ended || gltf->triangles == 0)
+    const uint64_t triangles = reader->piece ? gltf->meshes[gltf->pieces[reader->piece - 1]].triangles
+                                             : gltf->rest_triangles;
+    if (reader->ended || triangles == 0)
         return reader->all_bytes;
-    double share = (double)gltf->pass.done / (double)gltf->triangles;
+    double share = (double)gltf->pass.done / (double)triangles;
     return (uint64_t)(fmin(share, 1) * (double)reader->all_bytes);
 }
 
@@ -333,6 +346,7 @@ static void gltf_close(strl_reader *reader)
     strl__free(gltf->maps);
     strl__free(gltf->samplers);
     strl__free(gltf->images);
+    strl__free(gltf->pieces);
     strl__free(gltf->children);
     strl__free(gltf->roots);
     strl__free(gltf->world);
@@ -352,6 +366,9 @@ const strl__format strl__format_glb = {
     .bytes_done = gltf_bytes_done,
     .check_unchanged = gltf_check_unchanged,
     .close = gltf_close,
+    .piece_get = strl__gltf_piece_get,
+    .start_placements = strl__gltf_start_placements,
+    .next_placement = strl__gltf_next_placement,
 };
 
 const strl__format strl__format_gltf = {
@@ -367,4 +384,7 @@ const strl__format strl__format_gltf = {
     .bytes_done = gltf_bytes_done,
     .check_unchanged = gltf_check_unchanged,
     .close = gltf_close,
+    .piece_get = strl__gltf_piece_get,
+    .start_placements = strl__gltf_start_placements,
+    .next_placement = strl__gltf_next_placement,
 };

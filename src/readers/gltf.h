@@ -109,6 +109,9 @@ typedef struct strl__gltf_mesh {
     uint32_t first_primitive, primitive_count;
     bool is_checked;
     uint64_t triangles, vertices; /* once checked */
+    uint64_t uses;  /* by nodes that are drawn and their instances */
+    uint32_t piece; /* 0: it is read with all others, each copy for itself */
+    uint32_t part;  /* among the reader's, once it has one: of a piece */
 } strl__gltf_mesh;
 
 typedef struct strl__gltf_instances {
@@ -176,6 +179,8 @@ typedef struct strl__gltf_decoded {
 /* The placement that is read. */
 typedef struct strl__gltf_pass {
     bool has_node, has_placement; /* stands at one */
+    bool is_alone;                /* at a piece's mesh, without a node; has_node is false */
+    uint32_t mesh;                /* that is read */
     uint32_t root;                /* of the scene: the one under which node is */
     uint32_t node;
     uint32_t primitive; /* of the node's mesh */
@@ -203,6 +208,15 @@ typedef struct strl__gltf_paint {
 } strl__gltf_paint;
 
 #define STRL__GLTF_CHUNK 1024u /* elements read at once */
+#define STRL__GLTF_INSTANCES 256u
+
+/* Instances that were read at once. */
+typedef struct strl__gltf_window {
+    const strl__gltf_instances *of; /* NULL: none */
+    uint64_t first, count;
+    double translation[STRL__GLTF_INSTANCES][3], rotation[STRL__GLTF_INSTANCES][4],
+        scale[STRL__GLTF_INSTANCES][3];
+} strl__gltf_window;
 
 typedef struct strl__gltf {
     strl_reader *reader;
@@ -241,7 +255,11 @@ typedef struct strl__gltf {
     strl__draco *draco; /* the primitive decompressed last; owned */
     uint32_t draco_primitive;
     uint64_t draco_bytes;
-    uint64_t triangles, vertices; /* of all placements; of all meshes */
+    uint64_t triangles, vertices; /* of all placements, but of a piece once; of all meshes */
+    uint64_t rest_triangles;      /* of them those of piece 0 */
+    bool rest_is_empty;           /* nothing is in piece 0 */
+    uint32_t *pieces;             /* owned; the mesh of piece i + 1 */
+    strl__gltf_window instances;
     strl__gltf_matrix *world;     /* owned; of node's ancestors and itself, by depth */
     strl__gltf_pass pass;
     strl__gltf_paint paint;
@@ -300,8 +318,19 @@ strl__gltf_matrix strl__gltf_compose(const double translation[3], const double r
 void strl__gltf_derive(strl__gltf_pass *pass);
 /* A name of its own for the part of a node. */
 strl_status strl__gltf_name_part(strl__gltf *gltf, uint32_t node, uint32_t *part, strl_error *err);
+strl_status strl__gltf_name_piece(strl__gltf *gltf, uint32_t mesh, uint32_t *part, strl_error *err);
 strl_status strl__gltf_list_material(strl__gltf *gltf, uint32_t material, uint32_t *listed,
                                      strl_error *err);
+
+/* ---- gltf_pieces.c: meshes that are used again and again */
+/* Chooses them; after checking. */
+strl_status strl__gltf_find_pieces(strl__gltf *gltf, strl_error *err);
+void strl__gltf_piece_get(const strl_reader *reader, uint32_t piece, strl_reader_piece *facts);
+strl_status strl__gltf_start_placements(strl_reader *reader, strl_error *err);
+strl_status strl__gltf_next_placement(strl_reader *reader, strl_reader_placement *placement, bool *found, strl_error *err);
+uint64_t strl__gltf_instance_count(const strl__gltf_node *node);
+/* Of pass.node, an instance of it where it has any. */
+strl_status strl__gltf_place_node(strl__gltf *gltf, strl__gltf_matrix *placement, strl_error *err);
 
 /* ---- gltf_buffer.c: where bytes are */
 strl_status strl__gltf_open_buffer(strl__gltf *gltf, uint32_t index, strl_error *err);

@@ -240,8 +240,9 @@ strl_status strl__gltf_check_scene(strl__gltf *gltf, strl_error *err)
         if (!status && node->instances)
             status = check_instances(gltf, node->instances, err);
         add_product(&gltf->triangles, gltf->meshes[node->mesh].triangles,
-                    node->instances ? node->instances->count : 1);
+                    strl__gltf_instance_count(node));
+        add_product(&gltf->meshes[node->mesh].uses, 1, strl__gltf_instance_count(node));
     }
     strl__gltf_rewind(gltf);
-    return status;
+    return status ? status : strl__gltf_find_pieces(gltf, err);
 }

@@ -305,6 +305,21 @@ strl_status strl__gltf_name_part(strl__gltf *gltf, uint32_t node, uint32_t *part
     return status;
 }
 
+strl_status strl__gltf_name_piece(strl__gltf *gltf, uint32_t index, uint32_t *part, strl_error *err)
+{
+    strl__gltf_mesh *mesh = &gltf->meshes[index];
+    strl_status status = STRL_OK;
+    if (mesh->part == STRL__NO_ITEM) {
+        char number[24];
+        snprintf(number, sizeof number, "mesh %u", index);
+        status = add_name(gltf, &gltf->reader->parts,
+                          mesh->name && *mesh->name ? mesh->name : number, "mesh", index,
+                          &mesh->part, err);
+    }
+    *part = mesh->part;
+    return status;
+}
+
 strl_status strl__gltf_list_material(strl__gltf *gltf, uint32_t index, uint32_t *listed,
                                      strl_error *err)
 {

@@ -261,7 +261,7 @@ static strl_status parse_primitive(strl__gltf *gltf, strl__fields *fields, const
 static strl_status parse_mesh(strl__gltf *gltf, strl__fields *fields, const json_t *value)
 {
     const json_t *list = strl__fields_list(fields, value, "primitives");
-    strl__gltf_mesh mesh = {.name = strl__gltf_keep_text(gltf, fields, value, "name"),
+    strl__gltf_mesh mesh = {.part = STRL__NO_ITEM, .name = strl__gltf_keep_text(gltf, fields, value, "name"),
                             .first_primitive = (uint32_t)gltf->primitive_count,
                             .primitive_count = (uint32_t)json_array_size(list)};
     strl_status status = fields->status;

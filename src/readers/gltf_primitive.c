@@ -287,23 +287,18 @@ static strl_status load_vertices(strl__gltf *gltf, const strl__gltf_primitive *p
 
 /* ---- placement */
 
-/* Of one instance, among those of the node. */
-static strl_status place_instance(strl__gltf *gltf, const strl__gltf_instances *instances,
-                                  strl_error *err)
+static strl_status find_place(strl__gltf *gltf, strl_error *err)
 {
-    double translation[3] = {0}, rotation[4] = {0, 0, 0, 1}, scale[3] = {1, 1, 1};
-    const uint64_t instance = gltf->pass.instance;
-    strl_status status = STRL_OK;
-    if (instances->translation != STRL__NO_ITEM)
-        status =
-            strl__gltf_read_numbers(gltf, instances->translation, instance, 1, translation, err);
-    if (!status && instances->rotation != STRL__NO_ITEM)
-        status = strl__gltf_read_numbers(gltf, instances->rotation, instance, 1, rotation, err);
-    if (!status && instances->scale != STRL__NO_ITEM)
-        status = strl__gltf_read_numbers(gltf, instances->scale, instance, 1, scale, err);
-    strl__gltf_matrix own = strl__gltf_compose(translation, rotation, scale);
-    gltf->pass.placement = strl__gltf_multiply(strl__gltf_world(gltf), &own);
-    return status;
+    static const strl__gltf_matrix as_it_is = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
+    gltf->pass.placement = as_it_is;
+    return gltf->pass.is_alone ? STRL_OK : strl__gltf_place_node(gltf, &gltf->pass.placement, err);
+}
+
+static strl_status name_part(strl__gltf *gltf, strl_error *err)
+{
+    strl__gltf_pass *pass = &gltf->pass;
+    return pass->is_alone ? strl__gltf_name_piece(gltf, pass->mesh, &pass->part, err)
+                          : strl__gltf_name_part(gltf, pass->node, &pass->part, err);
 }
 
 strl_status strl__gltf_read_elements(strl__gltf *gltf, const strl__gltf_primitive *primitive,
@@ -350,10 +345,8 @@ strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primit
                                        strl_error *err)
 {
     strl__gltf_pass *pass = &gltf->pass;
-    const strl__gltf_node *node = &gltf->nodes[pass->node];
     gltf->paint.image = NULL; /* of the placement before: from now on it may be given up */
-    pass->placement = *strl__gltf_world(gltf);
-    strl_status status = node->instances ? place_instance(gltf, node->instances, err) : STRL_OK;
+    strl_status status = find_place(gltf, err);
     if (!status)
         status = open_draco(gltf, primitive, err);
     if (status)
@@ -384,7 +377,7 @@ strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primit
     if (!status && primitive->mode == 6 && !gltf->draco)
         status = read_first(gltf, primitive, err);
     if (!status)
-        status = strl__gltf_name_part(gltf, pass->node, &pass->part, err);
+        status = name_part(gltf, err);
     return status ? status
                   : strl__gltf_list_material(gltf, primitive->material, &pass->material, err);
 }

@@ -33,6 +33,11 @@ typedef struct strl__format {
     strl_status (*check_unchanged)(const strl_reader *reader,
                                    strl_error *err); /* files beside this one; may be NULL */
     void (*close)(strl_reader *reader);   /* what the state owns; may be NULL */
+    /* Of formats with pieces; may be NULL. start goes to the first face of reader->piece. */
+    void (*piece_get)(const strl_reader *reader, uint32_t piece, strl_reader_piece *facts);
+    strl_status (*start_placements)(strl_reader *reader, strl_error *err);
+    strl_status (*next_placement)(strl_reader *reader, strl_reader_placement *placement,
+                                  bool *found, strl_error *err);
 } strl__format;
 
 extern const strl__format strl__format_ply;
@@ -63,6 +68,9 @@ struct strl_reader {
     char *path;        /* owned */
     char *scratch_dir; /* owned; NULL where none was given */
     uint64_t memory_bytes, whole_bytes; /* whole: 0 = unknown */
+    uint32_t most_pieces;
+    uint32_t piece_count; /* besides piece 0 */
+    uint32_t piece;       /* the one that is read */
     strl_reader_child child; /* borrowed, during open */
     strl_axis default_up;
     const char *default_unit; /* static; NULL = unknown */

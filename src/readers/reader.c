@@ -148,6 +148,7 @@ strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__forma
     strl__names_init(&reader->parts, (size_t)names_bytes);
     strl__names_init(&reader->materials, (size_t)(names_bytes / 2));
     reader->child = desc->child;
+    reader->most_pieces = desc->most_pieces;
     strl_status status = open_file(reader, desc, err);
     if (!status)
         status = open_format(reader, err);
@@ -344,6 +345,43 @@ strl_status strl_reader_rewind(strl_reader *reader, strl_error *err)
     reader->drops = (strl_reader_drops){0};
     strl__batch_reset(&reader->batch);
     return STRL_OK;
+}
+
+uint32_t strl_reader_piece_count(const strl_reader *reader)
+{
+    return reader->piece_count + 1;
+}
+
+void strl_reader_piece_get(const strl_reader *reader, uint32_t piece, strl_reader_piece *facts)
+{
+    *facts = (strl_reader_piece){.triangles = reader->triangles_hint, .placements = 1};
+    if (reader->piece_count)
+        reader->format->piece_get(reader, piece, facts);
+}
+
+strl_status strl_reader_select(strl_reader *reader, uint32_t piece, strl_error *err)
+{
+    if (piece > reader->piece_count)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "%s: there is no piece %u, expected one of %u",
+                          reader->path, piece, reader->piece_count + 1);
+    reader->piece = piece;
+    return strl_reader_rewind(reader, err);
+}
+
+strl_status strl_reader_begin_placements(strl_reader *reader, strl_error *err)
+{
+    strl_status status = strl_reader_rewind(reader, err);
+    if (!status && reader->piece_count)
+        status = reader->format->start_placements(reader, err);
+    return status;
+}
+
+strl_status strl_reader_next_placement(strl_reader *reader, strl_reader_placement *placement,
+                                       bool *found, strl_error *err)
+{
+    *found = false;
+    return reader->piece_count ? reader->format->next_placement(reader, placement, found, err)
+                               : STRL_OK;
 }
 
 void strl_reader_rest(strl_reader *reader)

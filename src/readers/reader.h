@@ -1,7 +1,11 @@
 /* Readers turn a mesh file into one stream of triangles with resolved corners, in file order, within a memory budget,
  * whatever the size of the file. A stream can be rewound and read again: it then gives the same triangles.
  *
- * Call order: open -> (next)* until count 0 -> [rewind -> (next)*]* -> close. One thread at a time. */
+ * Call order: open -> (next)* until count 0 -> [rewind -> (next)*]* -> close. One thread at a time.
+ *
+ * A model whose parts are used again and again is a stream of all copies, or, where pieces are asked for, some streams: piece 0
+ * is what is used once, in the model's coordinates; each other piece is a mesh in its own, with placements of it. select in place of
+ * rewind goes to a piece. Which meshes are pieces: docs/architecture.md, "Pieces and placements". */
 #ifndef STRL_READERS_READER_H
 #define STRL_READERS_READER_H
 
@@ -55,7 +59,11 @@ typedef struct strl_reader_desc {
     uint64_t whole_bytes;     /* --memory, of which memory_bytes is a share: what sentences advise; 0 = unknown */
     uint64_t names_bytes;     /* budget of the names of parts; those of materials have half as much; 0 = an eighth of memory_bytes */
     strl_reader_child child;  /* borrowed during open: the child has ended before open returns */
+    uint32_t most_pieces;     /* besides piece 0; 0 = none: all copies are read as triangles */
 } strl_reader_desc;
+
+/* Of one file, besides piece 0. A container has 512 trees at most. */
+#define STRL_READER_MOST_PIECES 500u
 
 typedef enum strl_axis { STRL_AXIS_X, STRL_AXIS_Y, STRL_AXIS_Z } strl_axis;
 
@@ -86,6 +94,30 @@ strl_status strl_reader_next(strl_reader *reader, strl_triangle *triangles, size
 /* Back to the first triangle. Fails where the file, or a buffer's file beside it, has changed (size or time of
  * change). */
 strl_status strl_reader_rewind(strl_reader *reader, strl_error *err);
+
+/* ---- pieces */
+typedef struct strl_reader_piece {
+    uint64_t triangles;  /* once, as announced; of piece 0 a guess where the hint is */
+    uint64_t placements; /* 1 of piece 0 */
+    bool is_empty;       /* nothing is in it, not even a line: piece 0 of a file that uses all it has more than once */
+} strl_reader_piece;
+
+/* A placement of a piece other than 0: rows of three and the translation, from the piece's coordinates to the model's. */
+typedef struct strl_reader_placement {
+    uint32_t piece;
+    double transform[12]; /* finite */
+} strl_reader_placement;
+
+uint32_t strl_reader_piece_count(const strl_reader *reader); /* with piece 0, at least 1 */
+void strl_reader_piece_get(const strl_reader *reader, uint32_t piece, strl_reader_piece *facts);
+/* Parts and materials of the pieces other than 0 are known from opening on. */
+/* To the first triangle of a piece, as rewind. Drops are then those of a pass over the piece. */
+strl_status strl_reader_select(strl_reader *reader, uint32_t piece, strl_error *err);
+/* The placements of all pieces in the order of the file, as a stream: begin -> (next)* until *found is false. Then select or
+ * rewind before triangles are read. Those that are not finite are left out; each counts as its piece's triangles among the drops. */
+strl_status strl_reader_begin_placements(strl_reader *reader, strl_error *err);
+strl_status strl_reader_next_placement(strl_reader *reader, strl_reader_placement *placement, bool *found, strl_error *err);
+
 /* Gives back what reading takes, tables and windows, until rewind: of many files that are open one is read. Facts, drops and
  * names stay; next gives nothing. */
 void strl_reader_rest(strl_reader *reader);
@@ -111,7 +143,7 @@ uint64_t strl_reader_bytes_done(const strl_reader *reader);
 
 void strl_reader_costs_get(const strl_reader *reader, strl_reader_costs *costs);
 
-/* Parts (OBJ o/g, STL solids, glTF nodes with a mesh, of foreign formats the path of node names; a file without any has one,
+/* Parts (OBJ o/g, STL solids, glTF nodes with a mesh, and each piece other than 0 with the name of its mesh, of foreign formats the path of node names; a file without any has one,
  * unnamed) and materials (one default, white, where absent) as
  * known after a whole pass; indices are stable over passes. Names are borrowed UTF-8 until close. */
 uint32_t strl_reader_part_count(const strl_reader *reader);

@@ -15,6 +15,7 @@ typedef struct strl_cache_entry {
     uint32_t vertex_count, index_count; /* as uploaded */
     uint32_t index_capacity;            /* indices that the place has room for */
     uint32_t state;                     /* of the uploaded indices */
+    uint32_t placement;                 /* null's: of the item that came last */
     uint64_t frame;      /* the list whose indices these are; 0 = unknown */
     uint64_t batch;      /* the backend's: the batch of draws that uses it last */
     uint64_t bytes;

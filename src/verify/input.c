@@ -6,16 +6,12 @@
 #include <string.h>
 
 #include "base/fail.h"
-#include "platform/thread.h"
-#include "readers/reader.h"
 
 #define READ_BATCH 4096u
 #define CHUNK_TRIANGLES 4096u
 /* Memory of one triangle while its slice is cut into chunks: corners, box, order, and what building a chunk takes. */
 #define SLICE_TRIANGLE_BYTES 160u
 #define LATTICE_LIMIT 0x1p62
-/* What this process may grow by while a child reads for it. */
-#define CHILD_RESERVE_BYTES (8u << 20)
 
 /* ---- reading ---- */
 
@@ -52,7 +48,9 @@ static strl_status take(reading *self, const strl_triangle *triangle, strl_error
     strl__hash128 points[3];
     bool inside;
     self->input->triangles++;
-    if (!quantise(self->tree, triangle, corners, points, &inside)) {
+    /* Of a tree without a triangle the lattice is not known on which they lost their area. The header has to count them. */
+    bool none_kept = self->tree->triangle_count == 0 && self->model->tree_count > 1;
+    if (none_kept || !quantise(self->tree, triangle, corners, points, &inside)) {
         self->input->degenerate++;
         return STRL_OK;
     }
@@ -81,30 +79,12 @@ static strl_status read_all(reading *self, strl_reader *reader, strl_error *err)
     return status;
 }
 
-static bool go_on(void *context)
+static strl_status read_input(reading *self, uint32_t index, uint32_t piece, strl_error *err)
 {
-    return strl__v_report(context, "read input", 0, 0, NULL) == STRL_OK;
-}
-
-/* What is left of the budget for a child that reads a foreign format while this process waits. */
-static uint64_t child_bytes(const strl__model *model)
-{
-    const uint64_t held = strl_process_rss_bytes() + CHILD_RESERVE_BYTES;
-    return model->memory_bytes > held ? model->memory_bytes - held : CHILD_RESERVE_BYTES;
-}
-
-static strl_status read_input(reading *self, const char *path, strl_error *err)
-{
-    strl__model *model = self->model;
-    const strl_reader_desc desc = {
-        .path = path,
-        .scratch_dir = model->desc->scratch_dir,
-        .memory_bytes = model->memory_bytes / 4,
-        .whole_bytes = model->memory_bytes,
-        .child = {
-            .importer = model->desc->importer, .memory_bytes = child_bytes(model), .go_on = go_on, .context = model}};
     strl_reader *reader = NULL;
-    strl_status status = strl_reader_open(&desc, &reader, err);
+    strl_status status = strl__v_open_input(self->model, index, &reader, err);
+    if (status == STRL_OK && piece)
+        status = strl_reader_select(reader, piece, err);
     if (status == STRL_OK)
         status = read_all(self, reader, err);
     if (status == STRL_OK) {
@@ -120,8 +100,8 @@ static strl_status read_input(reading *self, const char *path, strl_error *err)
     return status;
 }
 
-static strl_status read_inputs(strl__model *model, const strl__vtree *tree, strl__vinput *input, strl__regions *regions,
-                               strl_error *err)
+static strl_status read_inputs(strl__model *model, const strl__vtree *tree, const strl__vpiece *piece, strl__vinput *input,
+                               strl__regions *regions, strl_error *err)
 {
     reading self = {.model = model,
                     .tree = tree,
@@ -130,7 +110,8 @@ static strl_status read_inputs(strl__model *model, const strl__vtree *tree, strl
                     .batch = strl__alloc(READ_BATCH, sizeof *self.batch)};
     strl_status status = self.batch ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory to read the input");
     for (uint32_t i = 0; status == STRL_OK && i < model->desc->input_count; i++)
-        status = read_input(&self, model->desc->inputs[i], err);
+        if (piece->input == STRL__EVERY_INPUT || piece->input == i)
+            status = read_input(&self, i, piece->piece, err);
     if (status == STRL_OK)
         status = strl__v_regions_flush(regions, err);
     strl__free(self.batch);
@@ -378,7 +359,8 @@ static double rounding_of(const strl__vtree *tree)
     return 16 * DBL_EPSILON * largest;
 }
 
-strl_status strl__v_input_read(strl__model *model, const strl__vtree *tree, strl__vinput *input, strl_error *err)
+strl_status strl__v_input_read(strl__model *model, const strl__vtree *tree, const strl__vpiece *piece, strl__vinput *input,
+                               strl_error *err)
 {
     uint64_t slice_triangles = model->memory_bytes / 8 / strl_pool_workers(model->pool) / SLICE_TRIANGLE_BYTES;
     uint64_t wanted = tree->triangle_count / (slice_triangles / 2) + 1;
@@ -388,7 +370,7 @@ strl_status strl__v_input_read(strl__model *model, const strl__vtree *tree, strl
     if (status == STRL_OK)
         status = strl__v_regions_create(model, tree, wanted > 512 ? 512 : (uint32_t)wanted, &regions, err);
     if (status == STRL_OK)
-        status = read_inputs(model, tree, input, &regions, err);
+        status = read_inputs(model, tree, piece, input, &regions, err);
     if (status == STRL_OK)
         status = make_chunks(model, input, &regions, slice_triangles, err);
     strl__v_regions_destroy(&regions);
@@ -404,13 +386,8 @@ void strl__v_input_deinit(strl__vinput *input)
     *input = (strl__vinput){0};
 }
 
-void strl__v_check_leaves(strl__model *model, const strl__vtree *tree, const strl__vinput *input)
+void strl__v_check_drops(strl__model *model, const strl__vinput *input)
 {
-    strl__hash128 sum = {0, 0};
-    for (uint32_t id = 0; id < tree->node_count; id++)
-        if (strl__holds_input(tree, id))
-            strl__hash_add(&sum, tree->nodes[id].finest);
-    strl__v_checked(model->checks, STRL_VERIFY_LEAVES, input->kept);
     if (input->triangles != model->triangles_in || input->nonfinite != model->dropped_nonfinite ||
         input->degenerate != model->dropped_degenerate || input->lines != model->dropped_lines ||
         input->points != model->dropped_points)
@@ -421,11 +398,20 @@ void strl__v_check_leaves(strl__model *model, const strl__vtree *tree, const str
                      input->triangles, input->nonfinite, input->degenerate, input->lines, input->points,
                      model->triangles_in, model->dropped_nonfinite, model->dropped_degenerate, model->dropped_lines,
                      model->dropped_points);
+}
+
+void strl__v_check_leaves(strl__model *model, const strl__vtree *tree, const strl__vinput *input)
+{
+    strl__hash128 sum = {0, 0};
+    for (uint32_t id = 0; id < tree->node_count; id++)
+        if (strl__holds_input(tree, id))
+            strl__hash_add(&sum, tree->nodes[id].finest);
+    strl__v_checked(model->checks, STRL_VERIFY_LEAVES, input->kept);
     if (input->kept != tree->triangle_count)
-        strl__v_flaw(model->checks, STRL_VERIFY_LEAVES, 2,
+        strl__v_flaw(model->checks, STRL_VERIFY_LEAVES, strl__key(tree, 2),
                      "the input has %" PRIu64 " triangles on the lattice, the leaves %" PRIu64, input->kept,
                      tree->triangle_count);
     else if (!strl__hash_same(sum, input->sum))
-        strl__v_flaw(model->checks, STRL_VERIFY_LEAVES, 3,
+        strl__v_flaw(model->checks, STRL_VERIFY_LEAVES, strl__key(tree, 3),
                      "the %" PRIu64 " triangles of the leaves are not those of the input on the lattice", input->kept);
 }

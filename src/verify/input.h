@@ -4,6 +4,7 @@
 #define STRL_VERIFY_INPUT_H
 
 #include "verify/mesh.h"
+#include "verify/pieces.h"
 #include "verify/surface.h"
 
 typedef struct strl__vinput {
@@ -18,11 +19,13 @@ typedef struct strl__vinput {
     uint64_t *bytes;  /* [surface.count] */
 } strl__vinput;
 
-/* Reads desc->inputs for a tree. Uses desc->scratch_dir; what it leaves there goes with deinit. */
-strl_status strl__v_input_read(strl__model *model, const strl__vtree *tree, strl__vinput *input, strl_error *err);
+/* Reads what the tree is of from desc->inputs. Uses desc->scratch_dir; what it leaves there goes with deinit. */
+strl_status strl__v_input_read(strl__model *model, const strl__vtree *tree, const strl__vpiece *piece, strl__vinput *input, strl_error *err);
 void strl__v_input_deinit(strl__vinput *input);
-/* Counts, drops and the multiset of triangles. */
+/* The multiset of triangles. */
 void strl__v_check_leaves(strl__model *model, const strl__vtree *tree, const strl__vinput *input);
+/* Counts and drops of all trees' inputs against the header. */
+void strl__v_check_drops(strl__model *model, const strl__vinput *total);
 
 /* ---- from readers to regions ---- */
 

@@ -212,3 +212,16 @@ strl_status strl__v_mesh_check_states(const strl__vmesh *mesh, strl_arena *scrat
         status = take_back(&u, step, err);
     return status;
 }
+
+strl__hash128 strl__hash_placement(uint32_t tree, const double transform[12])
+{
+    strl__hash128 hash = {strl__mix64(tree + 0x9e3779b97f4a7c15u), strl__mix64(tree + 0x632be59bd9b4e019u)};
+    for (unsigned i = 0; i < 12; i++) {
+        uint64_t bits;
+        double number = transform[i] + 0.0; /* zeros have one sign */
+        memcpy(&bits, &number, sizeof bits);
+        hash.low = strl__mix64(hash.low ^ bits);
+        hash.high = strl__mix64(hash.high + bits);
+    }
+    return hash;
+}

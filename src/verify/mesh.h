@@ -89,6 +89,9 @@ static inline strl__hash128 strl__hash_triangle(strl__hash128 a, strl__hash128 b
         strl__mix64(strl__mix64(first.high ^ 0x9fb21c651e98df25u) + 7 * second.high + 11 * third.high)};
 }
 
+/* Of a tree and twelve numbers, by their bits. */
+strl__hash128 strl__hash_placement(uint32_t tree, const double transform[12]);
+
 static inline void strl__hash_add(strl__hash128 *sum, strl__hash128 hash)
 {
     sum->low += hash.low;

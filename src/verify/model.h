@@ -68,7 +68,7 @@ typedef struct strl__model {
     strl__section sections[STRL__SECTIONS];
     strl__vtree *trees; /* [tree_count], owned */
     uint32_t tree_count;
-    bool placed_plainly;   /* one tree, placed once, as it is */
+    strl__hash128 placements; /* sum of the hashes of all of them */
     uint64_t record_bytes; /* held by all trees' arrays */
 } strl__model;
 

@@ -6,6 +6,7 @@
 #include "base/cursor.h"
 #include "base/fail.h"
 #include "base/memory.h"
+#include "verify/mesh.h"
 #include "verify/model.h"
 
 #define PAGE_BYTES 65536u
@@ -92,19 +93,18 @@ static void check_placement(table *self, uint64_t item, const uint8_t *bytes, si
     strl_cursor cursor = strl_cursor_make(bytes, size);
     uint32_t tree = strl_cursor_u32(&cursor), reserved = strl_cursor_u32(&cursor);
     double m[12];
-    bool finite = true, plain = true;
+    bool finite = true;
     for (unsigned i = 0; i < 12; i++) {
         m[i] = strl_cursor_f64(&cursor);
         finite = finite && isfinite(m[i]);
-        plain = plain && m[i] == (i % 5 == 0 ? 1 : 0);
     }
     bool good = size == PLACEMENT_BYTES && tree < self->model->tree_count && reserved == 0 && finite;
     TABLE_RULE(self, good, item, "placement %" PRIu64 ": %zu bytes, tree %u of %u, reserved word %u, %s", item, size,
                tree, self->model->tree_count, reserved, finite ? "finite" : "not finite");
-    self->model->placed_plainly =
-        self->model->placed_plainly && good && plain && item == 0 && self->model->tree_count == 1;
-    if (good)
+    if (good) {
         widen_bounds(self, &self->model->trees[tree], m);
+        strl__hash_add(&self->model->placements, strl__hash_placement(tree, m));
+    }
 }
 
 /* Empty where the material has none. */
@@ -231,7 +231,6 @@ strl_status strl__v_read_tables(strl__model *model, strl_error *err)
 {
     static const char *const names[STRL__SECTIONS] = {NULL, NULL, "placement", "part", "material", "image"};
     strl_status status = STRL_OK;
-    model->placed_plainly = model->sections[STRL__PLACEMENTS].item_count == 1;
     for (unsigned kind = STRL__PLACEMENTS; status == STRL_OK && kind < STRL__SECTIONS; kind++) {
         const strl__section *section = &model->sections[kind];
         if (section->item_count == 0)

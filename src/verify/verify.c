@@ -1,5 +1,7 @@
 #include "verify/verify.h"
 
+#include <string.h>
+
 #include "base/fail.h"
 #include "base/memory.h"
 #include "verify/cracks.h"
@@ -90,20 +92,76 @@ static void check_closed(strl__model *model, strl_verify_report *report)
                      (unsigned long long)report->open_edges);
 }
 
-static strl_status compare_input(strl__model *model, strl_verify_report *report, strl_error *err)
+static void add_totals(strl__vinput *total, const strl__vinput *input)
+{
+    total->triangles += input->triangles;
+    total->nonfinite += input->nonfinite;
+    total->degenerate += input->degenerate;
+    total->lines += input->lines;
+    total->points += input->points;
+}
+
+static strl_status compare_tree(strl__model *model, strl__vtree *tree, const strl__vpiece *piece, strl__vinput *total,
+                                strl_verify_report *report, strl_error *err)
 {
     strl__vinput input;
-    strl__vtree *tree = &model->trees[0];
-    if (!model->placed_plainly)
-        return strl__fail(err, STRL_ERR_UNSUPPORTED,
-                          "%s has more than one tree or placement: it cannot be compared with an input",
-                          model->desc->model);
-    strl_status status = strl__v_input_read(model, tree, &input, err);
-    if (status == STRL_OK)
+    strl_status status = strl__v_input_read(model, tree, piece, &input, err);
+    if (status == STRL_OK) {
+        add_totals(total, &input);
         strl__v_check_leaves(model, tree, &input);
-    if (status == STRL_OK && strl__replaces(tree)) /* in the others nothing moves but onto the lattice */
+    }
+    if (status == STRL_OK && strl__replaces(tree) && input.kept) /* in the others nothing moves but onto the lattice */
         status = strl__v_check_distances(model, tree, &input, report, err);
     strl__v_input_deinit(&input);
+    return status;
+}
+
+/* Of several trees the figures of cuts and levels are those of the tree whose claims are nearest to being broken. */
+static void keep_worse(strl_verify_report *report, strl_verify_report *one)
+{
+    bool worse = one->uniform_count && (!report->uniform_count || (one->worst_claimed_over_measured > 0 &&
+                                                                   (report->worst_claimed_over_measured == 0 ||
+                                                                    one->worst_claimed_over_measured < report->worst_claimed_over_measured)));
+    if (worse) {
+        strl_verify_report_deinit(report);
+        memcpy(report->uniform, one->uniform, sizeof report->uniform);
+        report->uniform_count = one->uniform_count;
+        report->levels = one->levels;
+        report->level_count = one->level_count;
+        report->claimed_over_measured_median = one->claimed_over_measured_median;
+        report->most_claimed_over_measured_of_levels = one->most_claimed_over_measured_of_levels;
+        report->worst_claimed_over_measured = one->worst_claimed_over_measured;
+        one->levels = NULL;
+    }
+    strl_verify_report_deinit(one);
+}
+
+static strl_status compare_trees(strl__model *model, strl__vpieces *pieces, strl_verify_report *report, strl_error *err)
+{
+    strl__vinput total = {0};
+    strl_status status = STRL_OK;
+    for (uint32_t t = 0; status == STRL_OK && t < model->tree_count; t++) {
+        strl_verify_report one = {0};
+        status = compare_tree(model, &model->trees[t], &pieces->items[t], &total, &one, err);
+        keep_worse(report, &one);
+    }
+    total.nonfinite += pieces->nonfinite;
+    total.triangles += pieces->nonfinite;
+    if (status == STRL_OK)
+        strl__v_check_drops(model, &total);
+    return status;
+}
+
+static strl_status compare_input(strl__model *model, strl_verify_report *report, strl_error *err)
+{
+    strl__vpieces pieces = {0};
+    bool comparable = false;
+    strl_status status = strl__v_pieces_list(model, &pieces, err);
+    if (status == STRL_OK)
+        status = strl__v_check_placements(model, &pieces, &comparable, err);
+    if (status == STRL_OK && comparable)
+        status = compare_trees(model, &pieces, report, err);
+    strl__v_pieces_deinit(&pieces);
     return status;
 }
 

@@ -23,7 +23,7 @@ static double allowed_px(const strl_walk *walk, uint32_t coarsening)
 static strl_status run_at(strl_walk *walk, const strl_view *view, strl__cut_kind kind, uint32_t coarsening,
                           double share, strl__cut *cut, strl_error *err)
 {
-    uint64_t capacity = walk->memory_bytes - walk->treelet_bytes;
+    uint64_t capacity = walk->memory_bytes - walk->treelet_bytes - walk->placement_bytes;
     *cut = (strl__cut){.kind = kind,
                        .view = view,
                        .allowed_px = allowed_px(walk, coarsening),

@@ -16,7 +16,7 @@ static strl_draw_item make_item(const strl_walk *walk, const strl__active *activ
     const strl__mesh *mesh = &node->mesh;
     float error = mesh->errors[mesh->state];
     strl_draw_item item = {
-        .key = node->load << STRL__PLACEMENT_BITS | active->placement,
+        .key = node->load,
         .placement = active->placement,
         .node = node->treelet->data.first_node + (uint32_t)(node - node->treelet->nodes),
         .level = record->level,

@@ -198,15 +198,26 @@ static strl_status visit_placement(strl__descent *c)
 {
     strl_walk *walk = c->walk;
     strl__node *root = walk->trees[c->placement->tree].root;
-    root->treelet->touched_frame = walk->frame;
     strl_status status = strl__find_demands(c, root);
     if (status != STRL_OK)
         return status;
-    if (c->cut->kind == STRL__CUT_FRONT && !strl__add_node(&walk->wanted, root))
-        return strl__no_memory(c->err);
     if (!strl__add_visit(&walk->level, root, true))
         return strl__no_memory(c->err);
     return visit_levels(c);
+}
+
+/* Roots stay, seen or not: what comes into view is never missing. */
+static strl_status keep_roots(strl_walk *walk, const strl__cut *cut, strl_error *err)
+{
+    for (uint32_t tree = 0; tree < walk->tree_count; tree++) {
+        strl__node *root = walk->trees[tree].root;
+        if (!root)
+            continue;
+        root->treelet->touched_frame = walk->frame;
+        if (cut->kind == STRL__CUT_FRONT && !strl__add_node(&walk->wanted, root))
+            return strl__no_memory(err);
+    }
+    return STRL_OK;
 }
 
 strl_status strl__cut_run(strl_walk *walk, strl__cut *cut, strl_error *err)
@@ -217,11 +228,13 @@ strl_status strl__cut_run(strl_walk *walk, strl__cut *cut, strl_error *err)
         walk->wanted.count = walk->split.count = walk->ahead.count = 0;
         walk->missing.count = walk->prefetch.count = walk->front.count = 0;
     }
-    strl_status status = STRL_OK;
-    for (uint32_t i = 0; status == STRL_OK && i < walk->placement_count && !cut->overflow; i++) {
+    strl_status status = keep_roots(walk, cut, err);
+    uint32_t i = strl__placements_next(walk, cut->view, 0);
+    while (status == STRL_OK && i < walk->placement_count && !cut->overflow) {
         const strl__placement *placement = &walk->placements[i];
         strl__descent c = {walk, cut, i, placement, walk->trees[placement->tree].tree, err};
         status = visit_placement(&c);
+        i = strl__placements_next(walk, cut->view, i + 1);
     }
     return status;
 }

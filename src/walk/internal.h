@@ -22,7 +22,6 @@
 
 #define STRL__REQUEST_NODES 32u /* most nodes that one page is read for at a time */
 #define STRL__MAX_REQUESTS 256u
-#define STRL__PLACEMENT_BITS 24u /* a load's number and a placement share a key; strl_walk_open refuses more placements */
 #define STRL__SPLAT_ROOM 2048u /* bytes that a decoded node may take beside what its record says: splats of an empty brick */
 #define STRL__GIVE_UP_FAILURES 3u /* from then on strl_walk_settled does not wait for it; it is still retried */
 
@@ -102,6 +101,14 @@ typedef struct strl__placement {
     double length_scale; /* world units per lattice unit, at most; of sample trees by the pixels that a splat may have for each of the
                             allowed error, so that sizes and errors are compared alike */
 } strl__placement;
+
+/* Boxes over runs of placements, or of the boxes of the level below (placements.c). */
+typedef struct strl__bound_level {
+    strl_box *boxes; /* [count], owned */
+    uint32_t count;
+} strl__bound_level;
+
+#define STRL__BOUND_LEVELS 7u /* for 2^24 placements in runs of 16 */
 
 typedef struct strl__walk_tree {
     const strl_tree *tree; /* borrowed from the container */
@@ -263,6 +270,8 @@ struct strl_walk {
     uint32_t tree_count;
     strl__placement *placements;
     uint32_t placement_count;
+    strl__bound_level bound_levels[STRL__BOUND_LEVELS];
+    uint32_t bound_level_count;
     uint64_t root_bytes; /* meshes of the roots */
 
     uint64_t frame, pass, loads, tokens;
@@ -271,6 +280,7 @@ struct strl_walk {
 
     strl__treelets treelets;
     uint64_t treelet_bytes; /* part of resident_bytes */
+    uint64_t placement_bytes; /* the same; 0 where there are few */
     uint64_t resident_bytes;
     strl__node *oldest, *newest;
 
@@ -309,6 +319,12 @@ void strl__mesh_deinit(strl__mesh *mesh);
 /* Moves to another state in time proportional to the corners that change; widens [*first, *end) to
  * hold them. */
 void strl__mesh_set_state(strl__mesh *mesh, uint32_t state, uint32_t *first, uint32_t *end);
+
+/* placements.c */
+strl_status strl__placements_load(strl_walk *walk, strl_error *err);
+void strl__placements_deinit(strl_walk *walk);
+/* The first placement from `from` on that the camera may see; placement_count where there is none. */
+uint32_t strl__placements_next(const strl_walk *walk, const strl_view *view, uint32_t from);
 
 /* treelets.c */
 strl__treelet *strl__treelets_find(const strl__treelets *treelets, uint32_t tree, uint32_t index);

@@ -78,7 +78,7 @@ static strl_status add_items(strl_walk *walk, uint32_t placement_index, double p
         if (!strl__grow(&walk->items, &walk->item_capacity, (size_t)list->count + 1, sizeof *walk->items))
             return strl__fail(err, STRL_ERR_MEMORY, "no memory for a draw list of %u items", list->count);
         strl_draw_item *item = &walk->items[list->count++];
-        *item = (strl_draw_item){.key = ++walk->loads << STRL__PLACEMENT_BITS | placement_index,
+        *item = (strl_draw_item){.key = ++walk->loads,
                                  .placement = placement_index,
                                  .visible = true,
                                  .vertices = walk->points + first,

@@ -10,74 +10,10 @@
 #define DEFAULT_MEMORY_BYTES ((uint64_t)512 << 20)
 #define DEFAULT_REQUESTS 16u
 #define DEFAULT_REMOTE_REQUESTS 64u /* the source says how many of them are of use now */
-#define MAX_PLACEMENTS (1u << 24) /* what a draw item's key can tell apart */
 #define AHEAD_FRAMES 15           /* how far the eye's motion is carried on for prefetching */
 #define AHEAD_EVERY 4             /* frames between two looks ahead */
 
 /* ---- opening */
-
-/* The largest singular value of a placement: the root of the largest eigenvalue of its transposed
- * times itself, by Jacobi rotations; a little more for rounding, because errors must stay bounds.
- */
-static double largest_scale(const double transform[12])
-{
-    double a[3][3] = {{0}};
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-            for (int row = 0; row < 3; row++)
-                a[i][j] += transform[4 * row + i] * transform[4 * row + j];
-    for (int sweep = 0; sweep < 12; sweep++)
-        for (int p = 0; p < 2; p++)
-            for (int q = p + 1; q < 3; q++) {
-                if (a[p][q] == 0)
-                    continue;
-                double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
-                double t = copysign(1, theta) / (fabs(theta) + sqrt(theta * theta + 1));
-                double c = 1 / sqrt(t * t + 1), s = t * c, shift = t * a[p][q];
-                int r = 3 - p - q;
-                double rp = a[r][p], rq = a[r][q];
-                a[p][p] -= shift, a[q][q] += shift;
-                a[p][q] = a[q][p] = 0;
-                a[r][p] = a[p][r] = c * rp - s * rq;
-                a[r][q] = a[q][r] = s * rp + c * rq;
-            }
-    double largest = sqrt(fmax(a[0][0], fmax(a[1][1], a[2][2])));
-    return largest == 1 ? 1 : largest * (1 + 1e-12);
-}
-
-static strl_status load_placements(strl_walk *walk, strl_error *err)
-{
-    uint64_t count = strl_container_get_info(walk->container)->placement_count;
-    if (count == 0 || count > MAX_PLACEMENTS || count > walk->memory_bytes / sizeof(strl__placement))
-        return strl__fail(err, count ? STRL_ERR_LIMIT : STRL_ERR_FORMAT,
-                          "the container has %" PRIu64
-                          " placements, expected at least 1 and no more than memory for walking allows",
-                          count);
-    walk->placements = strl__alloc((size_t)count, sizeof *walk->placements);
-    if (!walk->placements)
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %" PRIu64 " placements", count);
-    for (; walk->placement_count < count; walk->placement_count++) {
-        strl__placement *placement = &walk->placements[walk->placement_count];
-        strl_placement stored;
-        strl_status status = strl_container_placement(walk->container, walk->placement_count, &stored, err);
-        if (status != STRL_OK)
-            return status;
-        const strl_tree *tree = strl_container_tree(walk->container, stored.tree);
-        if (!tree)
-            return strl__fail(err, STRL_ERR_FORMAT,
-                              "placement %" PRIu32 " names tree %" PRIu32 ", expected less than %" PRIu32,
-                              walk->placement_count, stored.tree, walk->tree_count);
-        placement->tree = stored.tree;
-        memcpy(placement->transform, stored.transform, sizeof placement->transform);
-        placement->length_scale = largest_scale(stored.transform) * tree->step;
-        if (tree->structure == STRL_STRUCTURE_SAMPLES)
-            placement->length_scale /= walk->splat_ratio;
-        if (!isfinite(placement->length_scale))
-            return strl__fail(err, STRL_ERR_FORMAT, "placement %" PRIu32 ": its transform is not finite",
-                              walk->placement_count);
-    }
-    return STRL_OK;
-}
 
 /* Reads a range and waits. *data is the caller's. */
 static strl_status read_range(strl_walk *walk, uint64_t offset, size_t size, uint8_t **data, strl_error *err)
@@ -149,26 +85,11 @@ static strl_status load_trees(strl_walk *walk, strl_error *err)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %" PRIu32 " trees", walk->tree_count);
     for (uint32_t tree = 0; tree < walk->tree_count; tree++)
         walk->trees[tree].tree = strl_container_tree(walk->container, tree);
-    strl_status status = load_placements(walk, err);
+    strl_status status = strl__placements_load(walk, err);
     for (uint32_t i = 0; status == STRL_OK && i < walk->placement_count; i++)
         if (!walk->trees[walk->placements[i].tree].root)
             status = load_root(walk, walk->placements[i].tree, err);
     return status;
-}
-
-static void find_bounds(strl_walk *walk)
-{
-    for (int axis = 0; axis < 3; axis++)
-        walk->bounds[axis] = INFINITY, walk->bounds[axis + 3] = -INFINITY;
-    for (uint32_t i = 0; i < walk->placement_count; i++) {
-        const strl__placement *placement = &walk->placements[i];
-        const strl_tree *tree = walk->trees[placement->tree].tree;
-        strl_box box = strl__world_box(tree, placement, tree->box_min, tree->box_max);
-        for (int axis = 0; axis < 3; axis++) {
-            walk->bounds[axis] = fmin(walk->bounds[axis], box.min[axis]);
-            walk->bounds[axis + 3] = fmax(walk->bounds[axis + 3], box.max[axis]);
-        }
-    }
 }
 
 static void apply_desc(strl_walk *walk, const strl_walk_desc *desc, strl_source *source)
@@ -208,7 +129,7 @@ strl_status strl_walk_open(strl_source *source, const strl_walk_desc *desc, strl
         strl_walk_close(walk);
         return status;
     }
-    find_bounds(walk);
+    memcpy(walk->bounds, &walk->bound_levels[walk->bound_level_count - 1].boxes[0], sizeof walk->bounds);
     walk->stats.resident_bytes = walk->resident_bytes;
     *out = walk;
     return STRL_OK;
@@ -219,10 +140,10 @@ void strl_walk_close(strl_walk *walk)
     if (!walk)
         return;
     strl__jobs_abandon(walk);
+    strl__placements_deinit(walk);
     strl__treelets_deinit(&walk->treelets);
     strl_container_close(walk->container);
     void *const owned[] = {walk->trees,
-                           walk->placements,
                            walk->jobs,
                            walk->level.items,
                            walk->below.items,
@@ -277,7 +198,7 @@ static strl_status look_ahead(strl_walk *walk, const strl_camera *camera, strl_e
     strl__cut cut = {.kind = STRL__CUT_PREFETCH,
                      .view = &view,
                      .allowed_px = walk->stats.allowed_error_px,
-                     .capacity_bytes = walk->memory_bytes - walk->treelet_bytes,
+                     .capacity_bytes = walk->memory_bytes - walk->treelet_bytes - walk->placement_bytes,
                      .stop_at_capacity = true};
     return strl__cut_run(walk, &cut, err);
 }

@@ -1,4 +1,4 @@
-/* read_mesh FILE [MEMORY_BYTES [SCRATCH_DIR]]: what a reader gives, as one JSON object for scripts:
+/* read_mesh FILE [MEMORY_BYTES [SCRATCH_DIR [MOST_PIECES]]]: what a reader gives, as one JSON object for scripts:
  * the triangles (the first 4,096 of them), a hash of all positions, drops, parts, materials. Reads
  * twice and exits 3 where the two passes differ. A refusal is {"error": SENTENCE}. */
 #include <inttypes.h>
@@ -64,6 +64,48 @@ static strl_status read_pass(strl_reader *reader, pass_result *pass, strl_error 
     return status;
 }
 
+/* Each piece, and placements, the first 4,096 of them. */
+static strl_status add_pieces(strl_reader *reader, json_t *result, strl_error *err)
+{
+    json_t *pieces = json_array(), *placements = json_array();
+    strl_reader_placement placement;
+    uint64_t count = 0;
+    bool found = true;
+    strl_status status = STRL_OK;
+    for (uint32_t p = 0; p < strl_reader_piece_count(reader) && !status; p++) {
+        strl_reader_piece facts;
+        pass_result pass = {0};
+        char hash[24];
+        strl_reader_piece_get(reader, p, &facts);
+        status = strl_reader_select(reader, p, err);
+        if (!status)
+            status = read_pass(reader, &pass, err);
+        snprintf(hash, sizeof hash, "%016" PRIx64, pass.hash);
+        json_array_append_new(pieces, json_pack("{s:I,s:I,s:b,s:I,s:s,s:I,s:I}", "announced", (json_int_t)facts.triangles, "placements",
+                                                (json_int_t)facts.placements, "empty", (int)facts.is_empty, "count",
+                                                (json_int_t)pass.count, "hash", hash, "lines", (json_int_t)pass.drops.lines, "points",
+                                                (json_int_t)pass.drops.points));
+    }
+    if (!status)
+        status = strl_reader_begin_placements(reader, err);
+    while (!status && found) {
+        status = strl_reader_next_placement(reader, &placement, &found, err);
+        if (status || !found || ++count > SHOWN)
+            continue;
+        json_t *numbers = json_array();
+        for (unsigned i = 0; i < 12; i++)
+            json_array_append_new(numbers, json_real(placement.transform[i]));
+        json_array_append_new(placements, json_pack("[I,o]", (json_int_t)placement.piece, numbers));
+    }
+    strl_reader_drops drops;
+    strl_reader_drops_get(reader, &drops);
+    json_object_set_new(result, "pieces", pieces);
+    json_object_set_new(result, "placements", placements);
+    json_object_set_new(result, "placement_count", json_integer((json_int_t)count));
+    json_object_set_new(result, "placement_nonfinite", json_integer((json_int_t)drops.nonfinite));
+    return status;
+}
+
 static json_t *describe(const strl_reader *reader, const pass_result *pass)
 {
     char hash[24];
@@ -95,7 +137,8 @@ static json_t *describe(const strl_reader *reader, const pass_result *pass)
 int main(int argc, char **argv)
 {
     const strl_reader_desc desc = {.path = argc > 1 ? argv[1] : "",
-                                   .scratch_dir = argc > 3 ? argv[3] : NULL,
+                                   .scratch_dir = argc > 3 && *argv[3] ? argv[3] : NULL,
+                                   .most_pieces = argc > 4 ? (uint32_t)strtoul(argv[4], NULL, 10) : 0,
                                    .memory_bytes = argc > 2 ? strtoull(argv[2], NULL, 10) : 0};
     strl_reader *reader = NULL;
     strl_error err = {0};
@@ -108,6 +151,8 @@ int main(int argc, char **argv)
     if (!status)
         status = read_pass(reader, &second, &err);
     json_t *result = status ? json_pack("{s:s}", "error", err.message) : describe(reader, &first);
+    if (!status && argc > 4 && add_pieces(reader, result, &err))
+        json_object_set_new(result, "error", json_string(err.message));
     json_dumpf(result, stdout, JSON_COMPACT | JSON_REAL_PRECISION(17));
     puts("");
     json_decref(result);

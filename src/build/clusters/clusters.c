@@ -4,7 +4,7 @@
 
 #include "base/fail.h"
 #include "build/clusters/hierarchy.h"
-#include "build/container_facts.h"
+#include "build/model.h"
 #include "platform/file.h"
 #include "platform/thread.h"
 
@@ -56,6 +56,13 @@ static strl_status check_root(const strl_hierarchy *hierarchy, strl_error *err)
                             root->base_triangle_count, STRL_ROOT_MAX_TRIANGLES);
 }
 
+/* Of the root, which has no neighbour whose error it should share. */
+static void go_on_to_the_end(strl_hierarchy *hierarchy)
+{
+    hierarchy->most_target = hierarchy->soft_triangles = STRL_PLACED_ROOT_TRIANGLES;
+    hierarchy->even_error = 0;
+}
+
 static strl_status simplify_levels(strl_hierarchy *hierarchy, const strl_position *from, strl_error *err)
 {
     static const char *const names[] = {"level 0", "level 1", "level 2", "level 3", "level 4", "level 5", "level 6",
@@ -64,6 +71,8 @@ static strl_status simplify_levels(strl_hierarchy *hierarchy, const strl_positio
     for (uint32_t level = from->level; level <= hierarchy->partition->depth && !status; level++) {
         uint32_t first = level == from->level ? from->done : 0;
         strl__build_stage(hierarchy->context, names[level < 10 ? level : 10]);
+        if (level == hierarchy->partition->depth && strl__model_has_placements(hierarchy->context))
+            go_on_to_the_end(hierarchy);
         if (first == 0)
             status = strl_level_open(hierarchy, level, err);
         if (!status)
@@ -88,51 +97,35 @@ static void hierarchy_deinit(strl_hierarchy *hierarchy)
     strl_adjacency_deinit(&hierarchy->next);
 }
 
-static strl_status write_container(const strl_hierarchy *hierarchy, strl_error *err)
+static strl_status write_tree(const strl_hierarchy *hierarchy, strl_error *err)
 {
-    const strl_build_context *context = hierarchy->context;
+    strl_build_context *context = hierarchy->context;
     const strl_ingest *ingest = hierarchy->ingest;
-    strl_build_result *result = context->result;
-    const strl_container_writer_desc desc = strl_describe_container(context, ingest);
     strl_container_writer *writer = NULL;
     strl_tree tree = {.structure = STRL_STRUCTURE_CLUSTERS, .step = ingest->step, .node_count = (uint32_t)((2ull << hierarchy->partition->depth) - 1),
                       .level_count = hierarchy->partition->depth + 1, .leaf_geometric = ingest->leaf_error};
     memcpy(tree.origin, ingest->origin, sizeof tree.origin);
     for (uint32_t i = 0; i <= hierarchy->partition->depth; i++)
         tree.group_count += hierarchy->levels[i].group_count;
-    strl_placement identity = {.tree = 0, .transform = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
-    strl_status status = strl_container_writer_create(&desc, &writer, err);
+    strl_status status = strl__model_writer(context, ingest, &writer, err);
     if (!status)
         status = strl_container_writer_begin_tree(writer, &tree, err);
     if (!status)
         status = strl_write_nodes(hierarchy, writer, err);
-    if (!status)
-        status = strl_container_writer_end_tree(writer, err);
-    if (!status)
-        status = strl_container_writer_add_placement(writer, &identity, err);
-    if (!status)
-        status = strl_write_names(ingest, writer, err);
-    if (!status)
-        status = strl_container_writer_finish(writer, &result->bytes_out, err);
-    strl_container_writer_destroy(writer);
-    return status;
+    return status ? status : strl_container_writer_end_tree(writer, err);
 }
 
 static void fill_result(const strl_hierarchy *hierarchy, strl_build_result *result)
 {
     const strl_level *leaves = &hierarchy->levels[0];
+    const uint32_t levels = hierarchy->partition->depth + 1;
     for (uint32_t i = 0; i < leaves->count; i++) {
         result->triangles_leaf += leaves->nodes[i].record.triangle_count;
         result->vertices += leaves->nodes[i].record.vertex_count;
     }
-    result->nodes = (2ull << hierarchy->partition->depth) - 1;
-    result->levels = hierarchy->partition->depth + 1;
-    result->root_triangles = hierarchy->levels[hierarchy->partition->depth].nodes[0].record.base_triangle_count;
-    result->parts = (uint32_t)hierarchy->ingest->parts.count;
-    result->materials = (uint32_t)hierarchy->ingest->materials.count;
-    result->placements = 1;
-    result->step = hierarchy->ingest->step;
-    result->quantisation_error = (double)hierarchy->ingest->leaf_error * hierarchy->ingest->step;
+    result->nodes += (2ull << hierarchy->partition->depth) - 1;
+    result->levels = levels > result->levels ? levels : result->levels;
+    result->root_triangles += hierarchy->levels[hierarchy->partition->depth].nodes[0].record.base_triangle_count;
 }
 
 static strl_status run_ingest(strl_hierarchy *hierarchy, strl_position *position, strl_spill **graph, strl_error *err)
@@ -187,19 +180,16 @@ strl_status strl__clusters_run(strl_build_context *context, strl_error *err)
     strl_ingest ingest = {0};
     strl_partition partition = {0};
     strl_hierarchy hierarchy = {.context = context, .ingest = &ingest, .partition = &partition, .growth = FIRST_GROWTH,
-                                .soft_triangles = STRL_SOFT_TRIANGLES};
+                                .soft_triangles = STRL_SOFT_TRIANGLES, .most_target = UINT32_MAX};
     strl_status status = run_stages(&hierarchy, &partition, err);
-    const bool empty = ingest.triangle_count == 0;
-    if (!status && !empty)
+    if (!status && ingest.triangle_count) {
         fill_result(&hierarchy, context->result);
-    if (!status)
-        status = strl_check_counts(context->result, err);
-    if (!status && empty) {
-        const strl_container_writer_desc desc = strl_describe_container(context, &ingest);
-        status = strl_write_empty(&desc, STRL_STRUCTURE_CLUSTERS, context->result, err);
+        status = write_tree(&hierarchy, err);
     } else if (!status) {
-        status = write_container(&hierarchy, err);
+        status = strl__model_empty_tree(context, &ingest, STRL_STRUCTURE_CLUSTERS, err);
     }
+    if (!status)
+        status = strl__model_end_tree(context, &ingest, err);
     hierarchy_deinit(&hierarchy);
     strl_partition_deinit(&partition);
     strl_ingest_deinit(&ingest);

@@ -64,6 +64,9 @@ void strl_adjacency_deinit(strl_adjacency *adjacency);
 /* A base mesh of so many triangles is good enough where fewer would cost many times the error. */
 #define STRL_SOFT_TRIANGLES 6144u
 
+/* The root of a tree that is placed many times goes on down to so many: from afar each placement is drawn by no less. */
+#define STRL_PLACED_ROOT_TRIANGLES 64u
+
 typedef struct strl_hierarchy {
     strl_build_context *context;
     strl_ingest *ingest; /* gives up its streams when they are used up */
@@ -72,7 +75,8 @@ typedef struct strl_hierarchy {
     strl_adjacency current; /* of the level being made, until its groups are chosen */
     strl_adjacency next;    /* of the level above it */
     float even_error;       /* lattice units: where the nodes of the level being made are to end; 0 = at half their triangles */
-    uint32_t soft_triangles; /* STRL_SOFT_TRIANGLES but while leaves are sampled */
+    uint32_t soft_triangles; /* STRL_SOFT_TRIANGLES but while leaves are sampled, and at the root of a tree with placements */
+    uint32_t most_target;    /* nodes are to end at no more; UINT32_MAX = at half their triangles */
     strl_anchor_plan anchor_plan; /* of the level opened last: the one being made */
     float growth;           /* by which even_error grows from level to level, so that about half the triangles go */
     uint32_t saved_done;    /* groups of the level being made that the last checkpoint has */

@@ -25,6 +25,7 @@ void strl_made_node_deinit(strl_made_node *made)
 static strl_status simplify(const strl_hierarchy *hierarchy, const strl_mesh *mesh, uint32_t target, strl_arena *arena, strl_simplified *result,
                             strl_error *err)
 {
+    target = target < hierarchy->most_target ? target : hierarchy->most_target;
     strl_simplify_desc desc = {.target_triangles = target, .soft_triangles = hierarchy->soft_triangles, .error_limit = INFINITY,
                                .last_rung = STRL_SIMPLIFY_CLUSTERING, .normal_weight = STRL_NORMAL_WEIGHT,
                                .colour_weight = STRL_COLOUR_WEIGHT, .even_error = hierarchy->even_error,

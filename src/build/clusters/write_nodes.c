@@ -237,7 +237,7 @@ static strl_status write_levels(write_stage *stage, strl_error *err)
         status = write_level(stage, err);
         stage->group_base += stage->level->group_count;
     }
-    stage->hierarchy->context->result->groups = stage->group_base;
+    stage->hierarchy->context->result->groups += stage->group_base;
     return status;
 }
 

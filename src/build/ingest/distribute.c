@@ -9,6 +9,7 @@
 #include "base/memory.h"
 #include "build/ingest/batches.h"
 #include "build/ingest/internal.h"
+#include "build/model.h"
 #include "geometry/octahedral.h"
 
 /* Buckets decide where cells are cut, so their size must not depend on the number of threads, or the output would. Sorting takes
@@ -330,26 +331,36 @@ static bool add_name(strl_names *names, const char *prefix, const char *name, ui
 }
 
 /* With several inputs each file is a group: FILE/part. */
-static strl_status add_names(distribution *d, const strl_reader *reader, uint32_t input, strl_error *err)
+static strl_status add_names(const strl_build_desc *desc, strl_ingest *ingest, const strl_reader *reader, uint32_t input,
+                             strl_error *err)
 {
-    const strl_build_desc *desc = d->context->desc;
     const char *slash = strrchr(desc->inputs[input], '/'), *file = slash ? slash + 1 : desc->inputs[input];
     bool good = true;
     for (uint32_t i = 0; i < strl_reader_part_count(reader) && good; i++)
-        good = add_name(&d->ingest->parts, desc->input_count > 1 ? file : "", strl_reader_part_name(reader, i), 0, false);
+        good = add_name(&ingest->parts, desc->input_count > 1 ? file : "", strl_reader_part_name(reader, i), 0, false);
     for (uint32_t i = 0; i < strl_reader_material_count(reader) && good; i++) {
         uint32_t rgba;
         const char *name = strl_reader_material(reader, i, &rgba);
-        good = add_name(&d->ingest->materials, "", name, rgba, true);
+        good = add_name(&ingest->materials, "", name, rgba, true);
         strl_reader_image image;
         if (good && strl_reader_material_image(reader, i, &image))
-            good = strl__ingest_add_image(&d->ingest->materials, d->ingest->materials.count - 1, &(strl_material_image){
+            good = strl__ingest_add_image(&ingest->materials, ingest->materials.count - 1, &(strl_material_image){
                 .reference = image.reference, .wrap = {(strl_wrap)image.wrap[0], (strl_wrap)image.wrap[1]},
                 .texcoord_min = {image.texcoord_min[0], image.texcoord_min[1]},
                 .texcoord_extent = {image.texcoord_max[0] - image.texcoord_min[0],
                                     image.texcoord_max[1] - image.texcoord_min[1]}});
     }
     return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for the names of %s", desc->inputs[input]);
+}
+
+strl_status strl__ingest_add_names(strl_build_context *context, strl_ingest *ingest, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    for (uint32_t i = 0; i < context->desc->input_count && !status; i++)
+        status = add_names(context->desc, ingest, context->model->readers[i], i, err);
+    if (!status && !strl__ingest_fill_images(&ingest->materials))
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the images of %zu materials", ingest->materials.count);
+    return status;
 }
 
 static bool make_slots(distribution *d, const strl_batch_pass *pass)
@@ -376,16 +387,16 @@ static strl_status distribute_inputs(distribution *d, strl_reader *const *reader
     if (!status && !make_slots(d, &pass))
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory to read the input");
     for (uint32_t i = 0; i < d->context->desc->input_count && !status; i++) {
-        d->part_base = (uint32_t)d->ingest->parts.count;
-        d->material_base = (uint32_t)d->ingest->materials.count;
         d->reader = readers[i];
-        status = strl_reader_rewind(readers[i], err);
-        if (!status)
-            status = strl__batch_pass_run(&pass, readers[i], err);
-        if (!status)
-            status = add_names(d, readers[i], i, err);
-        if (d->context->desc->input_count > 1)
-            strl_reader_rest(readers[i]);
+        if (strl__model_reads(d->context, i)) {
+            status = strl__model_rewind(d->context, i, err);
+            if (!status)
+                status = strl__batch_pass_run(&pass, readers[i], err);
+            if (d->context->desc->input_count > 1)
+                strl_reader_rest(readers[i]);
+        }
+        d->part_base += strl_reader_part_count(readers[i]);
+        d->material_base += strl_reader_material_count(readers[i]);
     }
     for (unsigned i = 0; d->slots && i < pass.window; i++) {
         strl__free(d->slots[i].records);
@@ -403,11 +414,11 @@ strl_status strl__distribute(strl_build_context *context, strl_reader *const *re
     strl_status status = open_buckets(context, survey, ingest, octree, buckets, err);
     if (!status)
         status = distribute_inputs(&d, readers, err);
-    if (!status && !strl__ingest_fill_images(&ingest->materials))
-        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the images of %zu materials", ingest->materials.count);
+    if (!status)
+        status = strl__ingest_add_names(context, ingest, err);
     for (size_t i = 0; i < ingest->palette_count && !status; i++)
         ingest->palette[i].rgba = ingest->materials.rgba[ingest->palette[i].material];
-    if (!status && ingest->triangle_count == 0)
+    if (!status && ingest->triangle_count == 0 && strl__model_is_plain(context))
         status = strl__ingest_refuse_collapsed(context, ingest, survey->triangles, err);
     strl__free(d.table.slots);
     return status;

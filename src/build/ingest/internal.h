@@ -48,6 +48,8 @@ void strl__soup_pack(const strl_ingest *ingest, const strl_soup_triangle *triang
 bool strl__soup_has_collapsed(const strl_soup_triangle *triangle);
 void strl__soup_set_palette(const strl_ingest *ingest, uint32_t palette, uint8_t *bytes);
 
+/* Parts, materials and images of all inputs, whichever the tree is made of. They are known after the first survey. */
+strl_status strl__ingest_add_names(strl_build_context *context, strl_ingest *ingest, strl_error *err);
 /* Triangles to buckets by curve range. */
 strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, const model_survey *survey, bool octree,
                              strl_ingest *ingest, strl_buckets *buckets, strl_error *err);

@@ -6,6 +6,7 @@
 
 #include "base/fail.h"
 #include "build/ingest/internal.h"
+#include "build/model.h"
 
 /* Sentences about missing files; the rest is only counted. */
 #define MOST_MISSING_TOLD 16u
@@ -156,9 +157,11 @@ static void warn_of_images(strl_build_context *context, strl_reader *const *read
 
 void strl__ingest_warn(strl_build_context *context, strl_reader *const *readers, const strl_ingest *ingest)
 {
-    warn_of_missing(context, readers);
-    warn_of_unread(context, readers);
-    warn_of_images(context, readers);
+    if (strl__model_is_last_tree(context)) {
+        warn_of_missing(context, readers);
+        warn_of_unread(context, readers);
+        warn_of_images(context, readers);
+    }
     if (!ingest->is_coarse)
         return;
     char inputs[STRL_INPUTS_NAME_BYTES];

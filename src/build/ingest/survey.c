@@ -7,6 +7,7 @@
 #include "base/memory.h"
 #include "build/ingest/batches.h"
 #include "build/ingest/internal.h"
+#include "build/model.h"
 
 #define SAMPLE_CAPACITY 65536u
 /* Bins of a squared length by the top bits of its pattern: 8 bins an octave of the square, 16 an octave of length. */
@@ -153,9 +154,11 @@ strl_status strl__survey_run(strl_build_context *context, strl_reader *const *re
     if (!status && (!make_tallies(&s, workers) || !survey->edge_histogram || !survey->sample))
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory to read the input");
     for (uint32_t i = 0; i < context->desc->input_count; i++)
-        s.bytes_total += bytes_of(readers[i]);
+        s.bytes_total += strl__model_reads(context, i) ? bytes_of(readers[i]) : 0;
     for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
-        status = strl_reader_rewind(readers[i], err);
+        if (!strl__model_reads(context, i))
+            continue;
+        status = strl__model_rewind(context, i, err);
         if (!status)
             status = strl__batch_pass_run(&pass, readers[i], err);
         if (context->desc->input_count > 1)
@@ -227,7 +230,7 @@ static strl_status check_extent(const strl_build_context *context, const model_s
 static strl_status choose_step(const strl_build_context *context, const model_survey *survey, double extent,
                                strl_ingest *ingest, strl_error *err)
 {
-    const double asked = context->desc->grid;
+    const double asked = strl__model_grid(context);
     ingest->finest_step = 2 * power_of_two_below(ldexp(extent, -STEPS_EXPONENT));
     if (asked > 0) {
         ingest->step = power_of_two_below(asked);
@@ -263,6 +266,8 @@ strl_status strl__survey_choose_lattice(const strl_build_context *context, const
         status = choose_step(context, survey, extent, ingest, err);
     if (status)
         return status;
+    for (int k = 0; k < 3; k++)
+        ingest->centre[k] = survey->min[k] / 2 + survey->max[k] / 2;
     for (int k = 0; k < 3; k++)
         ingest->origin[k] = floor(survey->min[k] / ingest->step) * ingest->step;
     while (extent / ingest->step + 2 >= ldexp(1, 21 + (int)ingest->curve_shift))

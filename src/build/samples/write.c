@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "base/fail.h"
-#include "build/container_facts.h"
+#include "build/model.h"
 #include "build/samples/top.h"
 
 typedef struct numbering {
@@ -161,37 +161,22 @@ static strl_status write_tree(writing *w, strl_error *err)
     return status;
 }
 
-static strl_status write_container(strl_sample_stage *stage, const strl_brick_set *set, const numbering *ids, strl_error *err)
+static strl_status write_into(strl_sample_stage *stage, const strl_brick_set *set, const numbering *ids, strl_error *err)
 {
-    const strl_container_writer_desc desc = strl_describe_container(stage->context, stage->ingest);
-    strl_placement identity = {.tree = 0, .transform = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
     strl_container_writer *writer = NULL;
-    strl_status status = strl_container_writer_create(&desc, &writer, err);
-    if (!status)
-        status = write_tree(&(writing){.stage = stage, .set = set, .ids = ids, .writer = writer}, err);
-    if (!status)
-        status = strl_container_writer_add_placement(writer, &identity, err);
-    if (!status)
-        status = strl_write_names(stage->ingest, writer, err);
-    if (!status)
-        status = strl_container_writer_finish(writer, &stage->context->result->bytes_out, err);
-    strl_container_writer_destroy(writer);
-    return status;
+    strl_status status = strl__model_writer(stage->context, stage->ingest, &writer, err);
+    return status ? status : write_tree(&(writing){.stage = stage, .set = set, .ids = ids, .writer = writer}, err);
 }
 
 static void fill_result(const strl_sample_stage *stage, const strl_brick_set *set, const numbering *ids)
 {
     strl_build_result *result = stage->context->result;
-    result->triangles_leaf = stage->triangles + set->triangles;
-    result->vertices = stage->vertices + set->vertices;
-    result->nodes = result->groups = ids->nodes;
-    result->levels = ids->depths;
-    result->root_triangles = set->brick[0].record.base_triangle_count;
-    result->parts = (uint32_t)stage->ingest->parts.count;
-    result->materials = (uint32_t)stage->ingest->materials.count;
-    result->placements = 1;
-    result->step = stage->ingest->step;
-    result->quantisation_error = (double)stage->ingest->leaf_error * stage->ingest->step;
+    result->triangles_leaf += stage->triangles + set->triangles;
+    result->vertices += stage->vertices + set->vertices;
+    result->nodes += ids->nodes;
+    result->groups += ids->nodes;
+    result->levels = ids->depths > result->levels ? ids->depths : result->levels;
+    result->root_triangles += set->brick[0].record.base_triangle_count;
 }
 
 strl_status strl_samples_write(strl_sample_stage *stage, strl_error *err)
@@ -203,10 +188,8 @@ strl_status strl_samples_write(strl_sample_stage *stage, strl_error *err)
         status = number(stage, &set, &ids, err);
     if (!status) {
         fill_result(stage, &set, &ids);
-        status = strl_check_counts(stage->context->result, err);
+        status = write_into(stage, &set, &ids, err);
     }
-    if (!status)
-        status = write_container(stage, &set, &ids, err);
     numbering_deinit(&ids, stage->chunks.count);
     strl_bricks_deinit(&set);
     return status;

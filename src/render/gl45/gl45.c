@@ -166,8 +166,8 @@ static strl_status make_resident(gl45_draw *draw, const strl_draw_item *item, st
     gl45_renderer *self = draw->self;
     strl_cache_entry *entry = strl__cache_find(&self->gl.cache, item->key);
     strl_cache_upload plan = strl__cache_plan(entry, item, draw->frame);
-    if (entry && entry->batch == self->batch)
-        flush(draw); /* a key twice in a list: what is queued needs what lies there now */
+    if (entry && entry->batch == self->batch && (plan.vertices || plan.index_count))
+        flush(draw); /* another state of the same key: what is queued needs what lies there now */
     if (entry && plan.vertices) {
         release(self, entry);
         entry = NULL;

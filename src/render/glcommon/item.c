@@ -57,7 +57,8 @@ static void make_rows(strl_gl_placing *placing, const strl_view *view, const dou
     }
 }
 
-/* Cofactors grow with the square of a placement's scale: normals are brought near unit length here. */
+/* A placement that mirrors has cofactors that point to the other side, which lighting from both sides does not see.
+ * Cofactors grow with the square of a placement's scale: normals are brought near unit length here. */
 static void scale_cofactors(double cofactor[3][3])
 {
     double largest = 0;

@@ -131,13 +131,19 @@ static strl_status draw_item(null_renderer *self, const strl_draw_item *item, ui
     return STRL_OK;
 }
 
-/* Keys of the visible items must differ, or two nodes would share one place on the GPU. */
+/* Items of one key share one place on the GPU: they must be one node in one state, each placed elsewhere. */
 static strl_status check_keys(null_renderer *self, const strl_draw_item *item, uint64_t serial, strl_error *err)
 {
-    strl_cache_entry *entry = strl__cache_find(&self->cache, item->key);
-    if (entry && entry->batch == serial)
+    const strl_cache_entry *entry = strl__cache_find(&self->cache, item->key);
+    if (!entry || entry->batch != serial)
+        return STRL_OK;
+    if (entry->placement == item->placement)
         return strl__fail(err, STRL_ERR_ARGUMENT, "node %" PRIu32 " (placement %" PRIu32 ") has a key that is in the list already",
                           item->node, item->placement);
+    if (entry->state != item->state || entry->index_count != item->index_count)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "node %" PRIu32 " (placement %" PRIu32 ") is in state %" PRIu32
+                          ", but placement %" PRIu32 " of the same key in state %" PRIu32, item->node, item->placement, item->state,
+                          entry->placement, entry->state);
     return STRL_OK;
 }
 
@@ -161,6 +167,7 @@ static strl_status null_draw(strl_renderer *renderer, const strl_draw_setup *set
         if (status != STRL_OK)
             continue;
         self->cache.newest->batch = in_this_list;
+        self->cache.newest->placement = item->placement;
         stats->triangles += item->point_px > 0 ? 0 : item->index_count / 3;
         stats->items++;
         stats->draws++;

@@ -1,0 +1,182 @@
+/* A model of 10,000 placements: a frame looks at those that the camera sees, and what they share is uploaded once. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "build/built.h"
+#include "frame/view.h"
+#include "scenes/scene.h"
+#include "stroll/render.h"
+#include "walk/walk_checks.h"
+
+#define COPIES 10000u
+
+typedef struct shared_model {
+    uint8_t *bytes;
+    size_t size;
+    strl_container *container;
+    uint64_t vertices; /* of all nodes */
+    strl_box *boxes;   /* [COPIES] of the placements, in the world */
+} shared_model;
+
+static shared_model shared;
+
+/* By code of the test's own: all corners of the tree's box. */
+static strl_box placed_box(const strl_tree *tree, const double m[12])
+{
+    strl_box box = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
+    for (unsigned corner = 0; corner < 8; corner++)
+        for (int row = 0; row < 3; row++) {
+            double at = m[4 * row + 3];
+            for (int k = 0; k < 3; k++)
+                at += m[4 * row + k] *
+                      (tree->origin[k] + tree->step * (double)(corner >> k & 1 ? tree->box_max[k] : tree->box_min[k]));
+            box.min[row] = fmin(box.min[row], at);
+            box.max[row] = fmax(box.max[row], at);
+        }
+    return box;
+}
+
+static int make_model(void **state)
+{
+    strl_error err = {0};
+    if (built_setup(state) != 0)
+        return -1;
+    built_scene("isosurface", "one.ply", 20000, true);
+    const strl_scene_desc scene = {.name = "array", .path = built_path("many.gltf"), .of = built_path("one.ply"), .copies = COPIES};
+    if (strl_scene_write(&scene, NULL, NULL, &err) != STRL_OK)
+        fail_msg("%s", err.message);
+    const strl_build_result result = built_build_one(built_path("many.gltf"), built_path("many.stroll"));
+    assert_int_equal(result.trees, 1);
+    assert_int_equal(result.placements, COPIES);
+    shared.bytes = built_read_file(built_path("many.stroll"), &shared.size);
+    assert_true(shared.size < 1u << 21); /* a tree and 104 bytes a placement, not 200 M triangles */
+    assert_int_equal(strl_container_open_path(built_path("many.stroll"), &shared.container, &err), STRL_OK);
+    const strl_tree *tree = strl_container_tree(shared.container, 0);
+    shared.boxes = calloc(COPIES, sizeof *shared.boxes);
+    assert_non_null(shared.boxes);
+    for (uint32_t i = 0; i < COPIES; i++) {
+        strl_placement placement;
+        assert_int_equal(strl_container_placement(shared.container, i, &placement, &err), STRL_OK);
+        shared.boxes[i] = placed_box(tree, placement.transform);
+    }
+    for (uint32_t i = 0; i < tree->node_count; i++) {
+        strl_node node;
+        assert_int_equal(strl_container_node(shared.container, 0, i, &node, &err), STRL_OK);
+        shared.vertices += node.vertex_count;
+    }
+    return 0;
+}
+
+static int drop_model(void **state)
+{
+    strl_container_close(shared.container);
+    free(shared.boxes);
+    free(shared.bytes);
+    return built_teardown(state);
+}
+
+/* y is up; the array lies in x and -z. */
+static strl_camera look(double x, double height, double z, double target_x, double target_z)
+{
+    return (strl_camera){.eye = {x, height, -z}, .target = {target_x, 0, -target_z}, .up = {0.01, 1, 0.02}, .fov_y_deg = 40,
+                         .width = 640, .height = 360};
+}
+
+/* Every placement of the list is counted once; what is seen must be in it. */
+static uint32_t check_seen(const strl_draw_list *list, const strl_camera *camera)
+{
+    strl_view view;
+    uint8_t *drawn = calloc(COPIES, 1);
+    uint32_t seen = 0;
+    assert_non_null(drawn);
+    assert_true(strl_view_init(&view, camera));
+    for (uint32_t i = 0; i < list->count; i++)
+        drawn[list->items[i].placement] = 1;
+    for (uint32_t i = 0; i < COPIES; i++) {
+        strl_box box = shared.boxes[i];
+        for (int k = 0; k < 3; k++) { /* on the border rounding decides */
+            box.min[k] += 1e-9;
+            box.max[k] -= 1e-9;
+        }
+        seen += strl_view_sees(&view, &box);
+        assert_true(drawn[i] || !strl_view_sees(&view, &box));
+    }
+    free(drawn);
+    return seen;
+}
+
+static void what_is_seen_is_in_the_list_and_little_else(void **state)
+{
+    (void)state;
+    strl_walk *walk = open_walk(memory_source(shared.bytes, shared.size), NULL);
+    const strl_camera cameras[] = {look(60, 30, 60, 61, 61), look(-20, 10, -20, 60, 60), look(60, 2, 60, 200, 62),
+                                   look(60, 5, -40, 60, -140), look(60, 300, 61, 60, 60)};
+    uint32_t seen[5];
+    for (unsigned i = 0; i < 5; i++) {
+        strl_draw_list list = settle(walk, &cameras[i], 500);
+        seen[i] = check_seen(&list, &cameras[i]);
+        uint32_t placements = 0;
+        for (uint32_t k = 0; k < list.count; k++)
+            placements += k == 0 || list.items[k].placement != list.items[k - 1].placement;
+        assert_in_range(placements, seen[i], seen[i] + 2);
+    }
+    assert_in_range(seen[0], 1, 2000);
+    assert_int_equal(seen[3], 0); /* away from all of them */
+    assert_int_equal(seen[4], COPIES);
+    strl_walk_close(walk);
+}
+
+static void placements_share_keys_and_uploads(void **state)
+{
+    (void)state;
+    strl_error err = {0};
+    strl_renderer *renderer = NULL;
+    const strl_renderer_desc desc = {.backend = STRL_BACKEND_NULL, .width = 640, .height = 360};
+    assert_int_equal(strl_renderer_create(&desc, &renderer, &err), STRL_OK);
+    strl_walk *walk = open_walk(memory_source(shared.bytes, shared.size), NULL);
+    uint64_t uploaded = 0;
+    for (unsigned frame = 0; frame < 12; frame++) {
+        const strl_camera camera = look(40 + frame, 12, 40, 60, 60);
+        strl_draw_list list = settle(walk, &camera, 500);
+        strl_render_stats stats;
+        strl_draw_options options = {0};
+        if (strl_renderer_draw(renderer, &camera, &list, &options, &stats, &err) != STRL_OK)
+            fail_msg("%s", err.message);
+        assert_true(stats.items > 100);
+        uploaded += stats.uploaded_vertices;
+    }
+    assert_in_range(uploaded, 1, shared.vertices);
+    strl_walk_close(walk);
+    strl_renderer_destroy(renderer);
+}
+
+/* Roots are kept, whether one of their placements is seen or not: what comes into view is drawn at once. */
+static void what_comes_back_into_view_is_there_at_once(void **state)
+{
+    (void)state;
+    const strl_walk_desc desc = {.memory_bytes = 8u << 20};
+    strl_walk *walk = open_walk(memory_source(shared.bytes, shared.size), &desc);
+    const strl_camera away = look(60, 5, -40, 60, -140), there = look(60, 300, 61, 60, 60);
+    for (unsigned frame = 0; frame < 100; frame++)
+        assert_int_equal(walk_frame(walk, &away).count, 0);
+    const strl_draw_list list = walk_frame(walk, &there);
+    assert_true(list.count >= COPIES);
+    assert_true(strl_walk_get_stats(walk)->resident_bytes <= desc.memory_bytes);
+    strl_walk_close(walk);
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(what_is_seen_is_in_the_list_and_little_else),
+        cmocka_unit_test(placements_share_keys_and_uploads),
+        cmocka_unit_test(what_comes_back_into_view_is_there_at_once),
+    };
+    return cmocka_run_group_tests(tests, make_model, drop_model);
+}
