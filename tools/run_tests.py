@@ -22,7 +22,8 @@ BUILD = ROOT / "build"
 # Loops over failures, shapes and payloads that put no thread to a use which test_build, test_verify and test_walk do not.
 SLOW_UNDER_TSAN = ("test_build_certify", "test_build_faults", "test_build_root", "test_build_cuts", "test_certify",
                    "test_simplify", "test_simplify_shape", "test_pm_spill", "test_verify_payload", "test_container_hostile",
-                   "test_walk_built", "test_walk_remote", "test_build_resume", "test_build_texcoords", "test_container")
+                   "test_walk_built", "test_walk_remote", "test_build_resume", "test_build_texcoords", "test_container",
+                   "test_samples_draws", "test_samples_faults", "test_verify_samples", "test_walk_samples")
 # What a stage leaves to others. Under AddressSanitizer: what runs the program from outside as others do that stay, and long
 # builds whose code shorter ones run too. Files of which only a sanitizer shows what they do: under AddressSanitizer alone.
 LEFT_OUT = {

@@ -129,7 +129,7 @@ def send(server, data):
         try:
             connection.sendall(data)
             connection.shutdown(socket.SHUT_WR)
-        except ConnectionError:
+        except OSError: # reset, or no longer connected
             pass
         parts = []
         while some := receive(connection):
