@@ -92,7 +92,8 @@ def a_model_and_its_expansion_look_the_same(folder):
         assert all(frame["nodes"] + frame["nodes_culled"] >= 40 for frame in frames), frames
         # 49 balls are uploaded once, not 49 times: 24 bytes a vertex and its share of indices.
         assert sum(frame["uploaded_bytes"] for frame in frames) < 3 * 60 * shared["vertices"], frames
-    must("render", f"{folder}/shared.stroll", "--backend", "null", "--path", f"{folder}/whole/path.json", "--quiet")
+    must("render", f"{folder}/shared.stroll", "--backend", "null", "--stats", f"{folder}/null.jsonl", "--path",
+         f"{folder}/whole/path.json", "--quiet")
     assert info["placements"] == 50, info
 
 

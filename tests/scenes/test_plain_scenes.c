@@ -147,7 +147,7 @@ static void the_list_of_scenes_ends(void **state)
     size_t count = 0;
     while (strl_scene_at(count))
         count++;
-    assert_int_equal(count, 5);
+    assert_int_equal(count, 8);
     assert_string_equal(strl_scene_at(0)->name, "isosurface");
 }
 

@@ -286,8 +286,10 @@ static strl_status finish(void *context, uint64_t index, unsigned slot, unsigned
                     !strl__grow(&all->risen, &all->risen_capacity, all->risen_count + made->chunks.risen_count, sizeof *all->risen)))
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu pieces", all->count);
     if (!status) {
-        memcpy(all->chunk + all->count, made->chunks.chunk, made->chunks.count * sizeof *all->chunk);
-        memcpy(all->risen + all->risen_count, made->chunks.risen, made->chunks.risen_count * sizeof *all->risen);
+        if (made->chunks.count)
+            memcpy(all->chunk + all->count, made->chunks.chunk, made->chunks.count * sizeof *all->chunk);
+        if (made->chunks.risen_count)
+            memcpy(all->risen + all->risen_count, made->chunks.risen, made->chunks.risen_count * sizeof *all->risen);
         all->count += made->chunks.count;
         all->risen_count += made->chunks.risen_count;
         for (size_t i = 0; i < made->chunks.count; i++)
