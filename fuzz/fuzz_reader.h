@@ -64,6 +64,42 @@ static inline fuzz_pass fuzz_read_pass(strl_reader *reader)
     return pass;
 }
 
+/* Each piece twice to the same triangles, and as many finite placements as are announced, at most. */
+static inline void fuzz_pieces(const strl_reader_desc *desc, const strl__format *format)
+{
+    strl_reader_desc own = *desc;
+    strl_reader *reader;
+    strl_error err = {0};
+    own.most_pieces = 3;
+    if (strl__reader_open_as(&own, format, &reader, &err))
+        return;
+    uint64_t announced = 0, placements = 0;
+    for (uint32_t p = 0; p < strl_reader_piece_count(reader); p++) {
+        strl_reader_piece facts;
+        strl_reader_piece_get(reader, p, &facts);
+        announced += p ? facts.placements : 0;
+        if (facts.triangles > FUZZ_TRIANGLES_MAX)
+            continue;
+        FUZZ_CHECK(strl_reader_select(reader, p, &err) == STRL_OK);
+        const fuzz_pass first = fuzz_read_pass(reader);
+        FUZZ_CHECK(strl_reader_select(reader, p, &err) == STRL_OK);
+        const fuzz_pass second = fuzz_read_pass(reader);
+        FUZZ_CHECK(first.count == second.count && first.checksum == second.checksum);
+        FUZZ_CHECK(p == 0 || first.count <= facts.triangles);
+        FUZZ_CHECK(!facts.is_empty || first.count == 0);
+    }
+    bool found = announced <= FUZZ_TRIANGLES_MAX && strl_reader_begin_placements(reader, &err) == STRL_OK;
+    while (found) {
+        strl_reader_placement placement;
+        if (strl_reader_next_placement(reader, &placement, &found, &err) || !found)
+            break;
+        FUZZ_CHECK(placement.piece > 0 && placement.piece < strl_reader_piece_count(reader) && ++placements <= announced);
+        for (unsigned i = 0; i < 12; i++)
+            FUZZ_CHECK(__builtin_isfinite(placement.transform[i]));
+    }
+    strl_reader_close(reader);
+}
+
 static inline void fuzz_reader(const strl__format *format, const uint8_t *data, size_t size)
 {
     static int file = -1; /* the process's own scratch, reused because creating one is slow */
@@ -97,6 +133,7 @@ static inline void fuzz_reader(const strl__format *format, const uint8_t *data, 
                first.checksum == second.checksum);
     FUZZ_CHECK(memcmp(&first.drops, &second.drops, sizeof first.drops) == 0);
     strl_reader_close(reader);
+    fuzz_pieces(&desc, format);
 }
 
 #endif
