@@ -6,13 +6,20 @@
 #include "build/ingest/normals.h"
 
 #define LEAF_TRIANGLES 256u
-/* Of one bucket, more than these stay where they are, and the cells there count as so large: what is at the top is held in memory. */
+/* What is at the top is held in memory, so what a bucket hands up is bounded: triangles too large for it, of which more stay where they
+ * are and the cells there count as so large; and what the root of a piece stores. */
 #define MOST_RISEN 2048u
+#define MOST_OF_ROOT 8192u
+#define LEAST_HANDED_UP 64u
+#define SHARE_OF_MEMORY 8u    /* for all that is handed up */
+#define TIMES_OF_RISEN 2u     /* it is held twice: here and in the octree of the top */
+#define PIECES_OF_BUCKET 8u   /* mostly fewer */
 /* What a bucket takes in memory while it is worked on, in the size of its records: these, triangles, keys twice, cells, payloads. */
 #define TIMES_OF_BUCKET 6u
 
 /* One bucket on its way from a worker to the streams. */
 typedef struct made_bucket {
+    uint32_t most_risen, most_of_root;
     strl_chunks chunks;
     strl_brick_set *sets; /* [chunks.count] */
 } made_bucket;
@@ -118,11 +125,11 @@ static strl_risen rise(const strl_octree *octree, uint32_t triangle, float weigh
 }
 
 /* Those of order[] that are too large for a cell of `depth` go to risen, as long as there is room. Returns how many stay. */
-static bool let_rise(const strl_octree *octree, uint32_t *order, uint32_t *count, uint32_t depth, strl_chunks *chunks)
+static bool let_rise(const strl_octree *octree, uint32_t *order, uint32_t *count, uint32_t depth, uint32_t most, strl_chunks *chunks)
 {
     uint32_t kept = 0;
     for (uint32_t i = 0; i < *count; i++) {
-        if (octree->limit[order[i]] >= depth || chunks->risen_count >= MOST_RISEN) {
+        if (octree->limit[order[i]] >= depth || chunks->risen_count >= most) {
             order[kept++] = order[i];
             continue;
         }
@@ -149,17 +156,34 @@ static strl_status hand_up(const strl_octree *octree, uint32_t root, strl_chunk 
     return STRL_OK;
 }
 
+/* A root that stores too much gets a cell over it that draws no more than it may. */
+static strl_status cover_root(strl_octree *octree, uint32_t most, uint32_t *root, strl_error *err)
+{
+    const strl_octant *below = &octree->octant[*root];
+    if (below->item_count <= most)
+        return STRL_OK;
+    strl_octant cell = {.prefix = below->prefix, .depth = below->depth, .chunk = STRL_NO_CHUNK, .child_count = 1, .child = {*root}};
+    strl_status status = strl_octree_add(octree, &cell, root, err);
+    octree->most_draws = most;
+    if (!status)
+        status = strl_octree_sample(octree, *root, err);
+    octree->most_draws = 0;
+    return status;
+}
+
 static strl_status add_chunk(made_bucket *made, strl_octree *octree, uint32_t *order, uint32_t count, uint32_t depth,
                              strl_arena *arena, strl_error *err)
 {
     strl_chunks *chunks = &made->chunks;
     uint32_t root;
     size_t room = chunks->count;
-    if (!let_rise(octree, order, &count, depth, chunks))
+    if (!let_rise(octree, order, &count, depth, made->most_risen, chunks))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for large triangles");
     if (!count)
         return STRL_OK;
     strl_status status = strl_octree_build(octree, order, count, depth, &root, err);
+    if (!status)
+        status = cover_root(octree, made->most_of_root, &root, err);
     if (status)
         return status;
     if (!strl__grow(&made->sets, &room, chunks->count + 1, sizeof *made->sets) ||
@@ -206,6 +230,19 @@ static strl_status cut(const cutting *c, uint32_t begin, uint32_t end, uint64_t 
     return status;
 }
 
+static uint32_t bounded(uint64_t wanted, uint32_t most)
+{
+    return wanted < LEAST_HANDED_UP ? LEAST_HANDED_UP : wanted < most ? (uint32_t)wanted : most;
+}
+
+/* The same for any number of threads. */
+static void bound_what_rises(const strl_sample_stage *stage, made_bucket *made)
+{
+    uint64_t each = stage->context->memory_bytes / SHARE_OF_MEMORY / TIMES_OF_RISEN / sizeof(strl_risen) / stage->buckets->count;
+    made->most_risen = bounded(each / 2, MOST_RISEN);
+    made->most_of_root = bounded(each / 2 / PIECES_OF_BUCKET, MOST_OF_ROOT);
+}
+
 static strl_status work(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
 {
     const chunk_job *job = context;
@@ -214,6 +251,7 @@ static strl_status work(void *context, uint64_t index, unsigned slot, unsigned w
     strl_arena arena = {0};
     (void)worker;
     release(&job->slots[slot]);
+    bound_what_rises(job->stage, &job->slots[slot]);
     strl_status status = load_bucket(job->stage, (uint32_t)index, &octree, err);
     uint32_t *order = status ? NULL : strl__alloc(octree.triangle_count, sizeof *order);
     if (!status && !order)

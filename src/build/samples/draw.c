@@ -26,7 +26,8 @@ uint32_t strl_octree_draws(const strl_octree *octree, uint32_t depth, double are
     if (!(groups >= 1))
         return 0;
     double draws = ceil(groups * log(groups) + octree->coupons * groups); /* below 1 where the probability is */
-    return draws < 1 ? 1 : draws < MOST_DRAWS ? (uint32_t)draws : MOST_DRAWS;
+    uint32_t most = octree->most_draws ? octree->most_draws : MOST_DRAWS;
+    return draws < 1 ? 1 : draws < most ? (uint32_t)draws : most;
 }
 
 /* Running sums over the items of all children, so that those of a child sum up to its area. */

@@ -51,6 +51,7 @@ typedef struct strl_octree {
     const strl_ingest *ingest;
     uint32_t leaf_triangles; /* most of a leaf */
     double coupons;          /* c of the sample size */
+    uint32_t most_draws;     /* of the cell that is sampled now; 0 = as many as draws of any cell */
     bool has_pieces;         /* the top of a tree: leaves may be roots of pieces */
     uint32_t triangle_count;
     strl_soup_triangle *triangle; /* [triangle_count], owned with all that follows */
