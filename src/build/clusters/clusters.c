@@ -149,7 +149,7 @@ static strl_status run_partition(strl_hierarchy *hierarchy, strl_partition *part
     if (!status)
         hierarchy->levels = strl__alloc_zero((size_t)partition->depth + 1, sizeof *hierarchy->levels);
     if (!status && !hierarchy->levels)
-        status = strl__fail(err, STRL_ERR_MEMORY, "no memory");
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for %u levels", partition->depth + 1);
     if (!status && context->keep)
         status = strl_partition_save(context, hierarchy->ingest, partition, err);
     if (!status)
