@@ -68,7 +68,7 @@ def result_built(done):
     assert (0 < result["root_triangles"] <= 16384) == (result["triangles_leaf"] > 0), f"no root: {done}"
     warnings = done.error.count("stroll: warning: ")
     assert warnings == done.error.count("\n"), f"more than warnings: {done}"
-    words = [str(result["triangles_leaf"])]
+    words = [str(result["triangles_placed"])]
     words += [f"{kind}={dropped[kind]}" for kind in ("nonfinite", "degenerate", "lines", "points") if dropped[kind]]
     return " ".join(words + ([f"warnings={warnings}"] if warnings else []))
 
