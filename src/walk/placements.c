@@ -124,8 +124,10 @@ strl_status strl__placements_load(strl_walk *walk, strl_error *err)
     const strl__bound_level *below = NULL;
     for (uint32_t items = walk->placement_count; status == STRL_OK && (items > 1 || !below);) {
         status = add_level(walk, below, items, err);
-        below = &walk->bound_levels[walk->bound_level_count - 1];
-        items = below->count;
+        if (status == STRL_OK) {
+            below = &walk->bound_levels[walk->bound_level_count - 1];
+            items = below->count;
+        }
     }
     if (status == STRL_OK && !is_small(walk)) {
         walk->placement_bytes += walk->placement_count * PLACEMENT_BYTES;
