@@ -98,7 +98,7 @@ static void walk_brick(strl_node *record, const uint8_t *payload, size_t head_by
     record->vertex_count = sizes.vertex_count;
     record->base_vertex_count = sizes.base_vertex_count;
     record->step_count = sizes.step_count;
-    strl_status status = strl_page_mesh(record, payload, record->payload_bytes, NULL, arena, &pm, &err);
+    strl_status status = strl_page_mesh(record, payload, record->payload_bytes, NULL, arena, NULL, &pm, &err);
     require(status == STRL_OK || (status == STRL_ERR_FORMAT && err.message[0]));
     strl_status made = strl__mesh_create(record, payload, record->payload_bytes, NULL, true, &mesh, &err);
     require(made == STRL_OK || (made == STRL_ERR_FORMAT && err.message[0]));

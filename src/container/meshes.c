@@ -57,7 +57,7 @@ static strl_status decode(strl_container *container, const strl_node *record, co
     }
     strl_status status = load_page(container, &record->page, err);
     if (status == STRL_OK)
-        status = strl_page_mesh(record, container->page, record->page.bytes, parent ? &reference : NULL, arena, mesh, err);
+        status = strl_page_mesh(record, container->page, record->page.bytes, parent ? &reference : NULL, arena, NULL, mesh, err);
     return status == STRL_OK ? check_palette(container, record, mesh, err) : status;
 }
 

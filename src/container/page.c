@@ -91,26 +91,30 @@ static strl_status check_head(const strl_node *record, const strl_brick_head *he
     return STRL_OK;
 }
 
-static strl_status read_head(const strl_node *record, const uint8_t *payload, strl_arena *arena, strl_brick_head *head, size_t *bytes,
-                             strl_error *err)
+/* The node's bytes in its page, and what stands there before the mesh: head_bytes of them. */
+static strl_status find_payload(const strl_node *record, const uint8_t *page, size_t size, strl_arena *arena,
+                                const uint8_t **payload, strl_brick_head *head, size_t *head_bytes, strl_error *err)
 {
     *head = (strl_brick_head){0};
-    *bytes = 0;
+    *payload = NULL;
+    *head_bytes = 0;
+    if (record->payload_bytes == 0 || record->payload_offset > size || record->payload_bytes > size - record->payload_offset)
+        return strl__fail(err, STRL_ERR_FORMAT, "its %" PRIu32 " bytes pass the end of a page of %zu bytes",
+                          record->payload_bytes, size);
+    *payload = page + record->payload_offset;
     if (record->rung != STRL_RUNG_SAMPLED)
         return STRL_OK;
-    strl_status status = strl_brick_head_read(payload, record->payload_bytes, record->triangle_count, arena, head, bytes, err);
+    strl_status status =
+        strl_brick_head_read(*payload, record->payload_bytes, record->triangle_count, arena, head, head_bytes, err);
     return status ? status : check_head(record, head, err);
 }
 
 strl_status strl_page_head(const strl_node *record, const void *page, size_t size, strl_arena *arena, strl_brick_head *head,
                            strl_error *err)
 {
+    const uint8_t *payload;
     size_t bytes;
-    *head = (strl_brick_head){0};
-    if (record->payload_bytes == 0 || record->payload_offset > size || record->payload_bytes > size - record->payload_offset)
-        return strl__fail(err, STRL_ERR_FORMAT, "its %" PRIu32 " bytes pass the end of a page of %zu bytes",
-                          record->payload_bytes, size);
-    return read_head(record, (const uint8_t *)page + record->payload_offset, arena, head, &bytes, err);
+    return find_payload(record, page, size, arena, &payload, head, &bytes, err);
 }
 
 void strl_page_place(strl_payload_reference *reference, const int64_t anchor[3], const strl_node *record)
@@ -119,16 +123,12 @@ void strl_page_place(strl_payload_reference *reference, const int64_t anchor[3],
         reference->offset[axis] = (int32_t)(uint32_t)((uint64_t)anchor[axis] - (uint64_t)record->anchor[axis]);
 }
 
-static strl_status decode(const strl_node *record, const uint8_t *page, size_t size,
-                          const strl_payload_reference *reference, strl_arena *arena, strl_pm *mesh, strl_error *err)
+static strl_status decode(const strl_node *record, const uint8_t *page, size_t size, const strl_payload_reference *reference,
+                          strl_arena *arena, strl_brick_head *head, strl_pm *mesh, strl_error *err)
 {
-    if (record->payload_bytes == 0 || record->payload_offset > size || record->payload_bytes > size - record->payload_offset)
-        return strl__fail(err, STRL_ERR_FORMAT, "its %" PRIu32 " bytes pass the end of a page of %zu bytes",
-                          record->payload_bytes, size);
-    const uint8_t *payload = page + record->payload_offset;
+    const uint8_t *payload;
     size_t head_bytes;
-    strl_brick_head head;
-    strl_status status = read_head(record, payload, arena, &head, &head_bytes, err);
+    strl_status status = find_payload(record, page, size, arena, &payload, head, &head_bytes, err);
     if (status == STRL_OK)
         status = check_sizes(record, payload + head_bytes, record->payload_bytes - head_bytes, err);
     if (status == STRL_OK)
@@ -137,11 +137,12 @@ static strl_status decode(const strl_node *record, const uint8_t *page, size_t s
 }
 
 strl_status strl_page_mesh(const strl_node *record, const void *page, size_t size, const strl_payload_reference *reference,
-                           strl_arena *arena, strl_pm *mesh, strl_error *err)
+                           strl_arena *arena, strl_brick_head *head, strl_pm *mesh, strl_error *err)
 {
+    strl_brick_head unwanted;
     *mesh = (strl_pm){0};
     strl_arena_mark mark = strl_arena_get_mark(arena);
-    strl_status status = decode(record, page, size, reference, arena, mesh, err);
+    strl_status status = decode(record, page, size, reference, arena, head ? head : &unwanted, mesh, err);
     if (status == STRL_OK)
         return STRL_OK;
     strl_arena_rewind(arena, mark);

@@ -34,10 +34,11 @@ void strl_treelet_deinit(strl_treelet *treelet);
 /* Checks a page's bytes against its reference. */
 strl_status strl_page_check(const strl_page_ref *ref, const void *data, size_t size, strl_error *err);
 /* Decodes one node's mesh from its page (already checked) and checks it against the record (counts, box, errors).
- * reference: the finest state of the record's decode_parent, placed; NULL where it has none. */
+ * reference: the finest state of the record's decode_parent, placed; NULL where it has none. head: what stands before the mesh in a
+ * node of a sample tree, zero in others; NULL = not wanted. Arrays of both come from arena. */
 strl_status strl_page_mesh(const strl_node *record, const void *page, size_t size, const strl_payload_reference *reference,
-                           strl_arena *arena, strl_pm *mesh, strl_error *err);
-/* What stands before the mesh in a node of a sample tree; zero in others. Runs come from arena. */
+                           strl_arena *arena, strl_brick_head *head, strl_pm *mesh, strl_error *err);
+/* The head alone. */
 strl_status strl_page_head(const strl_node *record, const void *page, size_t size, strl_arena *arena, strl_brick_head *head,
                            strl_error *err);
 /* Sets the offset of a reference whose positions are relative to `anchor`, for a node's payload. */

@@ -177,12 +177,10 @@ strl_status strl__mesh_create(const strl_node *record, const void *page, size_t 
     *mesh = (strl__mesh){0};
     strl_arena_init(&arena, SCRATCH_BYTES);
     strl_brick_head head;
-    strl_status status = strl_page_mesh(record, page, size, reference, &arena, &pm, err);
-    if (status == STRL_OK)
-        status = strl_page_head(record, page, size, &arena, &head, err);
+    strl_status status = strl_page_mesh(record, page, size, reference, &arena, &head, &pm, err);
     if (status == STRL_OK)
         status = head.level_count ? strl__brick_create(record, &pm, &head, labels, mesh, err)
-                                                    : make_progressive(record, &pm, labels, &arena, mesh, err);
+                                  : make_progressive(record, &pm, labels, &arena, mesh, err);
     if (status == STRL_OK) {
         make_vertices(&pm, mesh->vertices);
         if (labels)

@@ -32,7 +32,7 @@ typedef struct strl_brick_set {
 } strl_brick_set;
 
 /* Appends the brick of an inner octant and those below it. At the top a child that is the root of a piece becomes a place of depth
- * and parent alone, its box as of chunk_box[chunk]. arena: for temporaries. */
+ * and parent alone. arena: for temporaries. */
 strl_status strl_bricks_add(strl_brick_set *set, const strl_octree *octree, uint32_t octant, uint32_t parent, strl_arena *arena,
                             strl_error *err);
 /* The first brick of a tree: what its root cell stores. */

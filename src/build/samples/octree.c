@@ -115,7 +115,6 @@ strl_status strl_octree_add_item(strl_octree *octree, uint32_t triangle, float w
 
 /* ---- leaves */
 
-/* What the table of sRGB codes says in linear light, made once for each octant's sums: cheap beside what it saves. */
 static double linear_of(uint32_t rgba, int channel)
 {
     return (double)strl_srgb_decode(rgba >> 8 * channel & 255);
@@ -179,9 +178,8 @@ static void add_sums(strl_splat_sums *to, const strl_splat_sums *from)
     add_vector(to->normal, from->normal);
 }
 
-/* `order` names the triangles. */
-static strl_status add_leaf(strl_octree *octree, const uint32_t *order, uint32_t count, strl_octant *leaf, uint32_t *index,
-                            strl_error *err)
+strl_status strl_octree_add_leaf(strl_octree *octree, const uint32_t *order, uint32_t count, strl_octant *leaf, uint32_t *index,
+                                 strl_error *err)
 {
     strl_status status = STRL_OK;
     leaf->is_leaf = true;
@@ -246,7 +244,7 @@ static strl_status build_children(strl_octree *octree, uint32_t *order, uint32_t
     }
     if (!status && large) {
         strl_octant leaf = {.prefix = octant->prefix, .depth = octant->depth, .is_large = true};
-        status = add_leaf(octree, order, large, &leaf, &octant->child[octant->child_count++], err);
+        status = strl_octree_add_leaf(octree, order, large, &leaf, &octant->child[octant->child_count++], err);
     }
     return status;
 }
@@ -261,7 +259,7 @@ static strl_status build(strl_octree *octree, uint32_t *order, uint32_t count, u
     own = own < depth ? depth : own;
     strl_octant octant = {.prefix = octree->key[order[0]] >> 3 * (STRL_OCTREE_DEPTH - own), .depth = own, .chunk = STRL_NO_CHUNK};
     if (count <= octree->leaf_triangles || own == STRL_OCTREE_DEPTH)
-        return add_leaf(octree, order, count, &octant, index, err);
+        return strl_octree_add_leaf(octree, order, count, &octant, index, err);
     strl_status status = build_children(octree, order, count, &octant, spare, err);
     if (!status)
         status = strl_octree_add(octree, &octant, index, err);
@@ -278,12 +276,6 @@ strl_status strl_octree_build(strl_octree *octree, uint32_t *order, uint32_t cou
                                : strl__fail(err, STRL_ERR_MEMORY, "no memory to sample %u triangles", count);
     strl__free(spare);
     return status;
-}
-
-strl_status strl_octree_add_leaf(strl_octree *octree, const uint32_t *order, uint32_t count, strl_octant *leaf, uint32_t *index,
-                                 strl_error *err)
-{
-    return add_leaf(octree, order, count, leaf, index, err);
 }
 
 void strl_octree_sum_children(strl_octree *octree, strl_octant *octant)
