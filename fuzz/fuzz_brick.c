@@ -100,7 +100,7 @@ static void walk_brick(strl_node *record, const uint8_t *payload, size_t head_by
     record->step_count = sizes.step_count;
     strl_status status = strl_page_mesh(record, payload, record->payload_bytes, NULL, arena, NULL, &pm, &err);
     require(status == STRL_OK || (status == STRL_ERR_FORMAT && err.message[0]));
-    strl_status made = strl__mesh_create(record, payload, record->payload_bytes, NULL, true, &mesh, &err);
+    strl_status made = strl__mesh_create(record, payload, record->payload_bytes, NULL, true, false, &mesh, &err);
     require(made == STRL_OK || (made == STRL_ERR_FORMAT && err.message[0]));
     require(status == STRL_OK || made != STRL_OK);
     if (status == STRL_OK)

@@ -87,6 +87,7 @@ static strl_status add_leaf(full_draw *draw, const strl_tree *tree, const strl_c
                              .vertex_count = mesh.vertex_count,
                              .indices = mesh.triangle[0],
                              .index_count = 3 * mesh.triangle_count,
+                             .draw_count = 3 * mesh.triangle_count,
                              .step = tree->step};
     item->vertices = make_vertices(&mesh, &model->arena);
     if (!item->vertices)

@@ -203,6 +203,7 @@ static strl_status make_items(soup_model *model, strl_error *err)
                                  .vertex_count = batch->vertex_count,
                                  .indices = batch->indices,
                                  .index_count = batch->index_count,
+                                 .draw_count = batch->index_count,
                                  .positions = STRL_POSITIONS_FLOAT};
         memcpy(item->origin, model->origin, sizeof item->origin);
         for (int i = 0; i < 3; i++)

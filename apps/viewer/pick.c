@@ -150,7 +150,7 @@ static bool pick_item(const strl_draw_item *item, const strl_ray *world, const l
                       const strl_pick_filter *filter, hit *best)
 {
     bool found = false;
-    for (uint32_t k = 0; k + 2 < item->index_count; k += 3) {
+    for (uint32_t k = item->draw_first; k + 2 < item->draw_first + item->draw_count; k += 3) {
         double p[3][3], t, normal[3];
         uint32_t vertex = item->indices[k];
         for (int c = 0; c < 3; c++)
@@ -204,7 +204,7 @@ bool strl_pick_list(const strl_draw_list *list, const strl_ray *ray, const strl_
     for (uint32_t i = 0; i < list->count; i++) {
         const strl_draw_item *item = &list->items[i];
         local_ray local;
-        if (item->index_count == 0 || !to_local(item, ray, &local) || !meets_box(item, &local, best.t))
+        if (item->draw_count == 0 || item->point_px > 0 || !to_local(item, ray, &local) || !meets_box(item, &local, best.t))
             continue;
         if (pick_item(item, ray, &local, filter ? filter : &none, &best))
             nearest = item;

@@ -207,7 +207,7 @@ static void upload_indices(drawer *d, gpu_node *node, const strl_draw_item *item
     uint32_t first = item->dirty_first, count = item->dirty_count;
     bool whole = frame == 0 || node->frame + 1 != frame;
     if (frame != 0 && node->frame == frame)
-        return; /* another placement of the node: in one list all have one state */
+        return; /* another placement of the node: in one list all have the same indices */
     glBindBuffer(GL_ELEMENT_ARRAY_BUFFER, node->indices);
     if (item->index_count > node->index_capacity) {
         node->index_capacity = item->index_count + item->index_count / 2;
@@ -353,7 +353,7 @@ static strl_status draw(drawer *d, const strl_camera *camera, const strl_draw_li
                 (GLfloat)((far + near) / (far - near)), (GLfloat)(-2 * far * near / (far - near)));
     for (uint32_t i = 0; i < list->count; i++) {
         const strl_draw_item *item = &list->items[i];
-        if (!item->visible)
+        if (!item->visible || item->draw_count == 0)
             continue;
         gpu_node *node = find_node(d, item->key);
         if (!node && !(node = add_node(d, item)))
@@ -361,7 +361,10 @@ static strl_status draw(drawer *d, const strl_camera *camera, const strl_draw_li
         glBindVertexArray(node->vertex_array);
         upload_indices(d, node, item, list->frame);
         place(d, camera, &basis, item);
-        glDrawElements(GL_TRIANGLES, (GLsizei)item->index_count, GL_UNSIGNED_SHORT, NULL);
+        if (item->point_px > 0) /* splats */
+            glPointSize(item->point_px);
+        glDrawElements(item->point_px > 0 ? GL_POINTS : GL_TRIANGLES, (GLsizei)item->draw_count, GL_UNSIGNED_SHORT,
+                       (void *)(item->draw_first * sizeof(uint16_t)));
     }
     drop_unused(d, list->frame);
     return glGetError() == GL_NO_ERROR ? STRL_OK : strl_error_set(err, STRL_ERR_INTERNAL, "OpenGL reports an error");

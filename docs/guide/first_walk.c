@@ -72,7 +72,7 @@ static strl_status print_list(strl_walk *walk, const strl_draw_list *list, strl_
 {
     for (uint32_t i = 0; i < list->count; i++) {
         const strl_draw_item *item = &list->items[i];
-        if (!item->visible || item->index_count == 0 || i >= 5) /* an empty model's only node has no corner */
+        if (!item->visible || item->draw_count == 0 || item->point_px > 0 || i >= 5) /* splats have no parts */
             continue;
         char name[64] = "";
         strl_status status = STRL_OK;
@@ -86,7 +86,7 @@ static strl_status print_list(strl_walk *walk, const strl_draw_list *list, strl_
         if (status != STRL_OK)
             return status;
         printf("node %" PRIu32 " of level %" PRIu32 ": %" PRIu32 " triangles, wrong by at most %.2f pixels, part %s\n",
-               item->node, item->level, item->index_count / 3, item->error_px, name);
+               item->node, item->level, item->draw_count / 3, item->error_px, name);
     }
     return STRL_OK;
 }

@@ -40,16 +40,18 @@ typedef enum strl_positions {
 
 /* One active node of one placement. All pointers are borrowed from the walk until its next frame. */
 typedef struct strl_draw_item {
-    uint64_t key;          /* (node, load): equal keys have equal vertices, in one list also equal states: all placements of a node
-                              share what is on the GPU */
+    uint64_t key;          /* (node, load): equal keys have equal vertices, in one list also equal indices: all placements of a node
+                              share what is on the GPU, and each draws its part of it */
     uint32_t placement, node, level, group;
-    uint32_t state;        /* refinement step; the indices are a function of (key, state) */
+    uint32_t state;        /* refinement step of the indices, which are a function of (key, state) */
     bool visible;          /* intersects the view frustum (and is not known to be hidden) */
     const strl_vertex *vertices;
     const strl_vertex_label *labels; /* [vertex_count]; NULL where the walk was not asked for them */
     uint32_t vertex_count;
-    const uint16_t *indices; /* 3 * triangle_count, of this state */
+    const uint16_t *indices; /* [index_count] what belongs onto the GPU */
     uint32_t index_count;
+    uint32_t draw_first, draw_count; /* indices to draw, three a triangle: all of them, or, of a node that several placements draw,
+                                        what this one needs */
     uint32_t dirty_first, dirty_count; /* indices that may differ from the list of frame - 1, where key is in that one */
     float point_px;              /* > 0: the vertices that indices name are drawn as squares of so many pixels of the output, which the
                                     alpha of their colour thins out: splats. 0: triangles */

@@ -17,8 +17,13 @@ strl_status strl__check_item_counts(const strl_draw_item *item, strl_error *err)
 {
     if (item->vertex_count > 65536)
         return fail_item(item, err, "vertex count", item->vertex_count, 65536);
-    if (!(item->point_px > 0) && item->index_count % 3 != 0)
-        return fail_item(item, err, "index count modulo three", item->index_count % 3, 0);
+    if (item->draw_first > item->index_count)
+        return fail_item(item, err, "first index to draw", item->draw_first, item->index_count);
+    if (item->draw_count > item->index_count - item->draw_first)
+        return fail_item(item, err, "count of indices to draw", item->draw_count, item->index_count - item->draw_first);
+    if (!(item->point_px > 0) && (item->index_count % 3 != 0 || item->draw_first % 3 != 0 || item->draw_count % 3 != 0))
+        return fail_item(item, err, "index count modulo three",
+                         item->index_count % 3 + item->draw_first % 3 + item->draw_count % 3, 0);
     if (item->dirty_first > item->index_count)
         return fail_item(item, err, "first dirty index", item->dirty_first, item->index_count);
     if (item->dirty_count > item->index_count - item->dirty_first)

@@ -14,7 +14,8 @@ static strl_draw_item make_item(const strl_walk *walk, const strl__active *activ
     const strl__placement *placement = &walk->placements[active->placement];
     const strl_tree *tree = walk->trees[placement->tree].tree;
     const strl__mesh *mesh = &node->mesh;
-    float error = mesh->errors[mesh->state];
+    float error = mesh->errors[active->state];
+    uint32_t draw_count = 3 * mesh->triangle_end[active->state];
     strl_draw_item item = {
         .key = node->load,
         .placement = active->placement,
@@ -27,7 +28,9 @@ static strl_draw_item make_item(const strl_walk *walk, const strl__active *activ
         .labels = mesh->labels,
         .vertex_count = mesh->vertex_count,
         .indices = mesh->indices,
-        .index_count = 3 * mesh->triangle_end[mesh->state],
+        .index_count = mesh->shared ? mesh->index_total : draw_count,
+        .draw_first = mesh->index_first ? mesh->index_first[active->state] : 0,
+        .draw_count = draw_count,
         .dirty_first = node->dirty_first,
         .dirty_count = node->dirty_end - node->dirty_first,
         .step = tree->step,
@@ -50,13 +53,13 @@ static void count_item(strl_walk *walk, const strl_draw_item *item)
         return;
     }
     stats->nodes++;
-    stats->triangles += item->index_count / 3;
+    stats->triangles += item->draw_count / 3;
     stats->max_error_px = fmaxf(stats->max_error_px, item->error_px);
 }
 
 strl_status strl__draw_list(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err)
 {
-    double least = INFINITY, largest = 0;
+    double least = walk->far_count ? walk->far_near : INFINITY, largest = walk->far_count ? walk->far_far : 0;
     if (!strl__grow(&walk->items, &walk->item_capacity, walk->front.count, sizeof *walk->items))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a draw list of %zu items", walk->front.count);
     for (size_t i = 0; i < walk->front.count; i++) {

@@ -226,15 +226,18 @@ strl_status strl__cut_run(strl_walk *walk, strl__cut *cut, strl_error *err)
     cut->bytes = walk->root_bytes;
     if (cut->kind == STRL__CUT_FRONT) {
         walk->wanted.count = walk->split.count = walk->ahead.count = 0;
-        walk->missing.count = walk->prefetch.count = walk->front.count = 0;
+        walk->missing.count = walk->prefetch.count = walk->front.count = walk->far_count = 0;
     }
     strl_status status = keep_roots(walk, cut, err);
-    uint32_t i = strl__placements_next(walk, cut->view, 0);
-    while (status == STRL_OK && i < walk->placement_count && !cut->overflow) {
+    uint32_t i = 0;
+    for (;; i++) {
+        if (status == STRL_OK)
+            status = strl__placements_next(walk, cut, i, &i, err);
+        if (status != STRL_OK || i == walk->placement_count || cut->overflow)
+            break;
         const strl__placement *placement = &walk->placements[i];
         strl__descent c = {walk, cut, i, placement, walk->trees[placement->tree].tree, err};
         status = visit_placement(&c);
-        i = strl__placements_next(walk, cut->view, i + 1);
     }
     return status;
 }

@@ -23,6 +23,7 @@
 #define STRL__REQUEST_NODES 32u /* most nodes that one page is read for at a time */
 #define STRL__MAX_REQUESTS 256u
 #define STRL__SPLAT_ROOM 2048u /* bytes that a decoded node may take beside what its record says: splats of an empty brick */
+#define STRL__MOST_POINT_PX 64.0 /* what every GL draws */
 #define STRL__GIVE_UP_FAILURES 3u /* from then on strl_walk_settled does not wait for it; it is still retried */
 
 typedef enum strl__residency { STRL__ABSENT, STRL__PENDING, STRL__RESIDENT } strl__residency;
@@ -35,19 +36,24 @@ typedef struct strl__retry {
 
 /* A decoded node: one block of at most strl__node_bytes, which `vertices` begins. indices[k]
  * = resolve(corner k, state) for all corners, also those of triangles that the state does not have
- * yet. The corners that a vertex v >= base_vertices moves (those in its subtree of the parent
+ * yet; of a node that several placements draw (`shared`), each in its state, the corners of some states are there, one after
+ * the other, and nothing of it changes. The corners that a vertex v >= base_vertices moves (those in its subtree of the parent
  * forest) are corners[moved_first[v - base] ...], moved_count of them. */
 typedef struct strl__mesh {
-    uint32_t vertex_count, base_vertices, triangle_count, step_count, state;
+    uint32_t vertex_count, base_vertices, triangle_count, step_count;
+    uint32_t state; /* of the indices; 0 where shared */
+    bool shared;
+    uint32_t index_total; /* in indices, of all states; shared */
     strl_vertex *vertices; /* owned, with all that follows; NULL = not resident */
     uint32_t *corners;
     uint32_t *moved_first, *moved_count; /* [vertex_count - base_vertices] */
     uint32_t *triangle_end;              /* [step_count + 1] */
+    uint32_t *index_first;               /* [step_count + 1] where the corners of a state begin; NULL: all at 0 */
     float *errors;                       /* [step_count + 1], lattice units, the larger of both kinds */
     uint16_t *vertex_end;                /* [step_count + 1] */
     uint16_t *parents;                   /* [vertex_count - base_vertices] */
     uint16_t *indices;                   /* [3 * triangle_count] */
-    uint16_t (*finest)[3];               /* [triangle_count], corners of the finest state; NULL at leaves */
+    uint16_t (*finest)[3];               /* [triangle_count], corners of the finest state; leaves may have none */
     strl_vertex_label *labels;           /* [vertex_count]; NULL where the walk keeps none */
     strl_splat *splats;                  /* of bricks: by state, those of state s before splat_end[s] */
     uint16_t *splat_end;                 /* [step_count]; NULL where it is no brick */
@@ -67,11 +73,8 @@ typedef struct strl__node {
     uint64_t counted_pass;  /* last traversal that counted its bytes */
     uint64_t wanted_frame;  /* last frame whose wanted cut has it at or above itself */
     uint64_t touched_frame; /* the same or prefetched */
-    uint64_t front_frame;   /* last frame in whose front it was */
-    uint64_t drawn_frame;   /* last frame in which it was visible too */
+    uint64_t drawn_frame;   /* last frame in whose front it was and visible */
     uint64_t split_frame;   /* last frame in which it was split */
-    bool was_drawn;         /* in the frame before front_frame */
-    uint32_t wanted_state;  /* of the front_frame; the finest over the placements */
     uint32_t dirty_first, dirty_end;
 } strl__node;
 
@@ -102,9 +105,21 @@ typedef struct strl__placement {
                             allowed error, so that sizes and errors are compared alike */
 } strl__placement;
 
+/* What a tree, a placement or a run of them looks like from very far. */
+typedef struct strl__far {
+    float area; /* of its faces: a tree's in lattice units, else world */
+    uint32_t rgba;
+    uint16_t normal[2];
+} strl__far;
+
+typedef struct strl__far_sums {
+    double area, linear[4], normal[3]; /* weighted by area */
+} strl__far_sums;
+
 /* Boxes over runs of placements, or of the boxes of the level below (placements.c). */
 typedef struct strl__bound_level {
     strl_box *boxes; /* [count], owned */
+    strl__far *fars; /* [count], owned */
     uint32_t count;
 } strl__bound_level;
 
@@ -113,6 +128,8 @@ typedef struct strl__bound_level {
 typedef struct strl__walk_tree {
     const strl_tree *tree; /* borrowed from the container */
     strl__node *root;      /* NULL where no placement uses the tree */
+    bool shared;           /* several do */
+    strl__far far;
 } strl__walk_tree;
 
 /* A page's bytes, shared by the decode jobs of its nodes. */
@@ -131,6 +148,7 @@ typedef struct strl__job {
     strl__page *page;
     strl_node record;
     bool labels;      /* wanted */
+    bool shared;      /* as strl__mesh */
     strl__node *node; /* the walk's thread only */
     bool is_waiting;  /* for the node by which it is decoded; the walk's thread only */
     strl_payload_reference reference; /* that node's mesh, which stays as long as the job may run */
@@ -226,6 +244,7 @@ typedef struct strl__active {
     strl__node *node;
     uint32_t placement;
     bool open;        /* of a sample tree: drawn with what is below it */
+    uint32_t state;   /* to be drawn in */
     strl_box box;     /* world */
     strl_sight sight; /* of the box */
 } strl__active;
@@ -303,6 +322,9 @@ struct strl_walk {
     size_t item_capacity;
     strl_vertex *points; /* splats of the frame */
     size_t point_count, point_capacity;
+    strl_vertex *far_points; /* of the frame: of placements too small to be told apart */
+    size_t far_count, far_capacity;
+    double far_near, far_far, far_px; /* depths of their boxes; the largest of these */
     uint16_t *numbers; /* 0, 1, 2, ...; NULL where there was no splat yet */
     strl_camera camera; /* of the last frame */
     strl_walk_stats stats;
@@ -312,7 +334,7 @@ struct strl_walk {
 /* What a decoded node takes at most, known before anything is fetched. */
 uint64_t strl__node_bytes(const strl_node *record, bool labels);
 strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size,
-                              const strl_payload_reference *reference, bool labels, strl__mesh *mesh, strl_error *err);
+                              const strl_payload_reference *reference, bool labels, bool shared, strl__mesh *mesh, strl_error *err);
 /* The finest state of a node's mesh, for the payload of another node. */
 strl_payload_reference strl__mesh_reference(const strl__node *from, const strl_node *record);
 void strl__mesh_deinit(strl__mesh *mesh);
@@ -322,9 +344,22 @@ void strl__mesh_set_state(strl__mesh *mesh, uint32_t state, uint32_t *first, uin
 
 /* placements.c */
 strl_status strl__placements_load(strl_walk *walk, strl_error *err);
+/* Boxes over them, and the walk's bounds. Roots must be there. */
+strl_status strl__placements_bound(strl_walk *walk, strl_error *err);
 void strl__placements_deinit(strl_walk *walk);
-/* The first placement from `from` on that the camera may see; placement_count where there is none. */
-uint32_t strl__placements_next(const strl_walk *walk, const strl_view *view, uint32_t from);
+/* *next: the first placement from `from` on that the camera may see; placement_count where there is none. Those before it that are
+ * too far away to be told apart are drawn as points by a cut that finds the front. */
+strl_status strl__placements_next(strl_walk *walk, const strl__cut *cut, uint32_t from, uint32_t *next, strl_error *err);
+
+/* far.c */
+void strl__far_of_tree(strl__walk_tree *tree); /* its root must be there */
+strl__far strl__far_of_placement(const strl_walk *walk, const strl__placement *placement);
+void strl__far_add(strl__far_sums *sums, const strl__far *far);
+strl__far strl__far_end(const strl__far_sums *sums);
+/* Whether the box projects to at most the allowed error. *px: to how much. */
+bool strl__is_far(const strl__cut *cut, const strl_box *box, double *px);
+strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl__far *far, double px, strl_error *err);
+strl_draw_item strl__far_item(const strl_walk *walk); /* what all items of far points have in common */
 
 /* treelets.c */
 strl__treelet *strl__treelets_find(const strl__treelets *treelets, uint32_t tree, uint32_t index);

@@ -169,8 +169,73 @@ static strl_status make_progressive(const strl_node *record, const strl_pm *pm, 
     return status;
 }
 
+/* ---- nodes that several placements draw */
+
+#define SHARED_STATES 32u
+#define SHARED_RATIO 0.62 /* of triangles from one state to the next coarser: all together have 2.7 times those of the finest */
+
+/* From the finest down, each with at most so many of the triangles of the one before; the coarsest is the last. */
+static uint32_t choose_states(const strl__mesh *mesh, uint32_t chosen[SHARED_STATES])
+{
+    uint32_t count = 1;
+    chosen[0] = mesh->step_count;
+    for (uint32_t state = mesh->step_count; state-- > 0 && count < SHARED_STATES;)
+        if (state == 0 || (mesh->triangle_end[state] <= SHARED_RATIO * mesh->triangle_end[chosen[count - 1]] && count + 1 < SHARED_STATES))
+            chosen[count++] = state;
+    return count;
+}
+
+/* What the node becomes: some of its states, with the indices of each. */
+static strl_status keep_states(strl__mesh *mesh, uint64_t most_bytes, strl_error *err)
+{
+    uint32_t chosen[SHARED_STATES], count = choose_states(mesh, chosen), triangles = 0;
+    for (uint32_t i = 0; i < count; i++)
+        triangles += mesh->triangle_end[chosen[i]];
+    size_t vertices = mesh->vertex_count, label_bytes = mesh->labels ? vertices * sizeof *mesh->labels : 0;
+    size_t bytes = vertices * sizeof *mesh->vertices + label_bytes + count * 3 * sizeof(uint32_t) + 3 * (size_t)triangles * sizeof(uint16_t);
+    if (bytes > most_bytes)
+        return strl__fail(err, STRL_ERR_INTERNAL, "the states of a node take %zu bytes, expected at most %" PRIu64, bytes, most_bytes);
+    uint8_t *block = strl__alloc(1, bytes);
+    if (!block)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %" PRIu32 " vertices", mesh->vertex_count);
+    strl__mesh kept = {.vertex_count = mesh->vertex_count, .base_vertices = mesh->base_vertices, .triangle_count = mesh->triangle_count,
+                       .step_count = count - 1, .index_total = 3 * triangles};
+    kept.vertices = (strl_vertex *)block;
+    kept.labels = mesh->labels ? (strl_vertex_label *)(kept.vertices + vertices) : NULL;
+    kept.triangle_end = (uint32_t *)(block + vertices * sizeof *kept.vertices + label_bytes);
+    kept.index_first = kept.triangle_end + count;
+    kept.errors = (float *)(kept.index_first + count);
+    kept.indices = (uint16_t *)(kept.errors + count);
+    memcpy(kept.vertices, mesh->vertices, vertices * sizeof *kept.vertices + label_bytes);
+    for (uint32_t s = 0, at = 0; s < count; s++) {
+        uint32_t state = chosen[count - 1 - s], first = 0, end = 0;
+        strl__mesh_set_state(mesh, state, &first, &end);
+        kept.index_first[s] = at;
+        kept.triangle_end[s] = mesh->triangle_end[state];
+        kept.errors[s] = mesh->errors[state];
+        memcpy(kept.indices + at, mesh->indices, 3 * (size_t)kept.triangle_end[s] * sizeof *kept.indices);
+        at += 3 * kept.triangle_end[s];
+    }
+    kept.finest = (uint16_t(*)[3])(kept.indices + kept.index_first[count - 1]);
+    strl__mesh_deinit(mesh);
+    *mesh = kept;
+    return STRL_OK;
+}
+
+/* Of a brick the indices of a state are the first ones of those of the next. */
+static strl_status share(strl__mesh *mesh, uint64_t most_bytes, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    if (mesh->splat_end)
+        mesh->index_total = 3 * mesh->triangle_count;
+    else
+        status = keep_states(mesh, most_bytes, err);
+    mesh->shared = status == STRL_OK;
+    return status;
+}
+
 strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size,
-                              const strl_payload_reference *reference, bool labels, strl__mesh *mesh, strl_error *err)
+                              const strl_payload_reference *reference, bool labels, bool shared, strl__mesh *mesh, strl_error *err)
 {
     strl_arena arena;
     strl_pm pm;
@@ -187,9 +252,11 @@ strl_status strl__mesh_create(const strl_node *record, const void *page, size_t 
             make_labels(&pm, mesh->labels);
         if (mesh->finest)
             memcpy(mesh->finest, pm.triangle, pm.triangle_count * sizeof *pm.triangle);
-    } else {
-        strl__mesh_deinit(mesh);
+        if (shared)
+            status = share(mesh, strl__node_bytes(record, labels), err);
     }
+    if (status != STRL_OK)
+        strl__mesh_deinit(mesh);
     strl_arena_deinit(&arena);
     return status;
 }

@@ -11,7 +11,7 @@
 
 #define MAX_PLACEMENTS (1u << 24)
 #define RUN 16u /* items under one box */
-#define PLACEMENT_BYTES (sizeof(strl__placement) + sizeof(strl_box) / (RUN - 1) + 1) /* with its share of the boxes */
+#define PLACEMENT_BYTES (sizeof(strl__placement) + (sizeof(strl_box) + sizeof(strl__far)) / (RUN - 1) + 1) /* with its share of the boxes */
 
 /* The largest singular value of a placement: the root of the largest eigenvalue of its transposed
  * times itself, by Jacobi rotations; a little more for rounding, because errors must stay bounds.
@@ -42,7 +42,8 @@ static double largest_scale(const double transform[12])
     return largest == 1 ? 1 : largest * (1 + 1e-12);
 }
 
-static strl_status load_all(strl_walk *walk, strl_error *err)
+/* is_used: [tree_count], none yet. */
+static strl_status load_all(strl_walk *walk, bool *is_used, strl_error *err)
 {
     uint64_t count = strl_container_get_info(walk->container)->placement_count;
     if (count == 0 || count > MAX_PLACEMENTS || count > walk->memory_bytes / 2 / PLACEMENT_BYTES)
@@ -72,6 +73,8 @@ static strl_status load_all(strl_walk *walk, strl_error *err)
         if (!isfinite(placement->length_scale))
             return strl__fail(err, STRL_ERR_FORMAT, "placement %" PRIu32 ": its transform is not finite",
                               walk->placement_count);
+        walk->trees[stored.tree].shared = is_used[stored.tree];
+        is_used[stored.tree] = true;
     }
     return STRL_OK;
 }
@@ -105,22 +108,45 @@ static strl_status add_level(strl_walk *walk, const strl__bound_level *below, ui
     strl__bound_level *level = &walk->bound_levels[walk->bound_level_count];
     level->count = (items - 1) / RUN + 1;
     level->boxes = strl__alloc(level->count, sizeof *level->boxes);
-    if (!level->boxes)
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory for the boxes of %" PRIu32 " placements", walk->placement_count);
+    level->fars = strl__alloc(level->count, sizeof *level->fars);
     walk->bound_level_count++;
+    if (!level->boxes || !level->fars)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for the boxes of %" PRIu32 " placements", walk->placement_count);
+    strl__far_sums sums = {0};
     for (uint32_t i = 0; i < items; i++) {
         strl_box box = below ? below->boxes[i] : box_of(walk, i);
-        if (i % RUN == 0)
+        strl__far far = below ? below->fars[i] : strl__far_of_placement(walk, &walk->placements[i]);
+        if (i % RUN == 0) {
             level->boxes[i / RUN] = box;
-        else
+            sums = (strl__far_sums){0};
+        } else {
             include(&level->boxes[i / RUN], &box);
+        }
+        strl__far_add(&sums, &far);
+        if (i % RUN == RUN - 1 || i + 1 == items)
+            level->fars[i / RUN] = strl__far_end(&sums);
     }
     return STRL_OK;
 }
 
 strl_status strl__placements_load(strl_walk *walk, strl_error *err)
 {
-    strl_status status = load_all(walk, err);
+    bool *is_used = strl__alloc_zero(walk->tree_count, sizeof *is_used);
+    strl_status status = is_used ? load_all(walk, is_used, err) : strl__fail(err, STRL_ERR_MEMORY, "no memory for %" PRIu32 " trees", walk->tree_count);
+    strl__free(is_used);
+    if (status == STRL_OK && !is_small(walk)) {
+        walk->placement_bytes += walk->placement_count * PLACEMENT_BYTES;
+        walk->resident_bytes += walk->placement_count * PLACEMENT_BYTES;
+    }
+    return status;
+}
+
+strl_status strl__placements_bound(strl_walk *walk, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    for (uint32_t tree = 0; tree < walk->tree_count; tree++)
+        if (walk->trees[tree].root)
+            strl__far_of_tree(&walk->trees[tree]);
     const strl__bound_level *below = NULL;
     for (uint32_t items = walk->placement_count; status == STRL_OK && (items > 1 || !below);) {
         status = add_level(walk, below, items, err);
@@ -129,44 +155,57 @@ strl_status strl__placements_load(strl_walk *walk, strl_error *err)
             items = below->count;
         }
     }
-    if (status == STRL_OK && !is_small(walk)) {
-        walk->placement_bytes += walk->placement_count * PLACEMENT_BYTES;
-        walk->resident_bytes += walk->placement_count * PLACEMENT_BYTES;
-    }
+    if (status == STRL_OK)
+        memcpy(walk->bounds, &walk->bound_levels[walk->bound_level_count - 1].boxes[0], sizeof walk->bounds);
     return status;
 }
 
 void strl__placements_deinit(strl_walk *walk)
 {
-    for (uint32_t i = 0; i < walk->bound_level_count; i++)
+    for (uint32_t i = 0; i < walk->bound_level_count; i++) {
         strl__free(walk->bound_levels[i].boxes);
+        strl__free(walk->bound_levels[i].fars);
+    }
     strl__free(walk->placements);
 }
 
 /* ---- looking */
 
-uint32_t strl__placements_next(const strl_walk *walk, const strl_view *view, uint32_t from)
+/* True where the camera looks past it, or sees no more of it than a point, which is drawn. */
+static bool passes_over(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl__far *far, strl_status *status,
+                        strl_error *err)
+{
+    double px;
+    if (!strl_view_sees(cut->view, box))
+        return true;
+    if (!strl__is_far(cut, box, &px))
+        return false;
+    if (cut->kind == STRL__CUT_FRONT)
+        *status = strl__far_draw(walk, cut, box, far, px, err);
+    return true;
+}
+
+strl_status strl__placements_next(strl_walk *walk, const strl__cut *cut, uint32_t from, uint32_t *next, strl_error *err)
 {
     uint32_t at = from;
-    if (is_small(walk))
-        return at;
-    while (at < walk->placement_count) {
-        /* The highest box that begins here and is not seen is passed over as a whole. */
-        uint32_t level = 0, run = RUN;
-        while (level + 1 < walk->bound_level_count && at % (run * RUN) == 0)
+    strl_status status = STRL_OK;
+    while (!is_small(walk) && at < walk->placement_count && !status) {
+        /* The highest box that begins here is looked at first, then those in it. */
+        uint32_t level = 0, run = RUN, passed = 0;
+        while (at % RUN == 0 && level + 1 < walk->bound_level_count && at % (run * RUN) == 0)
             level++, run *= RUN;
-        if (at % RUN == 0) {
-            while (level > 0 && strl_view_sees(view, &walk->bound_levels[level].boxes[at / run]))
-                level--, run /= RUN;
-            if (!strl_view_sees(view, &walk->bound_levels[level].boxes[at / run])) {
-                at += run;
-                continue;
-            }
+        for (bool more = at % RUN == 0; more && !passed; more = level-- > 0, run /= RUN)
+            if (passes_over(walk, cut, &walk->bound_levels[level].boxes[at / run], &walk->bound_levels[level].fars[at / run], &status, err))
+                passed = run;
+        if (!passed) {
+            strl_box box = box_of(walk, at);
+            strl__far far = strl__far_of_placement(walk, &walk->placements[at]);
+            if (!passes_over(walk, cut, &box, &far, &status, err))
+                break;
+            passed = 1;
         }
-        strl_box box = box_of(walk, at);
-        if (strl_view_sees(view, &box))
-            break;
-        at++;
+        at += passed;
     }
-    return at < walk->placement_count ? at : walk->placement_count;
+    *next = at < walk->placement_count ? at : walk->placement_count;
+    return status;
 }

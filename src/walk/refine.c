@@ -49,28 +49,19 @@ static uint32_t coarsest_state(const projector *p, uint32_t begin, uint32_t fine
     return suffices(p, high) ? bisect(p, low, high) : finest;
 }
 
-static void choose_state(strl_walk *walk, const strl__active *active)
+static uint32_t choose_state(const strl_walk *walk, const strl__active *active)
 {
-    strl__node *node = active->node;
-    const projector p = {&active->sight, node->mesh.errors, walk->placements[active->placement].length_scale,
-                         walk->stats.allowed_error_px};
+    const strl__mesh *mesh = &active->node->mesh;
+    const projector p = {&active->sight, mesh->errors, walk->placements[active->placement].length_scale, walk->stats.allowed_error_px};
     /* Beside what is below it a brick shows no splats: its record may open it before its own, smaller cells ask for that. */
-    uint32_t state = active->open ? node->mesh.step_count : coarsest_state(&p, node->mesh.state, node->mesh.step_count);
-    if (node->front_frame != walk->frame) {
-        node->was_drawn = node->drawn_frame > 0 && node->drawn_frame + 1 == walk->frame;
-        node->front_frame = walk->frame;
-        node->wanted_state = state;
-    } else if (state > node->wanted_state) {
-        node->wanted_state = state; /* placements share a node's indices: the finest state serves all */
-    }
-    if (active->sight.seen)
-        node->drawn_frame = walk->frame;
+    return active->open ? mesh->step_count : coarsest_state(&p, mesh->state, mesh->step_count);
 }
 
-static void apply_state(strl_walk *walk, strl__node *node)
+/* was_drawn: in the frame before. */
+static void apply_state(strl_walk *walk, strl__node *node, uint32_t state, bool was_drawn)
 {
     strl__mesh *mesh = &node->mesh;
-    uint32_t before = mesh->state, state = node->wanted_state;
+    uint32_t before = mesh->state;
     uint32_t count_before = 3 * mesh->triangle_end[before], count = 3 * mesh->triangle_end[state];
     uint32_t first = UINT32_MAX, end = 0;
     if (state > before)
@@ -79,7 +70,7 @@ static void apply_state(strl_walk *walk, strl__node *node)
         walk->stats.vertex_collapses += before - state;
     if (state != before)
         strl__mesh_set_state(mesh, state, &first, &end);
-    if (!node->was_drawn) {
+    if (!was_drawn) {
         first = 0, end = count;
     } else if (count > count_before) { /* not uploaded while they were not drawn */
         first = first < count_before ? first : count_before;
@@ -92,13 +83,13 @@ static void apply_state(strl_walk *walk, strl__node *node)
 
 void strl__refine_front(strl_walk *walk)
 {
-    for (size_t i = 0; i < walk->front.count; i++)
-        choose_state(walk, &walk->front.items[i]);
     for (size_t i = 0; i < walk->front.count; i++) {
-        strl__node *node = walk->front.items[i].node;
-        if (node->wanted_state == UINT32_MAX)
-            continue; /* done for another placement */
-        apply_state(walk, node);
-        node->wanted_state = UINT32_MAX;
+        strl__active *active = &walk->front.items[i];
+        strl__node *node = active->node;
+        active->state = choose_state(walk, active);
+        if (!node->mesh.shared)
+            apply_state(walk, node, active->state, node->drawn_frame > 0 && node->drawn_frame + 1 == walk->frame);
+        if (active->sight.seen)
+            node->drawn_frame = walk->frame;
     }
 }

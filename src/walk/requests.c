@@ -38,7 +38,7 @@ static void run_job(void *context)
         return;
     }
     const strl_payload_reference *reference = job->record.decode_parent != STRL_NONE ? &job->reference : NULL;
-    job->status = strl__mesh_create(&job->record, job->page->data, job->page->size, reference, job->labels, &job->mesh,
+    job->status = strl__mesh_create(&job->record, job->page->data, job->page->size, reference, job->labels, job->shared, &job->mesh,
                                     &job->error);
     atomic_store_explicit(&job->phase, STRL__JOB_DONE, memory_order_release);
 }
@@ -174,6 +174,7 @@ static strl_status start_job(strl_walk *walk, strl__node *node, strl__page *page
     job->node = node;
     job->record = *node->record;
     job->labels = walk->labels;
+    job->shared = walk->trees[node->treelet->tree].shared;
     strl_status status = submit_job(walk, job, err);
     if (status != STRL_OK) {
         destroy_job(job);

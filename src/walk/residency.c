@@ -73,7 +73,7 @@ void strl__node_install(strl_walk *walk, strl__node *node, const strl__mesh *mes
     node->load = ++walk->loads;
     node->retry = (strl__retry){0};
     node->touched_frame = walk->frame;
-    node->front_frame = node->drawn_frame = 0; /* what was drawn of an earlier load has another key */
+    node->drawn_frame = 0; /* what was drawn of an earlier load has another key */
     link_newest(walk, node);
 }
 

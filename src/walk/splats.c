@@ -1,11 +1,11 @@
-/* The splats of a frame: of all bricks whose cells are small enough, merged into items of points, one or more a placement. */
+/* The splats of a frame: of all bricks whose cells are small enough, merged into items of points, one or more a placement, and of
+ * placements that are too far away (far.c). */
 #include "walk/internal.h"
 
 #include <math.h>
 #include <string.h>
 
 #define MOST_POINTS 65535u /* of an item: indices have 16 bits */
-#define MOST_POINT_PX 64.0 /* what every GL draws */
 
 typedef struct shown {
     const strl_splat *splats;
@@ -16,17 +16,17 @@ typedef struct shown {
 static shown shown_splats(const strl__active *active)
 {
     const strl__mesh *mesh = &active->node->mesh;
-    if (active->sight.empty || !mesh->splat_end || mesh->state >= mesh->step_count)
+    if (active->sight.empty || !mesh->splat_end || active->state >= mesh->step_count)
         return (shown){0};
-    uint32_t first = mesh->state ? mesh->splat_end[mesh->state - 1] : 0;
-    return (shown){mesh->splats + first, mesh->splat_end[mesh->state] - first};
+    uint32_t first = active->state ? mesh->splat_end[active->state - 1] : 0;
+    return (shown){mesh->splats + first, mesh->splat_end[active->state] - first};
 }
 
 /* What is below has not arrived: the finest splats of the brick close its holes, as large as their cells. */
 static shown missing_splats(const strl__active *active)
 {
     const strl__mesh *mesh = &active->node->mesh;
-    if (active->sight.empty || !mesh->splat_end || mesh->state < mesh->step_count || active->open ||
+    if (active->sight.empty || !mesh->splat_end || active->state < mesh->step_count || active->open ||
         active->node->record->child_count == 0)
         return (shown){0};
     uint32_t first = mesh->step_count > 1 ? mesh->splat_end[mesh->step_count - 2] : 0;
@@ -67,36 +67,41 @@ static bool fill_numbers(strl_walk *walk)
     return walk->numbers != NULL;
 }
 
-/* The next `count` points, all of one placement. */
-static strl_status add_items(strl_walk *walk, uint32_t placement_index, double px, size_t first, size_t count, strl_draw_list *list,
+/* `shape`: all of an item but its points. */
+static strl_status add_items(strl_walk *walk, const strl_draw_item *shape, const strl_vertex *points, size_t count, strl_draw_list *list,
                              strl_error *err)
 {
-    const strl__placement *placement = &walk->placements[placement_index];
-    const strl_tree *tree = walk->trees[placement->tree].tree;
-    for (size_t end = first + count; first < end; first += MOST_POINTS) {
-        uint32_t part = end - first < MOST_POINTS ? (uint32_t)(end - first) : MOST_POINTS;
+    for (size_t first = 0; first < count; first += MOST_POINTS) {
+        uint32_t part = count - first < MOST_POINTS ? (uint32_t)(count - first) : MOST_POINTS;
         if (!strl__grow(&walk->items, &walk->item_capacity, (size_t)list->count + 1, sizeof *walk->items))
             return strl__fail(err, STRL_ERR_MEMORY, "no memory for a draw list of %u items", list->count);
         strl_draw_item *item = &walk->items[list->count++];
-        *item = (strl_draw_item){.key = ++walk->loads,
-                                 .placement = placement_index,
-                                 .visible = true,
-                                 .vertices = walk->points + first,
-                                 .vertex_count = part,
-                                 .indices = walk->numbers,
-                                 .index_count = part,
-                                 .dirty_count = part,
-                                 .step = tree->step,
-                                 .point_px = (float)fmin(fmax(px, 1), MOST_POINT_PX),
-                                 .error_px = (float)px};
-        memcpy(item->anchor, tree->box_min, sizeof item->anchor);
-        memcpy(item->box_min, tree->box_min, sizeof item->box_min);
-        memcpy(item->box_max, tree->box_max, sizeof item->box_max);
-        memcpy(item->origin, tree->origin, sizeof item->origin);
-        memcpy(item->transform, placement->transform, sizeof item->transform);
+        *item = *shape;
+        item->key = ++walk->loads;
+        item->visible = true;
+        item->vertices = points + first;
+        item->indices = walk->numbers;
+        item->vertex_count = item->index_count = item->draw_count = item->dirty_count = part;
         walk->stats.splats += part;
     }
     return STRL_OK;
+}
+
+/* Of points of one placement. */
+static strl_draw_item shape_of(const strl_walk *walk, uint32_t placement_index, double px)
+{
+    const strl__placement *placement = &walk->placements[placement_index];
+    const strl_tree *tree = walk->trees[placement->tree].tree;
+    strl_draw_item item = {.placement = placement_index,
+                           .step = tree->step,
+                           .point_px = (float)fmin(fmax(px, 1), STRL__MOST_POINT_PX),
+                           .error_px = (float)px};
+    memcpy(item.anchor, tree->box_min, sizeof item.anchor);
+    memcpy(item.box_min, tree->box_min, sizeof item.box_min);
+    memcpy(item.box_max, tree->box_max, sizeof item.box_max);
+    memcpy(item.origin, tree->origin, sizeof item.origin);
+    memcpy(item.transform, placement->transform, sizeof item.transform);
+    return item;
 }
 
 static double missing_px(const strl_walk *walk, const strl__active *active)
@@ -116,13 +121,13 @@ static strl_status list_splats(strl_walk *walk, strl_draw_list *list, strl_error
         size_t first = at;
         for (next = i; next < front->count && front->items[next].placement == front->items[i].placement; next++)
             at += shown_splats(&front->items[next]).count;
-        status = add_items(walk, front->items[i].placement, walk->splat_ratio * walk->stats.allowed_error_px, first, at - first, list,
-                           err);
+        const strl_draw_item shape = shape_of(walk, front->items[i].placement, walk->splat_ratio * walk->stats.allowed_error_px);
+        status = add_items(walk, &shape, walk->points + first, at - first, list, err);
     }
     for (size_t i = 0; i < front->count && !status; i++) {
         uint32_t count = missing_splats(&front->items[i]).count;
-        if (count)
-            status = add_items(walk, front->items[i].placement, missing_px(walk, &front->items[i]), at, count, list, err);
+        const strl_draw_item shape = shape_of(walk, front->items[i].placement, count ? missing_px(walk, &front->items[i]) : 0);
+        status = add_items(walk, &shape, walk->points + at, count, list, err);
         at += count;
     }
     return status;
@@ -136,11 +141,14 @@ strl_status strl__draw_splats(strl_walk *walk, strl_draw_list *list, strl_error 
         status = add_points(walk, &walk->front.items[i], shown_splats(&walk->front.items[i]), err);
     for (size_t i = 0; i < walk->front.count && !status; i++)
         status = add_points(walk, &walk->front.items[i], missing_splats(&walk->front.items[i]), err);
-    if (status || walk->point_count == 0)
+    if (status || walk->point_count + walk->far_count == 0)
         return status;
     if (!fill_numbers(walk))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for splats");
+    const strl_draw_item far = strl__far_item(walk);
     status = list_splats(walk, list, err);
+    if (status == STRL_OK)
+        status = add_items(walk, &far, walk->far_points, walk->far_count, list, err);
     list->items = walk->items;
     return status;
 }

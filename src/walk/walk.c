@@ -70,7 +70,7 @@ static strl_status load_root(strl_walk *walk, uint32_t tree, strl_error *err)
     if (status == STRL_OK && (status = strl_page_check(page, data, page->bytes, err)) != STRL_OK)
         strl_source_doubt(walk->source, page->offset, page->bytes);
     if (status == STRL_OK)
-        status = strl__mesh_create(root->record, data, page->bytes, NULL, walk->labels, &mesh, err);
+        status = strl__mesh_create(root->record, data, page->bytes, NULL, walk->labels, walk->trees[tree].shared, &mesh, err);
     if (status == STRL_OK)
         strl__node_install(walk, root, &mesh);
     strl__free(data);
@@ -89,7 +89,7 @@ static strl_status load_trees(strl_walk *walk, strl_error *err)
     for (uint32_t i = 0; status == STRL_OK && i < walk->placement_count; i++)
         if (!walk->trees[walk->placements[i].tree].root)
             status = load_root(walk, walk->placements[i].tree, err);
-    return status;
+    return status ? status : strl__placements_bound(walk, err);
 }
 
 static void apply_desc(strl_walk *walk, const strl_walk_desc *desc, strl_source *source)
@@ -129,7 +129,6 @@ strl_status strl_walk_open(strl_source *source, const strl_walk_desc *desc, strl
         strl_walk_close(walk);
         return status;
     }
-    memcpy(walk->bounds, &walk->bound_levels[walk->bound_level_count - 1].boxes[0], sizeof walk->bounds);
     walk->stats.resident_bytes = walk->resident_bytes;
     *out = walk;
     return STRL_OK;
@@ -162,6 +161,7 @@ void strl_walk_close(strl_walk *walk)
                            walk->front.items,
                            walk->items,
                            walk->points,
+                           walk->far_points,
                            walk->numbers,
                            walk};
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)

@@ -32,8 +32,8 @@ static uint64_t count_good_corners(const strl_draw_list *list)
 {
     uint64_t good = 0;
     for (uint32_t i = 0; i < list->count; i++)
-        for (uint32_t k = 0; list->items[i].visible && k < list->items[i].index_count; k++)
-            good += list->items[i].indices[k] < list->items[i].vertex_count;
+        for (uint32_t k = 0; list->items[i].visible && k < list->items[i].draw_count; k++)
+            good += list->items[i].indices[list->items[i].draw_first + k] < list->items[i].vertex_count;
     return good;
 }
 

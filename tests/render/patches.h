@@ -80,7 +80,7 @@ static void patches_init(patches *all, patches_desc desc)
     for (uint32_t p = 0; p < all->count; p++) {
         strl_draw_item *item = &all->items[p];
         *item = (strl_draw_item){.key = 100 + p, .node = p, .level = p % 3, .state = 5, .visible = true, .vertex_count = PATCH_VERTICES,
-                                 .index_count = PATCH_INDICES, .step = desc.step, .error = 0.01f, .error_px = (float)p / (float)all->count};
+                                 .index_count = PATCH_INDICES, .draw_count = PATCH_INDICES, .step = desc.step, .error = 0.01f, .error_px = (float)p / (float)all->count};
         item->vertices = all->vertices + p * PATCH_VERTICES;
         item->indices = all->indices + p * PATCH_INDICES;
         for (int i = 0; i < 3; i++) {

@@ -187,7 +187,7 @@ static void a_dirty_range_uploads_as_good_as_everything(void **state)
             memcpy(corner, (uint16_t[6]){a, (uint16_t)(a + 1), (uint16_t)(b + 1), a, (uint16_t)(b + 1), b}, 12);
         }
         all.items[1].state++, all.items[1].dirty_first = 300, all.items[1].dirty_count = 240;
-        all.items[2].state++, all.items[2].index_count -= PATCH_SIDE * 6;
+        all.items[2].state++, all.items[2].index_count -= PATCH_SIDE * 6, all.items[2].draw_count -= PATCH_SIDE * 6;
         all.list.frame = 2;
         shoot(renderer, &camera, &all.list, NULL, &partial);
         assert_int_equal(partial.stats.uploaded_vertices, 0);
@@ -214,9 +214,9 @@ static void a_node_that_refines_beyond_its_room_is_drawn_whole(void **state)
         patches_init(&all, (patches_desc){.side = 2});
         strl_camera camera = patches_camera(&all, WIDTH, HEIGHT, 0.25);
         strl_renderer *renderer = make((strl_renderer_desc){.backend = backend});
-        all.items[3].index_count = 60;
+        all.items[3].index_count = all.items[3].draw_count = 60;
         shoot(renderer, &camera, &all.list, NULL, &grown);
-        all.items[3].index_count = PATCH_INDICES, all.items[3].state++;
+        all.items[3].index_count = all.items[3].draw_count = PATCH_INDICES, all.items[3].state++;
         all.items[3].dirty_first = 60, all.items[3].dirty_count = PATCH_INDICES - 60;
         all.list.frame = 2;
         shoot(renderer, &camera, &all.list, NULL, &grown);

@@ -78,9 +78,13 @@ static void a_vertex_outside_the_box_is_found(void **state)
 static void a_broken_count_or_number_is_found(void **state)
 {
     fixture *f = *state;
-    f->all.items[1].index_count--;
+    f->all.items[1].index_count--, f->all.items[1].draw_count--;
     assert_refused(f, "index count modulo three");
-    f->all.items[1].index_count++;
+    f->all.items[1].index_count++, f->all.items[1].draw_count++;
+    assert_int_equal(draw(f), STRL_OK);
+    f->all.items[1].draw_first = 3, f->all.items[1].draw_count = PATCH_INDICES;
+    assert_refused(f, "count of indices to draw");
+    f->all.items[1].draw_first = 0;
     f->all.items[0].transform[5] = NAN;
     assert_refused(f, "not a finite number");
     f->all.items[0].transform[5] = 1, f->all.items[0].step = 0;

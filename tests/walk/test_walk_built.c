@@ -386,17 +386,18 @@ static int64_t (*drawn_triangles(const strl_draw_list *list, size_t *count))[3][
 {
     *count = 0;
     for (uint32_t i = 0; i < list->count; i++)
-        *count += list->items[i].index_count / 3;
+        *count += list->items[i].draw_count / 3;
     int64_t(*triangle)[3][3] = strl__alloc(*count + 1, sizeof *triangle);
     assert_non_null(triangle);
     size_t corner = 0;
     for (uint32_t i = 0; i < list->count; i++) {
         const strl_draw_item *item = &list->items[i];
-        for (uint32_t k = 0; k < item->index_count; k++, corner++) {
-            assert_true(item->indices[k] < item->vertex_count);
+        const uint16_t *indices = item->indices + item->draw_first;
+        for (uint32_t k = 0; k < item->draw_count; k++, corner++) {
+            assert_true(indices[k] < item->vertex_count);
             for (int axis = 0; axis < 3; axis++)
                 triangle[corner / 3][corner % 3][axis] =
-                    item->anchor[axis] + item->vertices[item->indices[k]].position[axis];
+                    item->anchor[axis] + item->vertices[indices[k]].position[axis];
         }
     }
     return triangle;

@@ -104,8 +104,9 @@ static uint32_t check_seen(const strl_draw_list *list, const strl_camera *camera
             box.min[k] += 1e-9;
             box.max[k] -= 1e-9;
         }
-        seen += strl_view_sees(&view, &box);
-        assert_true(drawn[i] || !strl_view_sees(&view, &box));
+        bool in_image = strl_view_sees(&view, &box) && !strl_view_sight(&view, &box).empty;
+        seen += in_image;
+        assert_true(drawn[i] || !in_image);
     }
     free(drawn);
     return seen;

@@ -96,7 +96,7 @@ typedef struct listed {
 static void look_at_splats(const strl_draw_item *item, listed *found)
 {
     assert_true(item->point_px >= 1 && isfinite(item->point_px));
-    for (uint32_t i = 0; i < item->index_count; i++) {
+    for (uint32_t i = 0; i < item->draw_count; i++) {
         assert_true(item->indices[i] < item->vertex_count);
         const strl_vertex *vertex = &item->vertices[item->indices[i]];
         for (int k = 0; k < 3; k++) {
@@ -106,7 +106,7 @@ static void look_at_splats(const strl_draw_item *item, listed *found)
         for (int k = 0; k < 3; k++)
             assert_int_equal(vertex->rgba[k], 255); /* of white triangles */
     }
-    found->splats += item->index_count;
+    found->splats += item->draw_count;
 }
 
 static void look_at_brick(const strl_draw_item *item, listed *found)
@@ -116,13 +116,13 @@ static void look_at_brick(const strl_draw_item *item, listed *found)
     drawn[item->node] = true;
     found->bricks++;
     const strl_pm *mesh = &model.mesh[item->node];
-    assert_true(item->index_count <= 3 * mesh->triangle_count);
+    assert_true(item->draw_count <= 3 * mesh->triangle_count);
     assert_int_equal(item->vertex_count, mesh->vertex_count);
-    found->whole += item->index_count == 3 * mesh->triangle_count;
-    for (uint32_t i = 0; i < item->index_count; i++)
+    found->whole += item->draw_count == 3 * mesh->triangle_count;
+    for (uint32_t i = 0; i < item->draw_count; i++)
         assert_true(item->indices[i] < item->vertex_count);
     if (item->visible)
-        found->triangles += item->index_count / 3;
+        found->triangles += item->draw_count / 3;
 }
 
 /* Bricks add up: what is drawn is drawn with all that is above it, and what is above is open. */
@@ -142,9 +142,9 @@ static listed look_at_list(const strl_draw_list *list, const strl_walk_stats *st
         const strl_draw_item *item = &list->items[i];
         if (item->point_px > 0 || model.node[item->node].child_count == 0 || !drawn[model.node[item->node].first_child])
             continue;
-        if (item->index_count != 3 * model.mesh[item->node].triangle_count)
+        if (item->draw_count != 3 * model.mesh[item->node].triangle_count)
             fail_msg("brick %u is drawn with what is below it, and with %u of its %u triangles: its cells of %g are %g pixels of %g; record %g visible %d settled %d",
-                     item->node, item->index_count / 3, model.mesh[item->node].triangle_count, (double)item->error,
+                     item->node, item->draw_count / 3, model.mesh[item->node].triangle_count, (double)item->error,
                      (double)item->error_px, stats->allowed_error_px, model.node[item->node].geometric_max * model.tree.step, item->visible, stats->missing_nodes);
     }
     assert_int_equal(found.triangles, stats->triangles);
@@ -176,7 +176,7 @@ static sample_tree_triangle *list_triangles(const strl_draw_list *list, uint64_t
     for (uint32_t i = 0; i < list->count; i++) {
         const strl_draw_item *item = &list->items[i];
         assert_false(item->point_px > 0);
-        for (uint32_t t = 0; t < item->index_count / 3; t++, ++*count) {
+        for (uint32_t t = 0; t < item->draw_count / 3; t++, ++*count) {
             assert_true(*count < model.tree.triangle_count);
             for (int c = 0; c < 3; c++) {
                 const strl_vertex *vertex = &item->vertices[item->indices[3 * t + (uint32_t)c]];
@@ -242,7 +242,7 @@ static void splats_are_as_large_as_the_error(void **state)
         for (uint32_t k = 0; k < list.count; k++)
             if (list.items[k].point_px > 0) {
                 assert_true(fabs((double)list.items[k].point_px - fmax(errors[i], 1)) < 1e-5);
-                splats += list.items[k].index_count;
+                splats += list.items[k].draw_count;
             }
         assert_true(i < 2 || splats > 0);
         strl_walk_close(walk);
@@ -266,7 +266,7 @@ static void what_is_near_is_open(void **state)
             const strl_draw_item *item = &list.items[k];
             if (item->point_px > 0 || !item->visible || item->error_px == 0) /* 0: nothing of its box is in sight */
                 continue;
-            if (item->index_count == 3 * model.mesh[item->node].triangle_count)
+            if (item->draw_count == 3 * model.mesh[item->node].triangle_count)
                 continue;
             looked_at++;
             double far = 0; /* of the farthest corner: nothing of the brick is as small as it is there */
@@ -281,7 +281,7 @@ static void what_is_near_is_open(void **state)
             }
             if ((double)item->error * pixels / far > 32.001)
                 fail_msg("brick %u of %u children in state %u with %u of %u triangles: its cells of %g are %.2f pixels, or as it says %.2f", item->node, model.node[item->node].child_count, item->state,
-                         item->index_count / 3, model.mesh[item->node].triangle_count, (double)item->error, (double)item->error * pixels / far, (double)item->error_px);
+                         item->draw_count / 3, model.mesh[item->node].triangle_count, (double)item->error, (double)item->error * pixels / far, (double)item->error_px);
         }
     }
     assert_true(looked_at > CAMERAS);

@@ -230,15 +230,15 @@ void check_cut_is_closed(const strl_draw_list *list, uint32_t placement)
     size_t corners = 0;
     int64_t area = 0;
     for (uint32_t i = 0; i < list->count; i++)
-        corners += list->items[i].placement == placement ? list->items[i].index_count : 0;
+        corners += list->items[i].placement == placement ? list->items[i].draw_count : 0;
     edges all = {NULL, 64};
     while (all.size < 2 * corners)
         all.size *= 2;
     all.slots = strl__alloc_zero(all.size, sizeof *all.slots);
     assert_non_null(all.slots);
     for (uint32_t i = 0; i < list->count; i++)
-        for (uint32_t k = 0; list->items[i].placement == placement && k < list->items[i].index_count; k += 3)
-            area += add_triangle(&list->items[i], k, &all);
+        for (uint32_t k = 0; list->items[i].placement == placement && k < list->items[i].draw_count; k += 3)
+            area += add_triangle(&list->items[i], list->items[i].draw_first + k, &all);
     uint32_t open = 0;
     for (size_t slot = 0; slot < all.size; slot++) {
         const edge *e = &all.slots[slot];
@@ -265,8 +265,8 @@ void check_same_lists(const strl_draw_list *a, const strl_draw_list *b)
         assert_non_null(y);
         assert_int_equal(x->state, y->state);
         assert_int_equal(x->visible, y->visible);
-        assert_int_equal(x->index_count, y->index_count);
-        assert_memory_equal(x->indices, y->indices, x->index_count * sizeof *x->indices);
+        assert_int_equal(x->draw_count, y->draw_count);
+        assert_memory_equal(x->indices + x->draw_first, y->indices + y->draw_first, x->draw_count * sizeof *x->indices);
     }
 }
 

@@ -193,10 +193,11 @@ static strl_status draw_item(gl3_draw *draw, const strl_draw_item *item, const s
     glUseProgram(program->name);
     glUniform4fv(program->rows, 6, record->rows[0]);
     glUniform4iv(program->base, 2, record->base[0]);
-    GLsizei count = (GLsizei)item->index_count;
     bool lines = drawn_as_lines(draw, item);
-    glDrawElements(points ? GL_POINTS : lines ? GL_LINES : GL_TRIANGLES, lines ? 2 * count : count, GL_UNSIGNED_SHORT, NULL);
-    draw->stats->triangles += points ? 0 : item->index_count / 3;
+    uint32_t copies = lines ? 2 : 1;
+    glDrawElements(points ? GL_POINTS : lines ? GL_LINES : GL_TRIANGLES, (GLsizei)(copies * item->draw_count), GL_UNSIGNED_SHORT,
+                   (const char *)0 + copies * item->draw_first * sizeof(uint16_t));
+    draw->stats->triangles += points ? 0 : item->draw_count / 3;
     draw->stats->items++;
     draw->stats->draws++;
     return STRL_OK;
@@ -219,7 +220,7 @@ static strl_status gl3_draw_list(strl_renderer *renderer, const strl_draw_setup 
     strl__gl_begin_draw(&self->gl, setup);
     for (uint32_t i = 0; status == STRL_OK && i < list->count; i++) {
         const strl_draw_item *item = &list->items[i];
-        if (!item->visible || item->index_count == 0)
+        if (!item->visible || item->draw_count == 0)
             continue;
         status = strl__check_item_counts(item, err);
         if (status != STRL_OK)

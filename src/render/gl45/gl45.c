@@ -211,13 +211,13 @@ static strl_status queue_item(gl45_draw *draw, const strl_draw_item *item, const
     if (entry->hidden)
         return STRL_OK;
     uint32_t at = self->batch_count++;
-    uint32_t first_index = entry->place.range.index_at * (STRL_GRANULE_BYTES / (uint32_t)sizeof(uint16_t));
+    uint32_t first_index = entry->place.range.index_at * (STRL_GRANULE_BYTES / (uint32_t)sizeof(uint16_t)) + item->draw_first;
     int32_t first_vertex = (int32_t)(entry->place.range.vertex_at * (STRL_GRANULE_BYTES / (uint32_t)sizeof(strl_vertex)));
     self->records[at] = *record;
-    self->queued[at] = (gl45_queued){{item->index_count, 1, first_index, first_vertex, at}, entry->place.range.slab,
+    self->queued[at] = (gl45_queued){{item->draw_count, 1, first_index, first_vertex, at}, entry->place.range.slab,
                                      entry->translucent || entry->hides, item->point_px > 0};
     entry->batch = self->batch;
-    draw->stats->triangles += item->point_px > 0 ? 0 : item->index_count / 3;
+    draw->stats->triangles += item->point_px > 0 ? 0 : item->draw_count / 3;
     draw->stats->items++;
     return STRL_OK;
 }
@@ -238,7 +238,7 @@ static strl_status gl45_draw_list(strl_renderer *renderer, const strl_draw_setup
     strl__gl_begin_draw(&self->gl, setup);
     for (uint32_t i = 0; status == STRL_OK && i < list->count; i++) {
         const strl_draw_item *item = &list->items[i];
-        if (!item->visible || item->index_count == 0)
+        if (!item->visible || item->draw_count == 0)
             continue;
         status = strl__check_item_counts(item, err);
         if (status != STRL_OK)

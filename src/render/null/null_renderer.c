@@ -159,7 +159,7 @@ static strl_status null_draw(strl_renderer *renderer, const strl_draw_setup *set
         status = strl__check_item_counts(item, err);
         if (status == STRL_OK)
             status = strl__check_item_contents(item, err);
-        if (status != STRL_OK || !item->visible || item->index_count == 0)
+        if (status != STRL_OK || !item->visible || item->draw_count == 0)
             continue;
         status = check_keys(self, item, in_this_list, err);
         if (status == STRL_OK)
@@ -168,7 +168,7 @@ static strl_status null_draw(strl_renderer *renderer, const strl_draw_setup *set
             continue;
         self->cache.newest->batch = in_this_list;
         self->cache.newest->placement = item->placement;
-        stats->triangles += item->point_px > 0 ? 0 : item->index_count / 3;
+        stats->triangles += item->point_px > 0 ? 0 : item->draw_count / 3;
         stats->items++;
         stats->draws++;
     }
