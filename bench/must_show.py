@@ -427,7 +427,7 @@ def parse_options():
     parser.add_argument("--kills", type=int, default=50, help="of builds in part kills (50)")
     parser.add_argument("--again", action="store_true", help="measure what the log has already")
     parser.add_argument("--keep", action="store_true", help="keep the frames, and the scenes that parts delete")
-    parser.add_argument("--write-docs", action="store_true", help="rewrite the tables, the counts and the errors from the log")
+    parser.add_argument("--write-docs", action="store_true", help="put the figures of the log into the tables, the counts and the errors")
     parser.add_argument("--docs", type=pathlib.Path, default=ROOT / "docs" / "benchmarks.md")
     parser.add_argument("--counts", type=pathlib.Path, default=counts.TABLE)
     parser.add_argument("--errors", type=pathlib.Path, default=ROOT / "bench" / "errors.csv")
@@ -448,10 +448,9 @@ def main():
     options.scratch.mkdir(parents=True, exist_ok=True)
     bench = Bench(options)
     failures = run_parts(bench, options.parts, words_of(options.models))
-    text = tables.markdown(bench.log.latest())
-    print(text)
+    print(tables.markdown(bench.log.latest()))
     if options.write_docs:
-        tables.write_docs(options.docs, text)
+        tables.merge_docs(options.docs, bench.log.latest())
         put_counts(bench, options.counts)
         tables.write_errors(options.errors, bench.log.latest())
     return 1 if failures else 0

@@ -1,5 +1,9 @@
-"""From the records of must_show.py to the Markdown tables of docs/benchmarks.md, and to bench/errors.csv."""
+"""From the records of must_show.py to the Markdown tables of docs/benchmarks.md, and to bench/errors.csv.
+
+What a log does not have stays in the document: figures that took hours outlive the folder in which they were measured."""
 import csv
+import dataclasses
+import re
 
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
 PATHS = ("orbit", "flythrough")
@@ -25,16 +29,6 @@ def percent(value, digits=3):
 
 def mebibytes(value):
     return f"{value / 2**20:,.0f} MiB"
-
-
-def table(part, title, header, rows, origin):
-    """The command stands with its table: whoever doubts a figure can take it again."""
-    if not rows:
-        return []
-    lines = [f"### {title}", "", f"`bench/must_show.py --data DIR --parts {part}`, {origin}", "",
-             "| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    lines += ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows]
-    return lines + [""]
 
 
 def records_of(records, measure):
@@ -305,7 +299,7 @@ def closing_lines(records):
         jobs = ", ".join(str(jobs) for jobs in record["digests"])
         lines.append(f"Same bytes for `--jobs` {jobs} ({record['model']}, `--parts bytes`, commit {record['commit']}): "
                      f"{number(record['holds'])}.")
-    return [text for line in lines for text in (line, "")]
+    return lines
 
 
 def machine_of(record):
@@ -313,29 +307,120 @@ def machine_of(record):
             f"Linux {record['kernel']}")
 
 
-def machines_of(records):
-    """Each machine's name. Where there is but one, it needs none."""
-    machines = list(dict.fromkeys(machine_of(record) for _, record in sorted(records.items())))
-    if len(machines) == 1:
-        return {machines[0]: ""}
-    return {machine: f"machine {number}" for number, machine in enumerate(machines, 1)}
+@dataclasses.dataclass
+class Table:
+    part: str
+    header: list
+    rows: list      # of lists of texts; the first of each is a model
+    places: dict    # (commit, machine) -> the models whose figures are from there
 
 
-def machine_lines(machines):
-    lines = [f"{name.capitalize() or 'Machine'}: {machine}." for machine, name in machines.items()]
-    return [text for line in lines for text in (line, "")]
+@dataclasses.dataclass
+class Document:
+    tables: dict    # by title
+    closing: list   # lines
+
+    def machines(self):
+        return list(dict.fromkeys(machine for table in self.tables.values() for _, machine in table.places))
 
 
-def origin_of(records, names, machines):
-    """Of which commit the measures' figures are, and of which machine: "commit a (model, model), b (model)"."""
-    models = {}
+def places_of(records, names):
+    """(commit, machine) -> models, of the measures with these names."""
+    places = {}
     for (name, model), record in sorted(records.items()):
         if name in names:
-            place = " on ".join(filter(None, (record["commit"], machines[machine_of(record)])))
-            models.setdefault(place, dict.fromkeys([]))[model] = None
-    if len(models) == 1:
-        return f"commit {next(iter(models))}"
-    return "commits " + ", ".join(f"{place} ({', '.join(of)})" for place, of in models.items())
+            models = places.setdefault((record["commit"], machine_of(record)), [])
+            models += [model] if model not in models else []
+    return places
+
+
+def document_of(records):
+    """records: as Log.latest gives them, by (measure, model)."""
+    tables = {}
+    for part, title, header, rows_of in TABLES:
+        rows = [[str(cell) for cell in row] for row in rows_of(records)]
+        if rows:
+            tables[title] = Table(part, list(header), rows, places_of(records, MEASURES.get(part, (part,))))
+    return Document(tables, closing_lines(records))
+
+
+# ---- Markdown
+
+def origin_text(places, names):
+    """Of which commit the figures are, and of which machine: "commit a", or "commits a (model, model), b (model)"."""
+    texts = {(commit + (f" on {names[machine]}" if names[machine] else "")): models for (commit, machine), models in places.items()}
+    if len(texts) == 1:
+        return f"commit {next(iter(texts))}"
+    return "commits " + ", ".join(f"{place} ({', '.join(models)})" for place, models in texts.items())
+
+
+def table_lines(title, table, names):
+    """The command stands with its table: whoever doubts a figure can take it again."""
+    lines = [f"### {title}", "", f"`bench/must_show.py --data DIR --parts {table.part}`, {origin_text(table.places, names)}", "",
+             "| " + " | ".join(table.header) + " |", "|" + "---|" * len(table.header)]
+    return lines + ["| " + " | ".join(row) + " |" for row in table.rows] + [""]
+
+
+def machine_names(machines):
+    """Where there is but one, it needs none."""
+    return {machine: f"machine {number}" if len(machines) > 1 else "" for number, machine in enumerate(machines, 1)}
+
+
+def text_of(document):
+    names = machine_names(document.machines())
+    lines = [text for machine, name in names.items() for text in (f"{name.capitalize() or 'Machine'}: {machine}.", "")]
+    for title, table in document.tables.items():
+        lines += table_lines(title, table, names)
+    return "\n".join(lines + [text for line in document.closing for text in (line, "")]).rstrip() + "\n"
+
+
+def markdown(records):
+    return text_of(document_of(records))
+
+
+def parsed_places(origin, models, machines):
+    """The inverse of origin_text; machines: by name."""
+    places = {}
+    for commit, machine, names in re.findall(r"([^\s,(]+)(?: on (machine \d+))?(?: \(([^)]*)\))?(?:, |$)", origin):
+        places[(commit, machines[machine])] = names.split(", ") if names else models
+    return places
+
+
+def parsed(text):
+    """The inverse of text_of."""
+    machines = {name.lower() if name != "Machine" else "": machine
+                for name, machine in re.findall(r"^(Machine(?: \d+)?): (.*)\.$", text, re.MULTILINE)}
+    document = Document({}, [])
+    for section in re.split(r"^### ", text, flags=re.MULTILINE)[1:]:
+        lines = section.splitlines()
+        title, (part, origin) = lines[0], re.search(r"--parts (\w+)`, commits? (.*)", section).groups()
+        cells = [line[2:-2].split(" | ") for line in lines if line.startswith("| ")]
+        models = list(dict.fromkeys(row[0] for row in cells[1:]))
+        document.tables[title] = Table(part, cells[0], cells[1:], parsed_places(origin, models, machines))
+        last = max(number for number, line in enumerate(lines) if line.startswith("|"))
+        document.closing += [line for line in lines[last + 1:] if line]
+    return document
+
+
+def merged_table(old, new):
+    """Models that were not measured again keep their rows."""
+    again = {row[0] for row in new.rows}
+    kept = [row for row in old.rows if row[0] not in again] if old.header == new.header else []
+    places = {place: [model for model in models if model in {row[0] for row in kept}] for place, models in old.places.items()}
+    for place, models in new.places.items():
+        places[place] = places.get(place, []) + models
+    return Table(new.part, new.header, kept + new.rows, {place: models for place, models in places.items() if models})
+
+
+def merged(old, new):
+    tables = {}
+    titles = [title for _, title, *_ in TABLES]
+    for title in titles + [title for title in old.tables if title not in titles]:
+        before, now = old.tables.get(title), new.tables.get(title)
+        if before or now:
+            tables[title] = merged_table(before, now) if before and now else before or now
+    subjects = {re.split(r"[:(]", line)[0] for line in new.closing}
+    return Document(tables, [line for line in old.closing if re.split(r"[:(]", line)[0] not in subjects] + new.closing)
 
 
 TABLES = (
@@ -394,34 +479,38 @@ TABLES = (
 )
 
 
-def markdown(records):
-    """records: as Log.latest gives them, by (measure, model)."""
-    machines = machines_of(records)
-    lines = machine_lines(machines)
-    for part, title, header, rows_of in TABLES:
-        origin = origin_of(records, MEASURES.get(part, (part,)), machines)
-        lines += table(part, title, header, list(rows_of(records)), origin)
-    return "\n".join(lines + closing_lines(records)).rstrip() + "\n"
-
-
 ERROR_COLUMNS = ("model", "side", "level", "claimed_over_measured")
 
 
 def write_errors(path, records):
-    """One row a level: what no clock changes of part claims."""
-    rows = [(record["model"], side, level, f"{ratio:.4g}") for record in records_of(records, "claims")
+    """One row a level: what no clock changes of part claims. Models that were not measured again keep their rows."""
+    rows = [[record["model"], side, str(level), f"{ratio:.4g}"] for record in records_of(records, "claims")
             for side in ("default", "certified") for level, ratio in enumerate(record[side]["levels"])]
+    again, kept = {row[0] for row in rows}, []
+    if path.exists():
+        with open(path, newline="", encoding="utf-8") as file:
+            kept = [row for row in list(csv.reader(file))[1:] if row[0] not in again]
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(ERROR_COLUMNS)
-        writer.writerows(rows)
+        writer.writerows(sorted(kept + rows, key=lambda row: row[0]))
+
+
+def split_document(path, marks):
+    """What stands before, between and after the marks."""
+    document = path.read_text(encoding="utf-8")
+    if [document.count(mark) for mark in marks] != [1, 1]:
+        raise SystemExit(f"{path} lacks the lines {marks[0]} and {marks[1]}")
+    before, rest = document.split(marks[0])
+    return (before, *rest.split(marks[1]))
 
 
 def write_docs(path, text, marks=(BEGIN, END)):
-    begin, end = marks
-    document = path.read_text(encoding="utf-8")
-    if document.count(begin) != 1 or document.count(end) != 1:
-        raise SystemExit(f"{path} lacks the lines {begin} and {end}")
-    before, rest = document.split(begin)
-    after = rest.split(end)[1]
-    path.write_text(f"{before}{begin}\n\n{text}\n{end}{after}", encoding="utf-8")
+    before, _, after = split_document(path, marks)
+    path.write_text(f"{before}{marks[0]}\n\n{text}\n{marks[1]}{after}", encoding="utf-8")
+
+
+def merge_docs(path, records):
+    """Writes the figures of the records over those that stand in the document."""
+    _, old, _ = split_document(path, (BEGIN, END))
+    write_docs(path, text_of(merged(parsed(old), document_of(records))))

@@ -123,6 +123,14 @@ class Test:
         self.check("two machines get names", "Machine 1: CPU, 2 cores" in text and "Machine 2: CPU, 4 cores" in text and
                    "--parts roots`, commits c1 on machine 1 (a), c1 on machine 2 (b)\n" in text, text)
 
+        self.docs.write_text(f"before\n{tables.BEGIN}\n\n{tables.markdown(records)}\n{tables.END}\nafter\n")
+        tables.merge_docs(self.docs, {("build", "b"): record("b", "c3", 4), ("build", "d"): record("d", "c3", 4)})
+        text = self.docs.read_text()
+        self.check("what is not measured again stays", "Machine 1: CPU, 2 cores" in text and "Machine 2: CPU, 4 cores" in text and
+                   "--parts build`, commits c1 on machine 1 (a, c), c3 on machine 2 (b, d)\n" in text and
+                   "--parts roots`, commit c1 on machine 1\n" in text and
+                   [line[2] for line in text.splitlines() if line.startswith("| ")] == list("macbd") + list("fa"), text)
+
     def test_sheet(self):
         rows = sheets.read_png(self.folder / "scratch" / "sheets" / f"{MODELS[0]}_orbit.png")
         width = len(rows[0]) // 9  # three pictures of three bytes a pixel
