@@ -172,12 +172,107 @@ static void what_comes_back_into_view_is_there_at_once(void **state)
     strl_walk_close(walk);
 }
 
+/* ---- states */
+
+/* The corners that the item draws are those of one state of the node's payload; which one: the coarsest with so many triangles. */
+static uint32_t state_of(const strl_draw_item *item, const strl_pm *mesh)
+{
+    uint32_t state = 0, triangles = item->draw_count / 3;
+    const uint16_t *corner = item->indices + item->draw_first;
+    while (state < mesh->step_count && (mesh->triangle_end[state] < triangles ||
+                                        fabsf(fmaxf(mesh->geometric_error[state], mesh->appearance_error[state]) * (float)item->step -
+                                              item->error) > 1e-6f * item->error))
+        state++;
+    assert_int_equal(mesh->triangle_end[state], triangles);
+    for (uint32_t k = 0; k < 3 * triangles; k++)
+        assert_int_equal(corner[k], built_resolve(mesh, mesh->triangle[k / 3][k % 3], state));
+    return state;
+}
+
+/* A near copy does not make those far away any finer, and each keeps to the allowed error. */
+static void each_placement_is_drawn_in_a_state_of_its_own(void **state)
+{
+    (void)state;
+    built_model model;
+    strl_view view;
+    built_open(&model, built_path("many.stroll"));
+    strl_walk *walk = open_walk(memory_source(shared.bytes, shared.size), NULL);
+    const strl_camera camera = look(40, 0.7, 40, 60, 60);
+    const strl_draw_list list = settle(walk, &camera, 500);
+    uint32_t least = UINT32_MAX, most = 0, checked = 0;
+    assert_true(strl_view_init(&view, &camera));
+    for (uint32_t i = 0; i < list.count; i++) {
+        const strl_draw_item *item = &list.items[i];
+        if (item->point_px > 0 || !item->visible)
+            continue;
+        assert_true(item->error_px <= 1 || (item->level == 0 && item->draw_first + item->draw_count == item->index_count));
+        if (item->node != 0)
+            continue;
+        least = item->draw_count < least ? item->draw_count : least;
+        most = item->draw_count > most ? item->draw_count : most;
+        if (i % 16 == 0) {
+            uint32_t of = state_of(item, &model.mesh[0]);
+            checked++;
+            if (of > 0) { /* the next coarser one that is kept has at least 0.6 of its triangles less, or would not suffice */
+                double error = fmax((double)model.mesh[0].geometric_error[0], (double)model.mesh[0].appearance_error[0]) * item->step;
+                assert_true(strl_view_error_px(&view, &shared.boxes[item->placement], error) > 1);
+            }
+        }
+    }
+    assert_true(checked > 20);
+    assert_true(least < most / 2);
+    strl_walk_close(walk);
+    built_close(&model);
+}
+
+/* ---- far away */
+
+/* Where the copies are smaller than a pixel each, points stand for runs of them: few, within what they stand for, and of the
+ * copies' colour. Coming nearer brings every copy back. */
+static void copies_below_a_pixel_are_drawn_as_points(void **state)
+{
+    (void)state;
+    strl_walk *walk = open_walk(memory_source(shared.bytes, shared.size), NULL);
+    const strl_camera far = look(60, 6000, 61, 60, 60), near = look(60, 300, 61, 60, 60);
+    strl_draw_list list = settle(walk, &far, 500);
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, bounds[6], opacity = 0, covered = 0;
+    uint32_t points = 0;
+    strl_walk_bounds(walk, bounds);
+    for (uint32_t i = 0; i < list.count; i++) {
+        const strl_draw_item *item = &list.items[i];
+        assert_true(item->point_px >= 1 && item->error_px <= 1);
+        for (uint32_t v = 0; v < item->vertex_count; v++, points++)
+            for (int k = 0; k < 3; k++) {
+                double at = item->origin[k] + item->step * (double)(item->anchor[k] + item->vertices[v].position[k]);
+                low[k] = fmin(low[k], at);
+                high[k] = fmax(high[k], at);
+                opacity += item->vertices[v].rgba[3] / 765.0;
+                assert_in_range(item->vertices[v].rgba[k], 100, 255); /* the scene is light grey */
+            }
+    }
+    assert_in_range(points, 100, COPIES / 2);
+    assert_int_equal(strl_walk_get_stats(walk)->splats, points);
+    for (int k = 0; k < 3; k += 2) { /* y is up */
+        assert_true(low[k] >= bounds[k] && low[k] < bounds[k] + 0.1 * (bounds[3 + k] - bounds[k]));
+        assert_true(high[k] <= bounds[3 + k] && high[k] > bounds[3 + k] - 0.1 * (bounds[3 + k] - bounds[k]));
+    }
+    for (uint32_t i = 0; i < COPIES; i++)
+        covered += (shared.boxes[i].max[0] - shared.boxes[i].min[0]) * (shared.boxes[i].max[2] - shared.boxes[i].min[2]);
+    covered *= pow(far.height / 2 / tan(far.fov_y_deg * M_PI / 360) / far.eye[1], 2);
+    assert_true(opacity > 0.3 * covered && opacity < 2 * covered); /* the surfaces fill about half of their boxes, and lie in layers */
+    list = settle(walk, &near, 500);
+    assert_true(list.count >= COPIES);
+    strl_walk_close(walk);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(what_is_seen_is_in_the_list_and_little_else),
         cmocka_unit_test(placements_share_keys_and_uploads),
         cmocka_unit_test(what_comes_back_into_view_is_there_at_once),
+        cmocka_unit_test(each_placement_is_drawn_in_a_state_of_its_own),
+        cmocka_unit_test(copies_below_a_pixel_are_drawn_as_points),
     };
     return cmocka_run_group_tests(tests, make_model, drop_model);
 }
