@@ -3,6 +3,7 @@
 in highp vec3 v_view;
 in highp vec3 v_normal;
 in highp vec4 v_colour;
+flat in highp uint v_shift;
 
 uniform highp vec4 u_projection;
 uniform highp int u_orthographic;
@@ -36,7 +37,10 @@ void main()
         discard;
 #endif
 #ifdef STRL_ALPHA
-    if (v_colour.a * 64.0 < float(bayer(ivec2(gl_FragCoord.xy))) + 0.5)
+    /* Splats of one pixel hide each other by chance: each has the pattern shifted, finer than its steps. */
+    int threshold = (bayer(ivec2(gl_FragCoord.xy)) + int(v_shift & 63u)) & 63;
+    float within = v_shift != 0u ? (float(v_shift >> 6 & 255u) + 0.5) / 256.0 : 0.5;
+    if (v_colour.a * 64.0 < float(threshold) + within)
         discard;
 #endif
     float length_squared = dot(normal, normal);

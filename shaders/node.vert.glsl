@@ -26,6 +26,7 @@ uniform highp vec4 u_section; /* view space: drawn is dot(xyz, p) + w >= 0 */
 out highp vec3 v_view;
 out highp vec3 v_normal;
 out highp vec4 v_colour;
+flat out highp uint v_shift; /* of the pattern that thins out; 0 for triangles */
 invariant gl_Position;
 
 #define FLAG_FLOAT_POSITIONS 1
@@ -53,6 +54,14 @@ vec3 decode_normal(uvec2 coordinates)
     return normalize(vec3(p, z));
 }
 
+uint hash(uvec3 cell)
+{
+    uint h = cell.x * 0x9e3779b1u ^ cell.y * 0x85ebca77u ^ cell.z * 0xc2b2ae3du;
+    h = (h ^ h >> 15) * 0x2c1b3c6du;
+    h = (h ^ h >> 12) * 0x297a2d39u;
+    return h ^ h >> 15;
+}
+
 void main()
 {
     vec4 row_x = ITEM_ROW(0), row_y = ITEM_ROW(1), row_z = ITEM_ROW(2);
@@ -65,6 +74,7 @@ void main()
 #endif
 
     gl_PointSize = intBitsToFloat(high.w);
+    v_shift = high.w != 0 ? hash(uvec3(in_position)) : 0u;
     vec3 normal = decode_normal(in_normal);
     v_view = view;
     v_normal = vec3(dot(ITEM_ROW(3).xyz, normal), dot(ITEM_ROW(4).xyz, normal), dot(ITEM_ROW(5).xyz, normal));
