@@ -41,6 +41,7 @@ static face_facts face_of(const strl_soup_triangle *triangle)
 typedef struct fan_table {
     uint32_t *head; /* first corner of the slot's position; NO_INDEX = free */
     uint32_t *next; /* [3 * count] next corner at the same position */
+    uint32_t *slot; /* [3 * count] of the corner's position */
     uint32_t *tail;
     uint32_t mask;
 } fan_table;
@@ -64,11 +65,13 @@ static bool build_fans(fan_table *table, const strl_soup_triangle *triangles, ui
     table->head = strl_arena_alloc(scratch, size, sizeof *table->head);
     table->tail = strl_arena_alloc(scratch, size, sizeof *table->tail);
     table->next = strl_arena_alloc(scratch, (size_t)count * 3, sizeof *table->next);
-    if (!table->head || !table->tail || !table->next)
+    table->slot = strl_arena_alloc(scratch, (size_t)count * 3, sizeof *table->slot);
+    if (!table->head || !table->tail || !table->next || !table->slot)
         return false;
     memset(table->head, 0xff, size * sizeof *table->head);
     for (uint32_t corner = 0; corner < 3 * count; corner++) {
         uint32_t at = slot_of(table, triangles, triangles[corner / 3].corner[corner % 3].position);
+        table->slot[corner] = at;
         table->next[corner] = NO_INDEX;
         if (table->head[at] == NO_INDEX)
             table->head[at] = corner;
@@ -85,7 +88,7 @@ static void fill_corner(const fan_table *table, const face_facts *faces, strl_so
     const float *axis = faces[corner / 3].normal;
     float sum[3] = {0};
     uint32_t seen = 0;
-    for (uint32_t c = table->head[slot_of(table, triangles, own->position)]; c != NO_INDEX && seen < MOST_FACES;
+    for (uint32_t c = table->head[table->slot[corner]]; c != NO_INDEX && seen < MOST_FACES;
          c = table->next[c], seen++) {
         const float *n = faces[c / 3].normal;
         if (n[0] * axis[0] + n[1] * axis[1] + n[2] * axis[2] < CREASE_COSINE)

@@ -12,15 +12,22 @@ double strl_octree_side(const strl_ingest *ingest, uint32_t depth)
     return ldexp(1, (int)(ingest->curve_shift + STRL_OCTREE_DEPTH - depth));
 }
 
+/* Every third bit, from the lowest on, moved together. */
+static uint64_t every_third(uint64_t bits)
+{
+    bits &= 0x1249249249249249u;
+    bits = (bits ^ bits >> 2) & 0x10c30c30c30c30c3u;
+    bits = (bits ^ bits >> 4) & 0x100f00f00f00f00fu;
+    bits = (bits ^ bits >> 8) & 0x001f0000ff0000ffu;
+    bits = (bits ^ bits >> 16) & 0x001f00000000ffffu;
+    return (bits ^ bits >> 32) & 0x00000000001fffffu;
+}
+
 void strl_octree_corner(const strl_ingest *ingest, uint64_t prefix, uint32_t depth, double corner[3])
 {
     double side = strl_octree_side(ingest, depth);
-    for (unsigned k = 0; k < 3; k++) {
-        uint64_t cell = 0;
-        for (uint32_t level = 0; level < depth; level++)
-            cell |= (prefix >> (3 * level + k) & 1) << level;
-        corner[k] = (double)cell * side;
-    }
+    for (unsigned k = 0; k < 3; k++)
+        corner[k] = (double)every_third(prefix >> k) * side;
 }
 
 static bool fits(const strl_ingest *ingest, const strl_soup_triangle *triangle, uint64_t key, uint32_t depth)
