@@ -49,6 +49,7 @@ import file_parts
 import measure
 import promise_parts
 import scale_parts
+import scene_parts
 import sheets
 import tables
 
@@ -57,7 +58,8 @@ MODELS = ("terrain_n49e011", "dragon_scans", "iso_engine", "motorBike", "turbine
 PATHS = ("orbit", "flythrough")
 SUFFIXES = (".ply", ".stl", ".obj", ".glb")
 ARCHIVES = (".tar", ".tar.zst")
-SCENE = re.compile(r"(isosurface|boxes|plant)_(\d+)([km]?)(_shuffled)?(_stl)?")
+SCENE = re.compile(r"(isosurface|boxes|plant|chessboard|landscape)_(\d+)([kmg]?)(_shuffled)?(_stl|_placed)?")
+ARRAY = re.compile(r"(\w+)_x(\d+)")  # so many copies of a model
 BACKEND_FRAMES = 8
 WALK_FRAMES_A_FRAME = 5  # 300 where the others have 60: a smooth path
 
@@ -80,12 +82,14 @@ class Bench:
 
     def inputs_of(self, model):
         """The model's files, generated or unpacked where they must be."""
-        if scene_triangles(model):
-            path = self.scene_path(model)
-            if not self.is_fresh(path):
-                name, shuffled = SCENE.fullmatch(model).group(1, 4)
-                self.program("scene", name, "--triangles", scene_triangles(model), "--seed", 1, "-o", path,
-                             *(["--shuffle"] if shuffled else []))
+        path, array = self.scene_path(model), ARRAY.fullmatch(model)
+        if array and not self.is_fresh(path):
+            self.program("scene", "array", "--of", self.inputs_of(array[1])[0], "--copies", array[2], "--seed", 1, "-o", path)
+        elif path and not self.is_fresh(path):
+            name, shuffled = SCENE.fullmatch(model).group(1, 4)
+            self.program("scene", name, "--triangles", scene_triangles(model), "--seed", 1, "-o", path,
+                         *(["--shuffle"] if shuffled else []))
+        if path:
             return [path]
         for path in sorted(self.data.rglob(f"{model}.*")):
             name = path.name.removeprefix(model)
@@ -124,13 +128,17 @@ class Bench:
         return scene_triangles(model)
 
     def scene_path(self, model):
-        scene = SCENE.fullmatch(model)
-        return self.scratch / f"{model}.{'stl' if scene[5] else 'gltf' if scene[1] == 'plant' else 'ply'}"
+        """None where the model is no scene."""
+        scene, array = SCENE.fullmatch(model), ARRAY.fullmatch(model)
+        if not scene and not array:
+            return None
+        placed = array or scene[5] == "_placed" or scene[1] == "plant"
+        return self.scratch / f"{model}.{'gltf' if placed else 'stl' if scene[5] else 'ply'}"
 
     def forget_scenes(self, models):
         """Those that anybody can generate again."""
         for model in () if self.options.keep else models:
-            if scene_triangles(model):
+            if self.scene_path(model):
                 self.scene_path(model).unlink(missing_ok=True)
                 for beside in self.scratch.glob(f"{model}*.bin"):
                     beside.unlink()
@@ -139,8 +147,11 @@ class Bench:
         """Made by the program as it is now."""
         return path.exists() and path.stat().st_mtime > self.stroll.stat().st_mtime
 
+    def container_path(self, model, *options):
+        return self.scratch / f"{model}{''.join(options)}.stroll"
+
     def container_of(self, model, *options):
-        path = self.scratch / f"{model}{''.join(options)}.stroll"
+        path = self.container_path(model, *options)
         if not self.is_fresh(path):
             self.program("build", *self.inputs_of(model), "-o", path, "--memory", "1G", *options)
         return path
@@ -175,9 +186,9 @@ class Bench:
 
 
 def scene_triangles(model):
-    """How many triangles isosurface_N, boxes_N or plant_N has; 0 = it is a file."""
+    """How many triangles a scene such as isosurface_N has; 0 = it is none."""
     match = SCENE.fullmatch(model)
-    return int(match[2]) * {"": 1, "k": 10**3, "m": 10**6}[match[3]] if match else 0
+    return int(match[2]) * {"": 1, "k": 10**3, "m": 10**6, "g": 10**9}[match[3]] if match else 0
 
 
 def part_build(bench, model):
@@ -371,7 +382,7 @@ PARTS = {"build": (part_build, MODELS), "images": (part_images, MODELS), "psnr":
          "sizes": (part_sizes, ("isosurface_1m", "isosurface_10m", "dragon_scans", "terrain_n49e011", "iso_cthead", "boxes_1m")),
          "dependencies": (part_dependencies, ("isosurface_10m",)),
          "walk": (part_walk, (("isosurface_1m", "isosurface_10m"),)), "roots": (part_roots, ("",)), **scale_parts.PARTS,
-         **promise_parts.PARTS, **file_parts.PARTS}
+         **promise_parts.PARTS, **file_parts.PARTS, **scene_parts.PARTS}
 
 
 def models_of(part, chosen):

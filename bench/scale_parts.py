@@ -21,12 +21,12 @@ WALK_GPU_MEMORY, WALK_GPU_MEMORY_BYTES = "512M", 512 * 2**20
 WALK_FRAMES_A_FRAME = 5
 
 
-def build_once(bench, model, memory=MEMORY, **settings):
+def build_once(bench, model, memory=MEMORY, options=(), **settings):
     """One build by the clock and by the system's account; the container stays."""
-    sources, container = bench.inputs_of(model), bench.scratch / f"{model}.stroll"
+    sources, container = bench.inputs_of(model), bench.container_path(model, *options)
     container.unlink(missing_ok=True)
     with measure.DiskWatch(f"{container}.tmp") as disk:
-        outcome = bench.program("build", *sources, "-o", container, "--memory", memory, "--json", **settings)
+        outcome = bench.program("build", *sources, "-o", container, "--memory", memory, "--json", *options, **settings)
     if outcome.status != 0:
         return outcome, None
     report = outcome.json()

@@ -271,6 +271,50 @@ def assembly_rows(records):
                number(int(record["drawn"]["triangles"]["median"])), number(int(record["drawn"]["draws"]["median"])))
 
 
+# ---- sample trees and placements
+
+SAMPLED_RATE, SAMPLED_BYTES, OVER_MORTON, CHESSBOARD_GROWTH = 1, 16, 1.1, 1.3
+
+
+def sampled_rows(records):
+    for record in sorted(records_of(records, "sampled"), key=lambda record: record["report"]["triangles_in"]):
+        over = record["morton"] and record["morton"]["over"]
+        yield (record["model"], number(record["report"]["triangles_in"]), least_to_most(record["seconds"]),
+               least_to_most(record["cpu_seconds"]), number(rate_of(record, "cpu_seconds")),
+               number(rate_of(record, "cpu_seconds") >= SAMPLED_RATE), mebibytes(record["system_peak_rss_bytes"]),
+               number(record["system_peak_rss_bytes"] <= record["memory_bytes"]), number(record["bytes_per_triangle"]),
+               number(record["bytes_per_triangle"] <= SAMPLED_BYTES),
+               f"x {number(over)}" if over else "not measured", number(over <= OVER_MORTON) if over else "not measured")
+
+
+def chessboard_rows(records):
+    rows = sorted(records_of(records, "chessboard"), key=lambda record: record["settings"]["models"].index(record["model"]))
+    for record in rows:
+        for splat, columns in record["splats"].items():
+            yield (record["model"], splat, number(columns["frame_ms"]["median"], 1), number(columns["frame_ms"]["p99"], 1),
+                   number(columns["select_ms"]["median"]), *(number(int(columns[name]["median"])) for name in ("triangles", "splats", "draws")),
+                   f"x {number(columns['frame_ms']['median'] / rows[0]['splats'][splat]['frame_ms']['median'])}")
+
+
+def chessboard_lines(records):
+    of = {record["model"]: record["splats"] for record in records_of(records, "chessboard")}
+    if len(of) > 2:
+        first, last = "chessboard_8m", "chessboard_320m"
+        names = next(iter(of.values()))
+        if first in of and last in of:
+            growth = {splat: of[last][splat]["frame_ms"]["median"] / of[first][splat]["frame_ms"]["median"] for splat in names}
+            yield (f"Time of a frame from {first} to {last}: " + ", ".join(f"x {number(ratio)} at splats of {splat}" for splat, ratio in growth.items())
+                   + f" (asked: less than {CHESSBOARD_GROWTH}).")
+
+
+def large_rows(records):
+    for record in sorted(records_of(records, "large"), key=lambda record: (record["placed"], record["model"])):
+        yield (record["model"], number(record["stored"]), number(record["placed"]), number(record["placements"]),
+               mebibytes(record["bytes"]), number(record["frame_ms"]["median"], 1), number(record["frame_ms"]["p99"], 1),
+               number(record["select_ms"]["median"]), *(number(int(record[name]["median"])) for name in ("triangles", "splats", "draws")),
+               number(record["requests_a_frame"], 1), number(int(record["missing_nodes"]["p99"])))
+
+
 def scale_lines(records):
     """How much the largest model costs more than the smallest, and its walk than the smaller one's."""
     sizes = sorted(records_of(records, "scale"), key=lambda record: record["report"]["triangles_in"])
@@ -294,7 +338,7 @@ def growth_lines(records):
 
 
 def closing_lines(records):
-    lines = list(growth_lines(records)) + list(scale_lines(records))
+    lines = [*growth_lines(records), *scale_lines(records), *chessboard_lines(records)]
     for record in records_of(records, "bytes"):
         jobs = ", ".join(str(jobs) for jobs in record["digests"])
         lines.append(f"Same bytes for `--jobs` {jobs} ({record['model']}, `--parts bytes`, commit {record['commit']}): "
@@ -475,6 +519,14 @@ TABLES = (
      ("model", "triangles in", "parts", "root triangles", f"at most {MOST_ROOT_TRIANGLES:,}", "M triangles per CPU second",
       "bytes per triangle", "peak memory", "CPU time a triangle", "bytes", "memory", f"all within {ASSEMBLY_LIMIT}",
       "triangles a frame", "draws a frame"), assembly_rows),
+    ("sampled", "Builds of sample trees, `--structure samples --memory 1G`",
+     ("model", "triangles in", "seconds (least to most)", "CPU seconds", "M triangles per CPU second", f"at least {SAMPLED_RATE}",
+      "peak memory", "within 1 GiB", "bytes per triangle", f"at most {SAMPLED_BYTES}", "over Morton order", f"at most {OVER_MORTON}"), sampled_rows),
+    ("chessboard", "The chessboard: time of a frame against size",
+     ("model", "splats, px", "frame_ms, median", "p99", "select_ms, median", "triangles", "splats", "draws", "over the smallest"), chessboard_rows),
+    ("large", "Walks through large scenes",
+     ("model and structure", "triangles stored", "triangles placed", "placements", "container", "frame_ms, median", "p99", "select_ms, median",
+      "triangles", "splats", "draws", "pages read a frame", "missing nodes, p99"), large_rows),
     ("roots", "Roots", ("file", "triangles in", "root triangles", f"at most {MOST_ROOT_TRIANGLES:,}"), root_rows),
 )
 

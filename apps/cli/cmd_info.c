@@ -193,7 +193,23 @@ static void format_unit(const strl_container_info *info, char text[sizeof info->
             *at = '?';
 }
 
-static void header_to_json(json_t *object, const strl_container *container)
+/* Each tree's as often as it is placed. */
+static strl_status count_placed(strl_container *container, uint64_t *triangles, strl_error *err)
+{
+    const strl_container_info *info = strl_container_get_info(container);
+    strl_status status = STRL_OK;
+    *triangles = 0;
+    for (uint64_t i = 0; i < info->placement_count && status == STRL_OK; i++) {
+        strl_placement placement;
+        status = strl_container_placement(container, i, &placement, err);
+        const strl_tree *tree = status == STRL_OK ? strl_container_tree(container, placement.tree) : NULL;
+        if (tree && __builtin_add_overflow(*triangles, tree->triangle_count, triangles))
+            *triangles = UINT64_MAX;
+    }
+    return status;
+}
+
+static void header_to_json(json_t *object, const strl_container *container, uint64_t placed)
 {
     static const char *const axes[] = {"x", "y", "z"};
     const strl_container_info *info = strl_container_get_info(container);
@@ -218,11 +234,12 @@ static void header_to_json(json_t *object, const strl_container *container)
     put_count(object, "parts", info->part_count);
     put_count(object, "materials", info->material_count);
     put_count(object, "placements", info->placement_count);
+    put_count(object, "triangles_placed", placed < INT64_MAX ? placed : INT64_MAX);
     put_count(object, "triangles", strl_container_triangle_count(container));
     json_object_set_new(object, "bytes_per_triangle", json_real(share(info->file_bytes, strl_container_triangle_count(container))));
 }
 
-static void print_header(const char *path, const strl_container *container)
+static void print_header(const char *path, const strl_container *container, uint64_t placed)
 {
     const strl_container_info *info = strl_container_get_info(container);
     char id[33];
@@ -245,6 +262,8 @@ static void print_header(const char *path, const strl_container *container)
     printf("  %" PRIu32 " part%s, %" PRIu32 " material%s, %" PRIu64 " placement%s\n", info->part_count,
            strl_cli_plural(info->part_count), info->material_count, strl_cli_plural(info->material_count),
            info->placement_count, strl_cli_plural(info->placement_count));
+    if (placed != triangles)
+        printf("  %" PRIu64 " triangles as placed\n", placed);
 }
 
 static void print_groups(const level_facts *level)
@@ -289,13 +308,16 @@ static void print_tree(uint32_t index, const strl_tree *tree, const tree_facts *
 
 static strl_status describe(strl_container *container, const char *path, bool as_json, strl_error *err)
 {
-    strl_status status = STRL_OK;
+    uint64_t placed;
+    strl_status status = count_placed(container, &placed, err);
+    if (status != STRL_OK)
+        return status;
     json_t *object = json_object(), *trees = json_array();
     json_object_set_new(object, "trees", trees);
     if (as_json)
-        header_to_json(object, container);
+        header_to_json(object, container, placed);
     else
-        print_header(path, container);
+        print_header(path, container, placed);
     for (uint32_t i = 0; status == STRL_OK && i < strl_container_get_info(container)->tree_count; i++) {
         tree_facts facts = {0};
         status = survey(container, i, &facts, err);

@@ -21,7 +21,7 @@ import tables
 MODELS = ("isosurface_3k", "isosurface_6k")
 ONE_EACH = ("build", "images_orbit", "images_flythrough", "psnr_orbit", "psnr_flythrough", "verify", "backends",
             "rate", "bytes", "sizes", "dependencies", "walk", "scale", "shapes", "cap", "walk_cold", "claims", "decode", "kills",
-            "model", "assembly")
+            "model", "assembly", "sampled", "chessboard")
 
 
 class Test:
@@ -55,7 +55,7 @@ class Test:
         self.check("every part is measured", result.returncode == 0, result.stderr)
         records = measure.Log(self.log, {}).latest()
         wanted = {(name, model) for name in ONE_EACH for model in MODELS}
-        wanted.add(("root", "plane"))
+        wanted |= {("root", "plane"), *(("large", model) for model in MODELS)}
         self.check("each record is there", set(records) == wanted, set(records) ^ wanted)
         said = {record["settings"].get("frames") for (name, _), record in records.items() if name.startswith("psnr")}
         self.check("the frames of a part stand in its record", said == {1}, said)

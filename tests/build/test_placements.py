@@ -94,7 +94,7 @@ def a_model_and_its_expansion_look_the_same(folder):
         assert sum(frame["uploaded_bytes"] for frame in frames) < 3 * 60 * shared["vertices"], frames
     must("render", f"{folder}/shared.stroll", "--backend", "null", "--stats", f"{folder}/null.jsonl", "--path",
          f"{folder}/whole/path.json", "--quiet")
-    assert info["placements"] == 50, info
+    assert (info["placements"], info["triangles_placed"]) == (50, shared["triangles_placed"]), info
 
 
 def bytes_do_not_depend_on_threads(folder):
