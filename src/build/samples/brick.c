@@ -15,7 +15,7 @@
 #define LEAVES_BESIDE 7u
 
 /* A cell whose triangles are no more goes into one brick as a whole. */
-#define COMPACT_TRIANGLES 4096u
+#define COMPACT_TRIANGLES 8000u
 
 /* Triangles of one brick on their way to a payload. */
 typedef struct brick_content {
