@@ -61,6 +61,7 @@ ARCHIVES = (".tar", ".tar.zst")
 SCENE = re.compile(r"(isosurface|boxes|plant|chessboard|landscape)_(\d+)([kmg]?)(_shuffled)?(_stl|_placed)?")
 ARRAY = re.compile(r"(\w+)_x(\d+)")  # so many copies of a model
 BACKEND_FRAMES = 8
+ROOMY = ("--memory", "4G", "--gpu-memory", "4G")  # images are of one pixel, whatever that takes
 WALK_FRAMES_A_FRAME = 5  # 300 where the others have 60: a smooth path
 
 
@@ -161,7 +162,7 @@ class Bench:
         shutil.rmtree(target, ignore_errors=True)
         stats = target.with_suffix(".jsonl")
         outcome = self.program("render", model_file, "--path", path, "--seed", 1, "--size", self.options.size, "--error", 1,
-                               "-o", target, "--stats", stats, *options)
+                               *ROOMY, "-o", target, "--stats", stats, *options)
         return measure.read_lines(stats), outcome.seconds
 
     def compare_pair(self, model, path, frames, options, limits, sheet=None):
