@@ -79,7 +79,8 @@ void main()
     v_view = view;
     v_normal = vec3(dot(ITEM_ROW(3).xyz, normal), dot(ITEM_ROW(4).xyz, normal), dot(ITEM_ROW(5).xyz, normal));
     vec3 tint = vec3(ITEM_ROW(3).w, ITEM_ROW(4).w, ITEM_ROW(5).w);
-    v_colour = vec4(tint.x >= 0.0 ? tint : linear_of(in_colour.rgb), in_colour.a);
+    vec3 own = tint.x < -1.5 ? mix(-2.0 - tint, in_colour.rgb, 0.25) : in_colour.rgb; /* a marked placement */
+    v_colour = vec4(tint.x >= 0.0 ? tint : linear_of(own), in_colour.a);
 
     /* Reversed depth: near / z, or linear where orthographic. */
     if (u_orthographic != 0) {

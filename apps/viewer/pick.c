@@ -129,6 +129,12 @@ static bool meets_triangle(const double p[3][3], const local_ray *ray, double *t
     return *t > 0;
 }
 
+static bool is_item_hidden(const strl_pick_filter *filter, const strl_draw_item *item)
+{
+    uint32_t part = item->own_part - 1; /* of none: more than any count */
+    return filter->part_styles && part < filter->part_count && filter->part_styles[part] == STRL_PART_HIDDEN;
+}
+
 static bool is_hidden(const strl_pick_filter *filter, const strl_draw_item *item, uint32_t vertex)
 {
     if (!item->labels || !filter->part_styles)
@@ -187,7 +193,7 @@ static void fill(const strl_draw_item *item, const strl_ray *ray, const hit *bes
         scale = fmax(scale, sqrt(dot(item->transform + 4 * i, item->transform + 4 * i)));
     *pick = (strl_pick){.distance = best->t,
                         .error = item->error * scale,
-                        .part = item->labels ? item->labels[best->vertex].part : UINT32_MAX,
+                        .part = item->own_part ? item->own_part - 1 : item->labels ? item->labels[best->vertex].part : UINT32_MAX,
                         .material = item->labels ? item->labels[best->vertex].material : UINT32_MAX,
                         .placement = item->placement,
                         .node = item->node};
@@ -204,7 +210,7 @@ bool strl_pick_list(const strl_draw_list *list, const strl_ray *ray, const strl_
     for (uint32_t i = 0; i < list->count; i++) {
         const strl_draw_item *item = &list->items[i];
         local_ray local;
-        if (item->draw_count == 0 || item->point_px > 0 || !to_local(item, ray, &local) || !meets_box(item, &local, best.t))
+        if (item->draw_count == 0 || item->point_px > 0 || is_item_hidden(filter ? filter : &none, item) || !to_local(item, ray, &local) || !meets_box(item, &local, best.t))
             continue;
         if (pick_item(item, ray, &local, filter ? filter : &none, &best))
             nearest = item;
@@ -239,8 +245,8 @@ bool strl_pick_style_bounds(const strl_draw_list *list, const uint8_t *part_styl
         const strl_draw_item *item = &list->items[i];
         for (uint32_t k = 0; item->labels && k < item->index_count; k++) {
             double local[3];
-            uint32_t part = item->labels[item->indices[k]].part;
-            if (part >= part_count || part_styles[part] != style)
+            uint32_t part = item->labels[item->indices[k]].part, own = item->own_part - 1;
+            if ((part >= part_count || part_styles[part] != style) && (own >= part_count || part_styles[own] != style))
                 continue;
             vertex_of(item, item->indices[k], local);
             add_point(item, local, bounds);

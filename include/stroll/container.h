@@ -34,6 +34,7 @@ typedef struct strl_container_info {
 /* A tree in the world. */
 typedef struct strl_placement {
     uint32_t tree;
+    uint32_t own_part; /* part + 1 that all of it is, such as a pump among many; 0: parts are those of its vertices */
     double transform[12]; /* model to world, row-major affine 3x4 */
 } strl_placement;
 

@@ -47,6 +47,7 @@ typedef struct strl_draw_item {
     bool visible;          /* intersects the view frustum (and is not known to be hidden) */
     const strl_vertex *vertices;
     const strl_vertex_label *labels; /* [vertex_count]; NULL where the walk was not asked for them */
+    uint32_t own_part;     /* part + 1 that the whole placement is; labels then say the part of what is placed; 0: labels alone do */
     uint32_t vertex_count;
     const uint16_t *indices; /* [index_count] what belongs onto the GPU */
     uint32_t index_count;

@@ -62,7 +62,7 @@ typedef struct strl_draw_options {
     float headlight;        /* strength of the light at the eye; 0 = 0.55 */
     double sky_up[3];       /* world direction from which the sky shines; zero = +z */
     double section[4];      /* world: only points p with x p.x + y p.y + z p.z <= w are drawn; zero = all */
-    /* Of parts by number, strl_part_style each; parts past the end are plain. It works on items with labels. NULL = all
+    /* Of parts by number, strl_part_style each; parts past the end are plain. It works on items with labels, and on placements with a part of their own. NULL = all
      * plain. Borrowed for the draw. The version tells contents apart: vertices are sent again only where it differs from that of the
      * draw before; change it with the contents. */
     const uint8_t *part_styles;

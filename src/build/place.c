@@ -24,6 +24,7 @@ typedef struct placing {
     placed *items; /* [capacity] */
     size_t count, capacity;
     uint64_t total; /* of all windows */
+    uint32_t part_base; /* of the parts of the input at hand */
 } placing;
 
 static uint64_t spread(uint64_t bits)
@@ -73,14 +74,14 @@ static strl_status write_window(placing *p, strl_error *err)
     return status ? status : strl__build_report(p->context, 0, 0, err);
 }
 
-static strl_status add(placing *p, uint32_t tree, const double transform[12], strl_error *err)
+static strl_status add(placing *p, uint32_t tree, uint32_t own_part, const double transform[12], strl_error *err)
 {
     strl_build_context *context = p->context;
     const strl_model_tree *facts = &context->model->trees[tree];
     if (facts->triangles == 0)
         return STRL_OK; /* of a tree without a triangle there is nothing to see */
     placed *item = &p->items[p->count++];
-    *item = (placed){.placement = {.tree = tree}, .index = p->total++};
+    *item = (placed){.placement = {.tree = tree, .own_part = own_part}, .index = p->total++};
     memcpy(item->placement.transform, transform, sizeof item->placement.transform);
     for (unsigned k = 0; k < 3; k++)
         item->centre[k] = transform[4 * k] * facts->centre[0] + transform[4 * k + 1] * facts->centre[1] +
@@ -100,7 +101,7 @@ static strl_status add_of_input(placing *p, uint32_t input, strl_error *err)
     while (!status && found) {
         status = strl_reader_next_placement(model->readers[input], &placement, &found, err);
         if (!status && found)
-            status = add(p, model->first_tree[input] + placement.piece - 1, placement.transform, err);
+            status = add(p, model->first_tree[input] + placement.piece - 1, p->part_base + placement.part + 1, placement.transform, err);
     }
     return status;
 }
@@ -123,10 +124,12 @@ static strl_status place_trees(strl_build_context *context, strl_error *err)
     p.items = strl__alloc(p.capacity, sizeof *p.items);
     strl_status status = p.items ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu placements", p.capacity);
     if (!status && model->trees[0].input == STRL_EVERY_INPUT)
-        status = add(&p, 0, as_it_is, err);
-    for (uint32_t i = 0; i < context->desc->input_count && !status; i++)
+        status = add(&p, 0, 0, as_it_is, err);
+    for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
         if (strl_reader_piece_count(model->readers[i]) > 1)
             status = add_of_input(&p, i, err);
+        p.part_base += strl_reader_part_count(model->readers[i]);
+    }
     if (!status && p.count)
         status = write_window(&p, err);
     strl__free(p.items);

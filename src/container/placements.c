@@ -10,17 +10,19 @@ static strl_status decode(const strl_container *container, uint64_t index, const
 {
     strl_cursor in = strl_cursor_make(item, bytes);
     placement->tree = strl_cursor_u32(&in);
-    uint32_t reserved = strl_cursor_u32(&in);
+    placement->own_part = strl_cursor_u32(&in);
     for (int i = 0; i < 12; i++)
         placement->transform[i] = strl_cursor_f64(&in);
-    if (in.failed || strl_cursor_left(&in) || reserved)
+    if (in.failed || strl_cursor_left(&in))
         return strl__fail(err, STRL_ERR_FORMAT,
-                          "placement %" PRIu64 ": %" PRIu32 " bytes or a reserved field, expected %u bytes", index,
-                          bytes, STRL__PLACEMENT_BYTES);
+                          "placement %" PRIu64 ": %" PRIu32 " bytes, expected %u", index, bytes, STRL__PLACEMENT_BYTES);
     if (placement->tree >= container->header.info.tree_count)
         return strl__fail(err, STRL_ERR_FORMAT,
                           "placement %" PRIu64 ": tree is %" PRIu32 ", expected less than %" PRIu32, index,
                           placement->tree, container->header.info.tree_count);
+    if (placement->own_part > container->header.info.part_count)
+        return strl__fail(err, STRL_ERR_FORMAT, "placement %" PRIu64 ": part is %" PRIu32 ", expected less than %" PRIu32, index,
+                          placement->own_part - 1, container->header.info.part_count);
     for (int i = 0; i < 12; i++)
         if (!isfinite(placement->transform[i]))
             return strl__fail(err, STRL_ERR_FORMAT, "placement %" PRIu64 ": number %d of its transform is not finite",

@@ -97,7 +97,7 @@ static strl_status add_placement(strl_container_writer *writer, const strl_place
     uint8_t bytes[STRL__PLACEMENT_BYTES];
     strl_writer out = {.data = bytes, .capacity = sizeof bytes};
     strl_writer_u32(&out, placement->tree);
-    strl_writer_u32(&out, 0);
+    strl_writer_u32(&out, placement->own_part);
     for (int i = 0; i < 12; i++) {
         if (!isfinite(placement->transform[i]))
             return strl__fail(err, STRL_ERR_ARGUMENT, "number %d of a placement's transform is not finite", i);
@@ -220,7 +220,7 @@ static strl_status add_defaults(strl_container_writer *writer, strl_error *err)
     strl_status status = STRL_OK;
     bool none_placed = strl__page_table_writer_count(writer->placements) == 0;
     for (uint32_t tree = 0; status == STRL_OK && none_placed && tree < writer->header.info.tree_count; tree++) {
-        const strl_placement as_it_is = {tree, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
+        const strl_placement as_it_is = {.tree = tree, .transform = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
         status = add_placement(writer, &as_it_is, err);
     }
     if (status == STRL_OK && strl__page_table_writer_count(writer->parts) == 0)

@@ -86,10 +86,21 @@ static bool is_rest_empty(const strl__gltf *gltf)
     return true;
 }
 
-/* Known at once, because trees of the pieces before need the tables of names to be whole. */
+static bool is_placed(const strl__gltf *gltf, const strl__gltf_node *node)
+{
+    return node->mesh != STRL__NO_ITEM && gltf->meshes[node->mesh].piece;
+}
+
+/* Known at once, because trees of the pieces before need the tables of names to be whole. Of a placement it is the node's, as if it
+ * were a copy. */
 static strl_status list_names(strl__gltf *gltf, strl_error *err)
 {
     strl_status status = STRL_OK;
+    uint32_t named;
+    while (!status && strl__gltf_next_node(gltf))
+        if (is_placed(gltf, &gltf->nodes[gltf->pass.node]))
+            status = strl__gltf_name_part(gltf, gltf->pass.node, &named, err);
+    strl__gltf_rewind(gltf);
     for (uint32_t i = 0; i < gltf->reader->piece_count && !status; i++) {
         const strl__gltf_mesh *mesh = &gltf->meshes[gltf->pieces[i]];
         uint32_t part, material;
@@ -221,6 +232,7 @@ strl_status strl__gltf_next_placement(strl_reader *reader, strl_reader_placement
             }
             pass->instance++;
             placement->piece = mesh->piece;
+            placement->part = node->part;
             memcpy(placement->transform, matrix.m, sizeof placement->transform);
             *found = true;
             return STRL_OK;

@@ -105,6 +105,7 @@ typedef struct strl_reader_piece {
 /* A placement of a piece other than 0: rows of three and the translation, from the piece's coordinates to the model's. */
 typedef struct strl_reader_placement {
     uint32_t piece;
+    uint32_t part; /* its own name, among the reader's parts */
     double transform[12]; /* finite */
 } strl_reader_placement;
 

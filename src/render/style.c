@@ -4,13 +4,18 @@
 
 #include "base/memory.h"
 
-/* Three parts of this and one of its own colour. */
-static const uint8_t mark[3] = {255, 150, 30};
+const uint8_t strl__style_mark[3] = {255, 150, 30};
 
 static strl_part_style style_of(const strl_draw_options *options, const strl_draw_item *item, uint32_t vertex)
 {
     uint32_t part = item->labels[vertex].part;
     return part < options->part_count ? (strl_part_style)options->part_styles[part] : STRL_PART_PLAIN;
+}
+
+strl_part_style strl__item_style(const strl_draw_item *item, const strl_draw_options *options)
+{
+    uint32_t part = item->own_part - 1; /* of none: more than any count */
+    return options->part_styles && part < options->part_count ? (strl_part_style)options->part_styles[part] : STRL_PART_PLAIN;
 }
 
 bool strl__style_update(strl_cache_entry *entry, const strl_draw_item *item, const strl_draw_options *options)
@@ -47,7 +52,7 @@ const strl_vertex *strl__style_vertices(const strl_cache_entry *entry, const str
         if (style == STRL_PART_HIDDEN)
             rgba[3] = 0;
         for (int i = 0; style == STRL_PART_MARKED && i < 3; i++)
-            rgba[i] = (uint8_t)((rgba[i] + 3 * mark[i]) / 4);
+            rgba[i] = (uint8_t)((rgba[i] + 3 * strl__style_mark[i]) / 4);
     }
     return *copy;
 }

@@ -213,9 +213,10 @@ strl_status strl__v_mesh_check_states(const strl__vmesh *mesh, strl_arena *scrat
     return status;
 }
 
-strl__hash128 strl__hash_placement(uint32_t tree, const double transform[12])
+strl__hash128 strl__hash_placement(uint32_t tree, uint32_t own_part, const double transform[12])
 {
-    strl__hash128 hash = {strl__mix64(tree + 0x9e3779b97f4a7c15u), strl__mix64(tree + 0x632be59bd9b4e019u)};
+    uint64_t names = (uint64_t)own_part << 32 | tree;
+    strl__hash128 hash = {strl__mix64(names + 0x9e3779b97f4a7c15u), strl__mix64(names + 0x632be59bd9b4e019u)};
     for (unsigned i = 0; i < 12; i++) {
         uint64_t bits;
         double number = transform[i] + 0.0; /* zeros have one sign */

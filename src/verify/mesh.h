@@ -90,7 +90,8 @@ static inline strl__hash128 strl__hash_triangle(strl__hash128 a, strl__hash128 b
 }
 
 /* Of a tree and twelve numbers, by their bits. */
-strl__hash128 strl__hash_placement(uint32_t tree, const double transform[12]);
+/* own_part: as stored; 0 where it is not compared. */
+strl__hash128 strl__hash_placement(uint32_t tree, uint32_t own_part, const double transform[12]);
 
 static inline void strl__hash_add(strl__hash128 *sum, strl__hash128 hash)
 {

@@ -91,6 +91,12 @@ void strl__v_pieces_deinit(strl__vpieces *pieces)
     *pieces = (strl__vpieces){0};
 }
 
+/* Parts of several inputs are numbered one input after the other, and how many an input has is known when it was read. */
+bool strl__v_compares_parts(const strl__model *model)
+{
+    return model->desc->input_count == 1;
+}
+
 /* Adds what the input says of trees that hold a triangle: others are not placed. */
 static strl_status sum_input(strl__model *model, strl__vpieces *pieces, uint32_t input, strl__hash128 *sum, uint64_t *count,
                              strl_error *err)
@@ -109,7 +115,7 @@ static strl_status sum_input(strl__model *model, strl__vpieces *pieces, uint32_t
         pieces->items[tree].placements++;
         if (model->trees[tree].triangle_count == 0)
             continue;
-        strl__hash_add(sum, strl__hash_placement(tree, placement.transform));
+        strl__hash_add(sum, strl__hash_placement(tree, strl__v_compares_parts(model) ? placement.part + 1 : 0, placement.transform));
         ++*count;
     }
     if (status == STRL_OK) {
@@ -134,7 +140,7 @@ strl_status strl__v_check_placements(strl__model *model, strl__vpieces *pieces, 
     if (!*comparable)
         return STRL_OK;
     if (pieces->items[0].input == STRL__EVERY_INPUT && (pieces->is_plain || model->trees[0].triangle_count)) {
-        strl__hash_add(&sum, strl__hash_placement(0, as_it_is));
+        strl__hash_add(&sum, strl__hash_placement(0, 0, as_it_is));
         count++;
     }
     strl_status status = STRL_OK;

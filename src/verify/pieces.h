@@ -26,6 +26,8 @@ strl_status strl__v_open_input(strl__model *model, uint32_t input, strl_reader *
 strl_status strl__v_pieces_list(strl__model *model, strl__vpieces *pieces, strl_error *err);
 void strl__v_pieces_deinit(strl__vpieces *pieces);
 /* Whether the container has a tree for each, and places it where the inputs do. False where trees cannot be compared. */
+/* Whether the container numbers parts as the input does. */
+bool strl__v_compares_parts(const strl__model *model);
 strl_status strl__v_check_placements(strl__model *model, strl__vpieces *pieces, bool *comparable, strl_error *err);
 
 #endif

@@ -8,6 +8,7 @@
 #include "base/memory.h"
 #include "verify/mesh.h"
 #include "verify/model.h"
+#include "verify/pieces.h"
 
 #define PAGE_BYTES 65536u
 #define MOST_REFS 2040u
@@ -91,19 +92,20 @@ static void widen_bounds(table *self, const strl__vtree *tree, const double m[12
 static void check_placement(table *self, uint64_t item, const uint8_t *bytes, size_t size)
 {
     strl_cursor cursor = strl_cursor_make(bytes, size);
-    uint32_t tree = strl_cursor_u32(&cursor), reserved = strl_cursor_u32(&cursor);
+    uint32_t tree = strl_cursor_u32(&cursor), own_part = strl_cursor_u32(&cursor);
     double m[12];
     bool finite = true;
     for (unsigned i = 0; i < 12; i++) {
         m[i] = strl_cursor_f64(&cursor);
         finite = finite && isfinite(m[i]);
     }
-    bool good = size == PLACEMENT_BYTES && tree < self->model->tree_count && reserved == 0 && finite;
-    TABLE_RULE(self, good, item, "placement %" PRIu64 ": %zu bytes, tree %u of %u, reserved word %u, %s", item, size,
-               tree, self->model->tree_count, reserved, finite ? "finite" : "not finite");
+    bool good = size == PLACEMENT_BYTES && tree < self->model->tree_count &&
+                own_part <= self->model->sections[STRL__PARTS].item_count && finite;
+    TABLE_RULE(self, good, item, "placement %" PRIu64 ": %zu bytes, tree %u of %u, its own part plus one %u, %s", item, size,
+               tree, self->model->tree_count, own_part, finite ? "finite" : "not finite");
     if (good) {
         widen_bounds(self, &self->model->trees[tree], m);
-        strl__hash_add(&self->model->placements, strl__hash_placement(tree, m));
+        strl__hash_add(&self->model->placements, strl__hash_placement(tree, strl__v_compares_parts(self->model) ? own_part : 0, m));
     }
 }
 

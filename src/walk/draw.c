@@ -26,6 +26,7 @@ static strl_draw_item make_item(const strl_walk *walk, const strl__active *activ
         .visible = active->sight.seen,
         .vertices = mesh->vertices,
         .labels = mesh->labels,
+        .own_part = placement->own_part,
         .vertex_count = mesh->vertex_count,
         .indices = mesh->indices,
         .index_count = mesh->shared ? mesh->index_total : draw_count,

@@ -99,7 +99,7 @@ typedef struct strl__treelets {
 } strl__treelets;
 
 typedef struct strl__placement {
-    uint32_t tree;
+    uint32_t tree, own_part;
     double transform[12];
     double length_scale; /* world units per lattice unit, at most; of sample trees by the pixels that a splat may have for each of the
                             allowed error, so that sizes and errors are compared alike */

@@ -66,6 +66,7 @@ static strl_status load_all(strl_walk *walk, bool *is_used, strl_error *err)
                               "placement %" PRIu32 " names tree %" PRIu32 ", expected less than %" PRIu32,
                               walk->placement_count, stored.tree, walk->tree_count);
         placement->tree = stored.tree;
+        placement->own_part = stored.own_part;
         memcpy(placement->transform, stored.transform, sizeof placement->transform);
         placement->length_scale = largest_scale(stored.transform) * tree->step;
         if (tree->structure == STRL_STRUCTURE_SAMPLES)

@@ -93,6 +93,7 @@ static strl_draw_item shape_of(const strl_walk *walk, uint32_t placement_index, 
     const strl__placement *placement = &walk->placements[placement_index];
     const strl_tree *tree = walk->trees[placement->tree].tree;
     strl_draw_item item = {.placement = placement_index,
+                           .own_part = placement->own_part,
                            .step = tree->step,
                            .point_px = (float)fmin(fmax(px, 1), STRL__MOST_POINT_PX),
                            .error_px = (float)px};

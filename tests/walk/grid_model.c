@@ -363,8 +363,8 @@ static void write_model(const builder *b, const char *folder, const char *path, 
                             .node_count = GRID_NODES,
                             .level_count = GRID_DEPTH + 1,
                             .leaf_geometric = 0.9f};
-    const strl_placement placed[2] = {{0, {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}},
-                                      {0, {0, -0.5, 0, -20, 0.5, 0, 0, 0, 0, 0, 0.5, 3}}};
+    const strl_placement placed[2] = {{.transform = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}},
+                                      {.transform = {0, -0.5, 0, -20, 0.5, 0, 0, 0, 0, 0, 0.5, 3}}};
     must(strl_container_writer_create(&desc, &writer, &err), &err);
     must(strl_container_writer_begin_tree(writer, &tree, &err), &err);
     for (uint32_t id = 0; id < GRID_NODES; id++)

@@ -238,7 +238,7 @@ static strl_status gl45_draw_list(strl_renderer *renderer, const strl_draw_setup
     strl__gl_begin_draw(&self->gl, setup);
     for (uint32_t i = 0; status == STRL_OK && i < list->count; i++) {
         const strl_draw_item *item = &list->items[i];
-        if (!item->visible || item->draw_count == 0)
+        if (!item->visible || item->draw_count == 0 || strl__item_style(item, &setup->options) == STRL_PART_HIDDEN)
             continue;
         status = strl__check_item_counts(item, err);
         if (status != STRL_OK)

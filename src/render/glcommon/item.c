@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "base/hash.h"
+#include "render/style.h"
 
 #define FLAG_FLOAT_POSITIONS 1
 /* Reference cells stay this close to the lattice's origin, so that differences fit 64 bits. */
@@ -114,12 +115,21 @@ static void debug_colour(strl_debug_colour debug, const strl_draw_item *item, fl
     }
 }
 
+/* What the shader takes instead of the vertices' colour, or, below -1, what it mixes to it. */
+static void tint_of(const strl_draw_setup *setup, const strl_draw_item *item, float rgb[3])
+{
+    debug_colour(setup->options.debug, item, rgb);
+    bool marked = rgb[0] < 0 && strl__item_style(item, &setup->options) == STRL_PART_MARKED;
+    for (int i = 0; i < 3 && marked; i++)
+        rgb[i] = -2 - strl__style_mark[i] / 255.f;
+}
+
 void strl__gl_item_make(strl_gl_placing *placing, const strl_draw_setup *setup, const strl_draw_item *item, strl_gl_item *out)
 {
     place(placing, &setup->view, item);
     *out = placing->shared;
     float tint[3];
-    debug_colour(setup->options.debug, item, tint);
+    tint_of(setup, item, tint);
     for (int i = 0; i < 3; i++) {
         bool lattice = item->positions == STRL_POSITIONS_LATTICE;
         uint64_t base = lattice ? (uint64_t)item->anchor[i] - (uint64_t)placing->reference[i] : 0;

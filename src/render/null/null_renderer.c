@@ -10,6 +10,7 @@
 #include "render/cache.h"
 #include "render/check.h"
 #include "render/renderer.h"
+#include "render/style.h"
 
 /* What a GPU would hold of one node. Found through the cache entry's key. */
 typedef struct shadow {
@@ -159,7 +160,7 @@ static strl_status null_draw(strl_renderer *renderer, const strl_draw_setup *set
         status = strl__check_item_counts(item, err);
         if (status == STRL_OK)
             status = strl__check_item_contents(item, err);
-        if (status != STRL_OK || !item->visible || item->draw_count == 0)
+        if (status != STRL_OK || !item->visible || item->draw_count == 0 || strl__item_style(item, &setup->options) == STRL_PART_HIDDEN)
             continue;
         status = check_keys(self, item, in_this_list, err);
         if (status == STRL_OK)
