@@ -134,6 +134,26 @@ def within_little_memory_it_coarsens(folder):
         assert stats["allowed_error_px"] > 0.5 and 0 < stats["triangles"] < ample["triangles"], stats
 
 
+def large_triangles_are_all_drawn_however_many_lie_in_a_cell(folder):
+    """Each spans the model: none may wait in a brick that never opens, nor vanish where small ones become splats."""
+    source, out, count, small = os.path.join(folder, "in.ply"), os.path.join(folder, "out.stroll"), 20000, 30000
+    dice = Random(5)
+    with open(source, "w", encoding="ascii") as file:
+        file.write(f"ply\nformat ascii 1.0\nelement vertex {3 * (count + small)}\nproperty float x\nproperty float y\nproperty float z\n"
+                   f"element face {count + small}\nproperty list uchar int vertex_indices\nend_header\n")
+        for t in range(count + small):
+            middle, reach = ([0, 0, 0], 1) if t < count else ([dice.uniform(-1, 1) for _ in range(3)], 1e-3)
+            for _ in range(3):
+                file.write(" ".join(f"{middle[k] + reach * dice.uniform(-1, 1):.5f}" for k in range(3)) + "\n")
+        file.writelines(f"3 {3 * t} {3 * t + 1} {3 * t + 2}\n" for t in range(count + small))
+    build(source, out, "--structure", "samples")
+    stats = os.path.join(folder, "stats.jsonl")
+    for camera, most in (("eye 9 -7 6 target 0 0 0 up 0 0 1 fov 30", "1"), ("eye 90 -70 60 target 0 0 0 up 0 0 1 fov 30", "1")):
+        must("render", out, "--camera", camera, "--error", most, "--backend", "null", "--stats", stats, "--quiet")
+        frame = json.loads(read(stats))
+        assert frame["triangles"] >= count and frame["missing_nodes"] == 0, frame
+
+
 def any_order_of_the_input_gives_the_same_triangles(folder):
     source, _, _ = plant(folder)
     shuffled, out = os.path.join(folder, "shuffled.ply"), os.path.join(folder, "shuffled.stroll")
@@ -142,7 +162,7 @@ def any_order_of_the_input_gives_the_same_triangles(folder):
     assert json.loads(must("verify", out, "--json", "--against", source).output)["ok"]
 
 
-run_tests(what_samples_cannot_do_is_refused, info_tells_what_it_is, verify_proves_it_and_not_against_another,
+run_tests(what_samples_cannot_do_is_refused, large_triangles_are_all_drawn_however_many_lie_in_a_cell, info_tells_what_it_is, verify_proves_it_and_not_against_another,
           extract_gives_what_is_above_a_front, as_the_error_goes_to_nothing_the_image_is_the_full_one,
           a_wireframe_shows_splats_as_they_are, other_errors_draw_fewer_triangles_and_splats, within_little_memory_it_coarsens,
           any_order_of_the_input_gives_the_same_triangles)
