@@ -21,7 +21,7 @@ import tables
 MODELS = ("isosurface_3k", "isosurface_6k")
 ONE_EACH = ("build", "images_orbit", "images_flythrough", "psnr_orbit", "psnr_flythrough", "verify", "backends",
             "rate", "bytes", "sizes", "dependencies", "walk", "scale", "shapes", "cap", "walk_cold", "claims", "decode", "kills",
-            "model", "assembly", "sampled", "chessboard")
+            "model", "assembly", "sampled", "chessboard", "theorem", "splats")
 
 
 class Test:
@@ -44,7 +44,7 @@ class Test:
         command = [sys.executable, "-B", ROOT / "bench" / "must_show.py", "--data", self.data, "--stroll", self.program,
                    "--scratch", self.folder / "scratch", "--log", self.log, "--docs", self.docs,
                    "--counts", self.counts, "--errors", self.errors, "--kills", 2, "--models", ",".join(models), "--frames", 2, "--size", "160x90", "--pairs", 1,
-                   "--runs", 1, *words]
+                   "--runs", 1, "--theorem-pairs", 2000, *words]
         return subprocess.run([str(word) for word in command], capture_output=True, text=True)
 
     def test_parts(self):
