@@ -33,6 +33,14 @@ static shown missing_splats(const strl__active *active)
     return (shown){mesh->splats + first, mesh->splat_end[mesh->step_count - 1] - first};
 }
 
+/* 0 = all faces are parallel, STRL_SPREAD_MOST = any direction: then their mean is half as long as they are together, all being
+ * turned to one side. */
+static uint16_t spread_of(const strl_splat *splat)
+{
+    uint32_t twice = 2 * (255u - splat->parallel);
+    return (uint16_t)((twice < 255 ? twice : 255) * STRL_SPREAD_MOST / 255);
+}
+
 /* Relative to the least corner of the tree's box, which all cells lie near. */
 static strl_vertex make_point(const strl_node *record, const strl_splat *splat, const int64_t origin[3])
 {
@@ -41,6 +49,7 @@ static strl_vertex make_point(const strl_node *record, const strl_splat *splat, 
         point.position[k] = (int32_t)(uint32_t)((uint64_t)record->anchor[k] - (uint64_t)origin[k] + (uint64_t)(int64_t)splat->centre[k]);
     for (int k = 0; k < 2; k++)
         point.normal[k] = (uint16_t)(splat->normal[k] * 1023u / 255u);
+    point.normal[0] |= (uint16_t)(spread_of(splat) << STRL_SPREAD_SHIFT);
     for (int k = 0; k < 3; k++)
         point.rgba[k] = (uint8_t)(splat->rgba >> 8 * k);
     point.rgba[3] = (uint8_t)((splat->rgba >> 24) * splat->coverage / 255);

@@ -105,6 +105,7 @@ static void look_at_splats(const strl_draw_item *item, listed *found)
         }
         for (int k = 0; k < 3; k++)
             assert_int_equal(vertex->rgba[k], 255); /* of white triangles */
+        assert_true(vertex->normal[1] <= 1023 && vertex->normal[0] >> STRL_SPREAD_SHIFT <= STRL_SPREAD_MOST);
     }
     found->splats += item->draw_count;
 }
