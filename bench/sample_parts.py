@@ -71,6 +71,8 @@ def check_theorem(bench, model, probability, pairs):
     said = outcome.json()
     if not default:
         container.unlink()
+    if not said["candidates"]:
+        raise measure.Failed(f"no cell of {model} leaves anything to those below it")
     hidden, broken = (share_bounds(said[failed], said[of]) for failed, of in (("hidden", "pairs"), ("broken", "premise")))
     return {**said, "asked": probability, "hidden_bounds": hidden, "broken_bounds": broken, "seconds": outcome.seconds,
             "holds": not broken or broken[0] <= 1 - said["probability"],
