@@ -6,6 +6,7 @@
 
 #include "base/fail.h"
 #include "base/hash.h"
+#include "build/ingest/buckets.h"
 #include "geometry/colour.h"
 #include "geometry/octahedral.h"
 #include "geometry/payload.h"
@@ -327,6 +328,22 @@ static strl_brick start_brick(const strl_brick_set *set, uint32_t parent)
     return (strl_brick){.parent = parent, .depth = parent == STRL_NO_BRICK ? 0 : set->brick[parent].depth + 1, .chunk = STRL_NO_CHUNK};
 }
 
+/* Along the curve, whatever the level: what lies side by side is told by each other. */
+static bool sort_triangles(const strl_octree *octree, const brick_content *content, strl_arena *arena)
+{
+    strl_keyed *keys = strl_arena_alloc(arena, content->count, sizeof *keys), *other = strl_arena_alloc(arena, content->count, sizeof *keys);
+    if (!keys || !other)
+        return false;
+    for (uint32_t i = 0; i < content->count; i++)
+        keys[i] = (strl_keyed){octree->key[content->triangle[i]], (uint64_t)content->triangle[i] << 8 | content->level[i]};
+    strl__sort_keys(keys, other, content->count);
+    for (uint32_t i = 0; i < content->count; i++) {
+        content->triangle[i] = (uint32_t)(keys[i].index >> 8);
+        content->level[i] = (uint8_t)keys[i].index;
+    }
+    return true;
+}
+
 static strl_status add_brick(strl_brick_set *set, const strl_octree *octree, const brick_content *content, uint32_t parent,
                              strl_arena *arena, uint32_t *index, strl_error *err)
 {
@@ -336,8 +353,9 @@ static strl_status add_brick(strl_brick_set *set, const strl_octree *octree, con
     int64_t alone[3] = {0};
     welding weld = {.octree = octree, .content = content};
     strl_pm pm;
-    strl_status status = weld_all(&weld, arena) ? STRL_OK
-                                                : strl__fail(err, STRL_ERR_MEMORY, "no memory for a brick of %u triangles", content->count);
+    strl_status status = sort_triangles(octree, content, arena) && weld_all(&weld, arena)
+                             ? STRL_OK
+                             : strl__fail(err, STRL_ERR_MEMORY, "no memory for a brick of %u triangles", content->count);
     if (!status) {
         if (content->cell_count[0])
             find_centre(octree, &octree->octant[content->cell[0][0]], alone);
