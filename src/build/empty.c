@@ -15,9 +15,8 @@ static strl_status encode_nothing(strl_structure structure, strl_arena *arena, s
     pm.geometric_error[0] = pm.appearance_error[0] = 0;
     pm.palette[0] = (strl_palette_entry){.rgba = 0xffffffffu};
     const strl_brick_head head = {.level_count = 1};
-    if (structure == STRL_STRUCTURE_SAMPLES)
-        strl_brick_head_write(&head, payload);
-    return strl_payload_encode(&pm, NULL, arena, payload, NULL, err);
+    strl_status status = structure == STRL_STRUCTURE_SAMPLES ? strl_brick_head_write(&head, payload, err) : STRL_OK;
+    return status ? status : strl_payload_encode(&pm, NULL, arena, payload, NULL, err);
 }
 
 strl_status strl_write_empty_tree(strl_container_writer *writer, strl_structure structure, strl_error *err)

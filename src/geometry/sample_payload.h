@@ -9,7 +9,7 @@
 
 /* Stands for all that lies in a cell of the octree. */
 typedef struct strl_splat {
-    int32_t centre[3];  /* of what lies in it, lattice units from the node's anchor */
+    int32_t centre[3];  /* of what lies in it, lattice units from the node's anchor; as of strl_splat_place */
     uint8_t side;       /* of the cell: 2^side lattice units */
     uint8_t coverage;   /* 255 = as much as a wall through the cell */
     uint8_t normal[2];  /* octahedral, of both sides */
@@ -18,11 +18,25 @@ typedef struct strl_splat {
 } strl_splat;
 
 /* First byte of such a payload; that of a mesh's is 1. */
-#define STRL_BRICK_VERSION 2u
+#define STRL_BRICK_VERSION 3u
 #define STRL_BRICK_LEVELS 22u
 #define STRL_BRICK_SPLATS 4096u
+/* Of a cell: a 32nd of it is what 32 bits can say. */
+#define STRL_SPLAT_MOST_SIDE 36u
 
-/* Triangles that follow each other in the mesh and are of one level. */
+/* Centres are stored in units of 2^this, a 32nd of the cell's side. */
+static inline unsigned strl_splat_shift(unsigned side)
+{
+    return side > 5 ? side - 5 : 0;
+}
+/* A centre's coordinate as it is stored: the middle of its unit. */
+static inline int32_t strl_splat_place(int32_t centre, unsigned side)
+{
+    unsigned shift = strl_splat_shift(side);
+    return shift ? (int32_t)((int64_t)(centre >> shift) * ((int64_t)1 << shift) + ((int64_t)1 << (shift - 1))) : centre;
+}
+
+/* Triangles that follow each other in the mesh and are of one level; the next run's is another one. */
 typedef struct strl_brick_run {
     uint32_t level, count;
 } strl_brick_run;
@@ -44,7 +58,7 @@ static inline uint32_t strl_brick_splats(const strl_brick_head *head)
 }
 
 /* Appends it. */
-void strl_brick_head_write(const strl_brick_head *head, strl_writer *writer);
+strl_status strl_brick_head_write(const strl_brick_head *head, strl_writer *writer, strl_error *err);
 /* *bytes: its length; the mesh's payload follows. Arrays come from arena. triangles: of the mesh, which runs must sum up to. */
 strl_status strl_brick_head_read(const void *data, size_t size, uint32_t triangles, strl_arena *arena, strl_brick_head *head,
                                  size_t *bytes, strl_error *err);

@@ -1,16 +1,26 @@
 /* Heads of bricks: docs/format-payload.md, "Bricks". */
+#include <inttypes.h>
 #include <math.h>
 
-#include "base/cursor.h"
 #include "base/fail.h"
-#include "verify/mesh.h"
+#include "verify/payload.h"
 
-#define VERSION 2u
+#define VERSION 3u
 #define MOST_LEVELS 22u
 #define MOST_SPLATS 4096u
-#define SPLAT_BYTES 21u
-#define RUN_BYTES 3u
-#define MOST_SIDE 62u
+#define MOST_SIDE 36u
+
+enum brick_stream {
+    SIDE = 0,
+    CENTRE,
+    COVERAGE,
+    NORMAL,
+    PARALLEL,
+    COLOUR,
+    LEVEL = 9,
+    COUNT,
+    STREAMS = 12
+};
 
 static strl_status check_levels(strl_cursor *cursor, uint32_t levels, const strl__vnode *node, uint32_t *splats, strl_error *err)
 {
@@ -31,50 +41,86 @@ static strl_status check_levels(strl_cursor *cursor, uint32_t levels, const strl
     return STRL_OK;
 }
 
-static strl_status check_splats(strl_cursor *cursor, uint32_t splats, const strl__vnode *node, strl_error *err)
+static strl_status read_streams(strl__v_payload *self, const uint8_t *bytes, size_t size)
 {
-    for (uint32_t i = 0; i < splats && !cursor->failed; i++) {
-        for (unsigned k = 0; k < 3; k++) {
-            int64_t at = node->anchor[k] + (int32_t)strl_cursor_u32(cursor);
-            if (!cursor->failed && (at < node->box[0][k] || at > node->box[1][k]))
-                return strl__fail(err, STRL_ERR_FORMAT, "splat %u is at %lld on axis %u, outside its node's box", i, (long long)at, k);
-        }
-        uint32_t side = strl_cursor_u8(cursor);
-        strl_cursor_take(cursor, SPLAT_BYTES - 13);
+    strl_cursor cursor = strl_cursor_make(bytes, size);
+    self->words = strl_cursor_u32(&cursor);
+    for (unsigned i = 0; i < 4; i++)
+        self->coder[i] = strl_cursor_u32(&cursor);
+    if (cursor.failed)
+        return strl__fail(self->err, STRL_ERR_FORMAT, "a brick's streams of %zu bytes end within their first 20", size);
+    return strl__v_payload_streams(self, &cursor, size, STREAMS);
+}
+
+/* Where the middle of so many units of 2^shift lies; the number of units is 32 bits. */
+static int64_t middle(int32_t units, unsigned shift)
+{
+    int64_t unit = (int64_t)1 << shift;
+    return units * unit + unit / 2;
+}
+
+static strl_status check_splats(strl__v_payload *self, uint32_t splats, const strl__vnode *node)
+{
+    int64_t centre[3] = {0};
+    uint32_t side = 0;
+    for (uint32_t i = 0; i < splats; i++) {
+        side = (side + strl__v_residual(self, SIDE)) % 256;
         if (side > MOST_SIDE)
-            return strl__fail(err, STRL_ERR_FORMAT, "splat %u has a side of 2^%u lattice units", i, side);
+            return strl__fail(self->err, STRL_ERR_FORMAT, "splat %u has a side of 2^%u lattice units", i, side);
+        unsigned shift = side < 5 ? 0 : side - 5;
+        for (unsigned k = 0; k < 3; k++) {
+            int32_t units = (int32_t)((uint32_t)(centre[k] >> shift) + strl__v_residual(self, CENTRE));
+            centre[k] = middle(units, shift);
+            int64_t at = node->anchor[k] + centre[k];
+            if (centre[k] != (int32_t)centre[k] || at < node->box[0][k] || at > node->box[1][k])
+                return strl__fail(self->err, STRL_ERR_FORMAT, "splat %u is at %" PRId64 " on axis %u, outside its node's box", i, at, k);
+        }
+        strl__v_pull(self, COVERAGE);
+        strl__v_pull(self, PARALLEL);
+        for (unsigned k = 0; k < 2; k++)
+            strl__v_pull(self, NORMAL);
+        for (unsigned k = 0; k < 4; k++)
+            strl__v_pull(self, COLOUR + k);
     }
     return STRL_OK;
 }
 
-static strl_status check_runs(strl_cursor *cursor, uint32_t runs, uint32_t levels, const strl__vnode *node, strl_error *err)
+static strl_status check_runs(strl__v_payload *self, uint32_t levels, const strl__vnode *node)
 {
-    uint64_t sum = 0;
-    for (uint32_t i = 0; i < runs && !cursor->failed; i++) {
-        uint32_t level = strl_cursor_u8(cursor), count = strl_cursor_u16(cursor);
-        sum += count;
-        if (level > levels || (count == 0 && !cursor->failed))
-            return strl__fail(err, STRL_ERR_FORMAT, "run %u has %u triangles of level %u of %u", i, count, level, levels);
+    uint64_t sum = 0, before = levels + 1; /* of none */
+    uint32_t runs = self->stream[LEVEL].count;
+    for (uint32_t i = 0; i < runs; i++) {
+        uint64_t up = strl__v_pull(self, LEVEL);
+        if (i > 0 && up >= before)
+            up++;
+        if (up > levels)
+            return strl__fail(self->err, STRL_ERR_FORMAT, "run %u is of a level %" PRIu64 " above the finest of %u", i, up, levels);
+        sum += (uint64_t)1 + strl__v_pull(self, up == 0 ? COUNT : COUNT + 1);
+        before = up;
     }
-    if (!cursor->failed && sum != node->triangle_count)
-        return strl__fail(err, STRL_ERR_FORMAT, "its runs have %llu triangles, its record says %u", (unsigned long long)sum,
+    if (sum != node->triangle_count)
+        return strl__fail(self->err, STRL_ERR_FORMAT, "its runs have %" PRIu64 " triangles, its record says %u", sum,
                           node->triangle_count);
     return STRL_OK;
 }
 
-strl_status strl__v_brick_check(const uint8_t *payload, const strl__vnode *node, size_t *bytes, strl_error *err)
+strl_status strl__v_brick_check(const uint8_t *payload, const strl__vnode *node, strl_arena *arena, size_t *bytes, strl_error *err)
 {
     strl_cursor cursor = strl_cursor_make(payload, node->payload_bytes);
-    uint32_t version = strl_cursor_u8(&cursor), levels = strl_cursor_u8(&cursor), runs = strl_cursor_u32(&cursor), splats;
+    strl__v_payload self = {.arena = arena, .err = err};
+    uint32_t version = strl_cursor_u8(&cursor), levels = strl_cursor_u8(&cursor), coded = strl_cursor_u32(&cursor), splats;
     if (!cursor.failed && (version != VERSION || levels < 1 || levels > MOST_LEVELS))
         return strl__fail(err, STRL_ERR_FORMAT, "a brick of version %u with %u levels", version, levels);
     strl_status status = check_levels(&cursor, levels, node, &splats, err);
-    if (status == STRL_OK)
-        status = check_splats(&cursor, splats, node, err);
-    if (status == STRL_OK)
-        status = check_runs(&cursor, runs, levels, node, err);
-    if (status == STRL_OK && cursor.failed)
+    const uint8_t *streams = strl_cursor_take(&cursor, coded);
+    if (status == STRL_OK && !streams)
         status = strl__fail(err, STRL_ERR_FORMAT, "the payload of %u bytes ends within the head of a brick", node->payload_bytes);
+    if (status == STRL_OK)
+        status = read_streams(&self, streams, coded);
+    if (status == STRL_OK)
+        status = check_splats(&self, splats, node);
+    if (status == STRL_OK)
+        status = check_runs(&self, levels, node);
     *bytes = cursor.at;
-    return status;
+    return status == STRL_OK ? strl__v_payload_ends(&self) : status;
 }

@@ -34,7 +34,7 @@ static strl_status decode_one(const strl__vnode *node, const uint8_t *bytes, boo
             told.offset[k] = (uint32_t)((uint64_t)parent->anchor[k] - (uint64_t)node->anchor[k]);
     }
     size_t head = 0;
-    strl_status status = node->rung == 4 ? strl__v_brick_check(bytes, node, &head, err) : STRL_OK;
+    strl_status status = node->rung == 4 ? strl__v_brick_check(bytes, node, arena, &head, err) : STRL_OK;
     if (status == STRL_OK)
         status = strl__v_payload_decode(bytes + head, node->payload_bytes - head, parent ? &told : NULL, arena, with_looks, mesh, err);
     if (status == STRL_OK)

@@ -35,8 +35,9 @@ typedef struct strl__v_told {
 
 /* docs/format-payload.md. STRL_ERR_FORMAT with a sentence where the bytes are not a payload; the arrays live in
  * arena. told: NULL = self-contained. Without with_looks normals and colours are not decoded, and zero. */
-/* What stands before the mesh in a payload of a sample tree (docs/format-payload.md, "Bricks"). *bytes: its length. */
-strl_status strl__v_brick_check(const uint8_t *payload, const strl__vnode *node, size_t *bytes, strl_error *err);
+/* What stands before the mesh in a payload of a sample tree (docs/format-payload.md, "Bricks"). *bytes: its length. Its streams
+ * live in arena. */
+strl_status strl__v_brick_check(const uint8_t *payload, const strl__vnode *node, strl_arena *arena, size_t *bytes, strl_error *err);
 strl_status strl__v_payload_decode(const uint8_t *data, size_t size, const strl__v_told *told, strl_arena *arena,
                                    bool with_looks, strl__vmesh *mesh, strl_error *err);
 

@@ -99,7 +99,7 @@ static strl_status reserve(strl__v_payload *self)
     return STRL_OK;
 }
 
-static strl_status check_ends(const strl__v_payload *self)
+strl_status strl__v_payload_ends(const strl__v_payload *self)
 {
     if (self->starved)
         return strl__fail(self->err, STRL_ERR_FORMAT, "the payload has too few values in a stream");
@@ -123,7 +123,7 @@ strl_status strl__v_payload_decode(const uint8_t *data, size_t size, const strl_
     strl_status status = read_head(&self, &cursor);
     /* The streams come first: they bound the counts by the payload's size before anything is reserved for them. */
     if (status == STRL_OK)
-        status = strl__v_payload_streams(&self, &cursor, size);
+        status = strl__v_payload_streams(&self, &cursor, size, self.flags & 8 ? STRL__V_STREAMS : STRL__V_TEXCOORD);
     if (status == STRL_OK)
         status = reserve(&self);
     if (status == STRL_OK)
@@ -134,5 +134,5 @@ strl_status strl__v_payload_decode(const uint8_t *data, size_t size, const strl_
         status = strl__v_payload_steps(&self);
     if (status == STRL_OK)
         status = strl__v_payload_attributes(&self, with_looks);
-    return status == STRL_OK ? check_ends(&self) : status;
+    return status == STRL_OK ? strl__v_payload_ends(&self) : status;
 }

@@ -57,8 +57,9 @@ typedef struct strl__v_payload {
     uint16_t *from;  /* [Vb] */
 } strl__v_payload;
 
-/* All fail with STRL_ERR_FORMAT and a sentence, or STRL_ERR_MEMORY. bytes: what follows the head. */
-strl_status strl__v_payload_streams(strl__v_payload *self, strl_cursor *cursor, size_t payload_bytes);
+/* All fail with STRL_ERR_FORMAT and a sentence, or STRL_ERR_MEMORY. */
+/* All that is left of cursor, behind the words' number and the states; payload_bytes: with what stands before. */
+strl_status strl__v_payload_streams(strl__v_payload *self, strl_cursor *cursor, size_t payload_bytes, unsigned stream_count);
 strl_status strl__v_payload_copies(strl__v_payload *self);
 strl_status strl__v_payload_base(strl__v_payload *self);
 strl_status strl__v_payload_steps(strl__v_payload *self);
@@ -73,6 +74,9 @@ static inline uint32_t strl__v_pull(strl__v_payload *self, unsigned number)
     self->starved = true;
     return 0;
 }
+
+/* A value was asked for that is not there, or one that is was not. */
+strl_status strl__v_payload_ends(const strl__v_payload *self);
 
 /* A residual, modulo 2^32. */
 static inline uint32_t strl__v_residual(strl__v_payload *self, unsigned number)

@@ -124,14 +124,14 @@ static bool ended(const rans_coder *coder, size_t payload_bytes, uint64_t items)
     return good && (there == used || items > ITEMS_A_BYTE * (uint64_t)(payload_bytes - 1));
 }
 
-static strl_status read_streams(strl__v_payload *self, rans_coder *coder, size_t payload_bytes)
+static strl_status read_streams(strl__v_payload *self, rans_coder *coder, size_t payload_bytes, unsigned stream_count)
 {
     uint64_t items = (uint64_t)self->vertices + self->triangles + self->entries,
              most = ITEMS_A_BYTE * (uint64_t)payload_bytes;
     if (items > most)
         return strl__fail(self->err, STRL_ERR_FORMAT, "%" PRIu64 " items cannot stand in a payload of %zu bytes", items,
                           payload_bytes);
-    for (unsigned number = 0; number < (self->flags & 8 ? STRL__V_STREAMS : STRL__V_TEXCOORD); number++) {
+    for (unsigned number = 0; number < stream_count; number++) {
         strl_status status = read_stream(self, coder, number, most - items);
         if (status != STRL_OK)
             return status;
@@ -142,7 +142,7 @@ static strl_status read_streams(strl__v_payload *self, rans_coder *coder, size_t
                : strl__fail(self->err, STRL_ERR_FORMAT, "the payload does not end where its streams do");
 }
 
-strl_status strl__v_payload_streams(strl__v_payload *self, strl_cursor *cursor, size_t payload_bytes)
+strl_status strl__v_payload_streams(strl__v_payload *self, strl_cursor *cursor, size_t payload_bytes, unsigned stream_count)
 {
     if (self->words > strl_cursor_left(cursor) / 2)
         return strl__fail(self->err, STRL_ERR_FORMAT, "%" PRIu32 " words do not stand in the payload's last %zu bytes",
@@ -159,5 +159,5 @@ strl_status strl__v_payload_streams(strl__v_payload *self, strl_cursor *cursor, 
     coder->bits = bits;
     coder->bit_end = 8 * (uint64_t)bit_bytes;
     memcpy(coder->state, self->coder, sizeof coder->state);
-    return read_streams(self, coder, payload_bytes);
+    return read_streams(self, coder, payload_bytes, stream_count);
 }

@@ -29,7 +29,7 @@ static void copy_node(strl_container_writer *to, uint32_t id, strl_node record, 
         must(strl_payload_encode(mesh, NULL, &arena, &encoded, NULL, &err), &err);
         record.triangle_count = record.base_triangle_count = mesh->triangle_count;
         brick.run_count = 1;
-        brick.run[0] = (test_brick_run){1, (uint16_t)mesh->triangle_count};
+        brick.run[0] = (test_brick_run){1, mesh->triangle_count};
         brick.bytes = 0;
         payload = encoded.data;
         size = encoded.size;

@@ -54,7 +54,7 @@ static void check_record(const built_model *model, uint32_t id)
 
 static void check_levels(const test_brick *brick, const strl_node *node)
 {
-    assert_int_equal(brick->version, 2);
+    assert_int_equal(brick->version, 3);
     assert_true(brick->level_count >= 1 && brick->level_count <= 22);
     for (uint32_t i = 0; i < brick->level_count; i++) {
         assert_true(isfinite(brick->level[i].size) && brick->level[i].size >= 0);
@@ -66,7 +66,7 @@ static void check_levels(const test_brick *brick, const strl_node *node)
 static void check_splats(const test_brick *brick, const strl_node *node)
 {
     for (uint32_t i = 0; i < brick->splat_count; i++) {
-        assert_true(brick->splat[i].side <= 62);
+        assert_true(brick->splat[i].side <= 36);
         for (int k = 0; k < 3; k++) {
             int64_t at = node->anchor[k] + brick->splat[i].centre[k];
             if (at < node->box_min[k] || at > node->box_max[k])
@@ -86,6 +86,7 @@ static void check_brick(const built_model *model, const uint8_t *file, size_t si
     check_splats(&brick, node);
     for (uint32_t i = 0; i < brick.run_count; i++) {
         assert_true(brick.run[i].level <= brick.level_count && brick.run[i].count >= 1);
+        assert_true(i == 0 || brick.run[i].level != brick.run[i - 1].level);
         sum += brick.run[i].count;
     }
     assert_int_equal(sum, node->triangle_count);

@@ -1,10 +1,12 @@
 #include "build/samples/brick.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "base/fail.h"
 #include "base/hash.h"
+#include "build/ingest/buckets.h"
 #include "geometry/colour.h"
 #include "geometry/octahedral.h"
 #include "geometry/payload.h"
@@ -181,23 +183,40 @@ static uint32_t splat_colour(const strl_splat_sums *sums)
     return rgba;
 }
 
-static strl_splat make_splat(const strl_octree *octree, const strl_octant *octant, const int64_t anchor[3])
+static int encode_line(const double normal[3], float sign, const uint8_t near[2], uint8_t line[2])
+{
+    uint16_t code[2];
+    int distance = 0;
+    strl_oct_encode((const float[3]){sign * (float)normal[0], sign * (float)normal[1], sign * (float)normal[2]}, code);
+    for (int k = 0; k < 2; k++) {
+        line[k] = (uint8_t)((code[k] * 255u + STRL_OCT_MAX / 2) / STRL_OCT_MAX);
+        distance += abs((int8_t)(uint8_t)(line[k] - near[k]));
+    }
+    return distance;
+}
+
+/* The sign means nothing: what costs less behind the splat before. */
+static void set_line(const double normal[3], const uint8_t near[2], uint8_t line[2])
+{
+    uint8_t other[2];
+    if (encode_line(normal, -1, near, other) < encode_line(normal, 1, near, line))
+        memcpy(line, other, sizeof other);
+}
+
+static strl_splat make_splat(const strl_octree *octree, const strl_octant *octant, const int64_t anchor[3], const uint8_t near[2])
 {
     const strl_splat_sums *sums = &octant->sums;
     double side = strl_octree_side(octree->ingest, octant->depth), length = 0;
     strl_splat splat = {.side = (uint8_t)(octree->ingest->curve_shift + STRL_OCTREE_DEPTH - octant->depth), .rgba = UINT32_MAX};
-    if (!(sums->area > 0))
-        return splat;
-    float normal[3];
-    uint16_t code[2];
+    bool has_area = sums->area > 0;
     for (int k = 0; k < 3; k++) {
-        splat.centre[k] = (int32_t)lrint(sums->centre[k] / sums->area - (double)anchor[k]);
+        double centre = has_area ? sums->centre[k] / sums->area - (double)anchor[k] : 0;
+        splat.centre[k] = strl_splat_place((int32_t)lrint(centre), splat.side);
         length += sums->normal[k] * sums->normal[k];
-        normal[k] = (float)sums->normal[k];
     }
-    strl_oct_encode(normal, code);
-    splat.normal[0] = (uint8_t)((code[0] * 255u + STRL_OCT_MAX / 2) / STRL_OCT_MAX);
-    splat.normal[1] = (uint8_t)((code[1] * 255u + STRL_OCT_MAX / 2) / STRL_OCT_MAX);
+    if (!has_area)
+        return splat;
+    set_line(sums->normal, near, splat.normal);
     splat.parallel = to_byte(sqrt(length) / sums->area);
     splat.coverage = to_byte(sums->area / (side * side));
     splat.rgba = splat_colour(sums);
@@ -238,17 +257,13 @@ static strl_status set_runs(const brick_content *content, const strl_payload_ord
 }
 
 /* What a splat stands for may have moved up as a whole: the box of the brick's own triangles need not have it. */
-static void widen_box(const brick_content *content, const strl_octree *octree, strl_node *record)
+static void widen_box(const strl_brick_head *head, strl_node *record)
 {
-    for (uint32_t s = 0; s < content->level_count; s++)
-        for (uint32_t i = 0; i < content->cell_count[s]; i++) {
-            const strl_octant *cell = &octree->octant[content->cell[s][i]];
-            int64_t centre[3];
-            find_centre(octree, cell, centre);
-            for (int k = 0; k < 3; k++) {
-                record->box_min[k] = centre[k] < record->box_min[k] ? centre[k] : record->box_min[k];
-                record->box_max[k] = centre[k] + 1 > record->box_max[k] ? centre[k] + 1 : record->box_max[k];
-            }
+    for (uint32_t i = 0; i < strl_brick_splats(head); i++)
+        for (int k = 0; k < 3; k++) {
+            int64_t at = record->anchor[k] + head->splat[i].centre[k];
+            record->box_min[k] = at < record->box_min[k] ? at : record->box_min[k];
+            record->box_max[k] = at > record->box_max[k] ? at : record->box_max[k];
         }
 }
 
@@ -264,8 +279,9 @@ static strl_status set_splats(const strl_octree *octree, const brick_content *co
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %u splats", count);
     count = 0;
     for (uint32_t s = 0; s < content->level_count; s++) {
-        for (uint32_t i = 0; i < content->cell_count[s]; i++)
-            head->splat[count++] = make_splat(octree, &octree->octant[content->cell[s][i]], anchor);
+        for (uint32_t i = 0; i < content->cell_count[s]; i++, count++)
+            head->splat[count] = make_splat(octree, &octree->octant[content->cell[s][i]], anchor,
+                                            count ? head->splat[count - 1].normal : (const uint8_t[2]){0});
         head->splat_end[s] = count;
         head->error[s] = content->size[s];
     }
@@ -284,8 +300,9 @@ static strl_status encode(strl_brick_set *set, const strl_pm *pm, const brick_co
                              : strl__fail(err, STRL_ERR_MEMORY, "no memory for a brick of %u triangles", content->count);
     if (!status)
         status = set_runs(content, &order, arena, head, err);
+    if (!status)
+        status = strl_brick_head_write(head, &set->bytes, err);
     if (!status) {
-        strl_brick_head_write(head, &set->bytes);
         strl_writer_bytes(&set->bytes, mesh.data, mesh.size);
         brick->payload_bytes = (uint32_t)(set->bytes.size - brick->payload_at);
         if (set->bytes.failed)
@@ -311,6 +328,22 @@ static strl_brick start_brick(const strl_brick_set *set, uint32_t parent)
     return (strl_brick){.parent = parent, .depth = parent == STRL_NO_BRICK ? 0 : set->brick[parent].depth + 1, .chunk = STRL_NO_CHUNK};
 }
 
+/* Along the curve, whatever the level: what lies side by side is told by each other. */
+static bool sort_triangles(const strl_octree *octree, const brick_content *content, strl_arena *arena)
+{
+    strl_keyed *keys = strl_arena_alloc(arena, content->count, sizeof *keys), *other = strl_arena_alloc(arena, content->count, sizeof *keys);
+    if (!keys || !other)
+        return false;
+    for (uint32_t i = 0; i < content->count; i++)
+        keys[i] = (strl_keyed){octree->key[content->triangle[i]], (uint64_t)content->triangle[i] << 8 | content->level[i]};
+    strl__sort_keys(keys, other, content->count);
+    for (uint32_t i = 0; i < content->count; i++) {
+        content->triangle[i] = (uint32_t)(keys[i].index >> 8);
+        content->level[i] = (uint8_t)keys[i].index;
+    }
+    return true;
+}
+
 static strl_status add_brick(strl_brick_set *set, const strl_octree *octree, const brick_content *content, uint32_t parent,
                              strl_arena *arena, uint32_t *index, strl_error *err)
 {
@@ -320,8 +353,9 @@ static strl_status add_brick(strl_brick_set *set, const strl_octree *octree, con
     int64_t alone[3] = {0};
     welding weld = {.octree = octree, .content = content};
     strl_pm pm;
-    strl_status status = weld_all(&weld, arena) ? STRL_OK
-                                                : strl__fail(err, STRL_ERR_MEMORY, "no memory for a brick of %u triangles", content->count);
+    strl_status status = sort_triangles(octree, content, arena) && weld_all(&weld, arena)
+                             ? STRL_OK
+                             : strl__fail(err, STRL_ERR_MEMORY, "no memory for a brick of %u triangles", content->count);
     if (!status) {
         if (content->cell_count[0])
             find_centre(octree, &octree->octant[content->cell[0][0]], alone);
@@ -330,11 +364,11 @@ static strl_status add_brick(strl_brick_set *set, const strl_octree *octree, con
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a brick of %u triangles", content->count);
     }
     if (!status)
-        widen_box(content, octree, &brick.record);
-    if (!status)
         status = set_splats(octree, content, brick.record.anchor, arena, &head, err);
-    if (!status)
+    if (!status) {
+        widen_box(&head, &brick.record);
         status = encode(set, &pm, content, &head, &brick, arena, err);
+    }
     strl_node *record = &brick.record;
     record->vertex_count = record->base_vertex_count = weld.vertices;
     record->triangle_count = record->base_triangle_count = content->count;
