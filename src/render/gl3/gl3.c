@@ -196,7 +196,7 @@ static strl_status draw_item(gl3_draw *draw, const strl_draw_item *item, const s
     bool lines = drawn_as_lines(draw, item);
     uint32_t copies = lines ? 2 : 1;
     glDrawElements(points ? GL_POINTS : lines ? GL_LINES : GL_TRIANGLES, (GLsizei)(copies * item->draw_count), GL_UNSIGNED_SHORT,
-                   (const char *)0 + copies * item->draw_first * sizeof(uint16_t));
+                   (const void *)(uintptr_t)(copies * item->draw_first * sizeof(uint16_t)));
     draw->stats->triangles += points ? 0 : item->draw_count / 3;
     draw->stats->items++;
     draw->stats->draws++;
