@@ -45,14 +45,32 @@ static unsigned size_of(double px)
     return size;
 }
 
+static double depth_of(const strl_view *view, const double point[3])
+{
+    double depth = 0;
+    for (int k = 0; k < 3; k++)
+        depth += (point[k] - view->eye[k]) * view->forward[k];
+    return depth;
+}
+
+/* Where the point is drawn; its depth is not above 0 where it can't be. Where the middle of a box is behind the eye, what is missing
+ * of it is before the eye all the same. */
+static double find_place(const strl_view *view, const strl_box *box, bool is_missing, double place[3])
+{
+    for (int k = 0; k < 3; k++)
+        place[k] = box->min[k] + (box->max[k] - box->min[k]) / 2;
+    double depth = depth_of(view, place), ahead = diagonal(box) / 2;
+    if (!is_missing || depth > 0)
+        return depth;
+    for (int k = 0; k < 3; k++)
+        place[k] = fmin(fmax(view->eye[k] + ahead * view->forward[k], box->min[k]), box->max[k]);
+    return depth_of(view, place);
+}
+
 strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far, double px, bool is_missing,
                            strl_error *err)
 {
-    double depth = 0, least, largest, centre[3], step = lattice_step(walk);
-    for (int k = 0; k < 3; k++) {
-        centre[k] = box->min[k] + (box->max[k] - box->min[k]) / 2;
-        depth += (centre[k] - cut->view->eye[k]) * cut->view->forward[k];
-    }
+    double least, largest, place[3], step = lattice_step(walk), depth = find_place(cut->view, box, is_missing, place);
     if (!(px > 0) || !(depth > 0) || !(far->area > 0)) /* not in the image, or nothing */
         return STRL_OK;
     double scale = cut->view->focal_px / (cut->view->orthographic ? 1 : depth);
@@ -64,7 +82,7 @@ strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box
     strl_vertex *point = &points->items[points->count++];
     double opacity = fmin(1, (double)far->area / 2 * scale * scale / (side * side)); /* a face is seen with half its area on average */
     for (int k = 0; k < 3; k++)
-        point->position[k] = (int32_t)lrint((centre[k] - walk->bounds[k]) / step);
+        point->position[k] = (int32_t)lrint((place[k] - walk->bounds[k]) / step);
     for (int k = 0; k < 2; k++)
         point->normal[k] = far->normal[k];
     for (unsigned k = 0; k < 3; k++)
