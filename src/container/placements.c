@@ -80,9 +80,10 @@ static strl_status decode_run(const strl_container *container, uint32_t run, con
     facts->page.offset = strl_cursor_u64(&in);
     facts->page.checksum = strl_cursor_u64(&in);
     uint32_t expected = 4 + placements_of(container, run) * (4 + STRL__PLACEMENT_BYTES);
-    if (in.failed || strl_cursor_left(&in) || !is_box(facts))
-        return strl__fail(err, STRL_ERR_FORMAT, "run %" PRIu32 ": %" PRIu32 " bytes, expected %u with a finite box, min <= max", run,
-                          bytes, STRL__RUN_BYTES);
+    if (in.failed || strl_cursor_left(&in))
+        return strl__fail(err, STRL_ERR_FORMAT, "run %" PRIu32 ": %" PRIu32 " bytes, expected %u", run, bytes, STRL__RUN_BYTES);
+    if (!is_box(facts))
+        return strl__fail(err, STRL_ERR_FORMAT, "run %" PRIu32 ": its box is not finite, or a min is above its max", run);
     if (!(facts->far.area >= 0) || !isfinite(facts->far.area) || facts->far.normal[0] > STRL_OCT_MAX ||
         facts->far.normal[1] > STRL_OCT_MAX)
         return strl__fail(err, STRL_ERR_FORMAT, "run %" PRIu32 ": its area is %g, its normal %u %u, expected finite, >= 0, and at most %d",

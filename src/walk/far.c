@@ -82,7 +82,7 @@ strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box
     strl_vertex *point = &points->items[points->count++];
     double opacity = fmin(1, (double)far->area / 2 * scale * scale / (side * side)); /* a face is seen with half its area on average */
     for (int k = 0; k < 3; k++)
-        point->position[k] = (int32_t)lrint((place[k] - walk->bounds[k]) / step);
+        point->position[k] = (int32_t)lrint(fmin(fmax((place[k] - walk->bounds[k]) / step, 0), LATTICE));
     for (int k = 0; k < 2; k++)
         point->normal[k] = far->normal[k];
     for (unsigned k = 0; k < 3; k++)
