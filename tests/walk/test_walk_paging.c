@@ -10,6 +10,7 @@
 
 #include "base/memory.h"
 #include "build/built.h"
+#include "container/reseal.h"
 #include "scenes/scene.h"
 #include "walk/internal.h"
 #include "walk/walk_checks.h"
@@ -22,17 +23,22 @@ static uint8_t *bytes;
 static size_t size;
 static double width; /* of the array, which lies in x and -z */
 
-static int make_model(void **state)
+static uint8_t *make_array(uint64_t copies, size_t *file_bytes)
 {
     strl_error err = {0};
+    const strl_scene_desc scene = {.name = "array", .path = built_path("many.gltf"), .of = built_path("one.ply"), .copies = copies};
+    if (strl_scene_write(&scene, NULL, NULL, &err) != STRL_OK)
+        fail_msg("%s", err.message);
+    assert_int_equal(built_build_one(built_path("many.gltf"), built_path("many.stroll")).placements, copies);
+    return built_read_file(built_path("many.stroll"), file_bytes);
+}
+
+static int make_model(void **state)
+{
     if (built_setup(state) != 0)
         return -1;
     built_scene("isosurface", "one.ply", 2000, true);
-    const strl_scene_desc scene = {.name = "array", .path = built_path("many.gltf"), .of = built_path("one.ply"), .copies = COPIES};
-    if (strl_scene_write(&scene, NULL, NULL, &err) != STRL_OK)
-        fail_msg("%s", err.message);
-    assert_int_equal(built_build_one(built_path("many.gltf"), built_path("many.stroll")).placements, COPIES);
-    bytes = built_read_file(built_path("many.stroll"), &size);
+    bytes = make_array(COPIES, &size);
     strl_walk *walk = open_walk(memory_source(bytes, size), NULL);
     double bounds[6];
     strl_walk_bounds(walk, bounds);
@@ -295,6 +301,66 @@ static void what_is_no_longer_wanted_gives_its_room_back(void **state)
     strl_walk_close(walk);
 }
 
+/* ---- hostile files */
+
+/* Some bytes of placements and runs, and of the index pages and the header that lead to them, under right checksums. */
+static void damage_placements(uint8_t *data, size_t data_bytes, uint64_t *random)
+{
+    unsigned damages = 1 + (unsigned)(next_random(random) * 3);
+    for (unsigned i = 0; i < damages; i++) {
+        bool runs = next_random(random) < 0.5;
+        uint64_t section = STRL__AT_SECTIONS + (runs ? 4 : 1) * (uint64_t)STRL__SECTION_BYTES, start = strl__load_le(data + section + 16, 8);
+        uint64_t length = strl__load_le(data + section + 24, 4);
+        if (!runs && next_random(random) < 0.8) { /* a page of placements; each run tells where one is */
+            uint64_t leaf = strl__load_le(data + STRL__AT_SECTIONS + 4 * STRL__SECTION_BYTES + 16, 8);
+            uint64_t run = leaf <= data_bytes - 400 ? leaf + 16 + 80 * (uint64_t)(next_random(random) * 3) : 0;
+            start = run ? strl__load_le(data + run + 64, 8) : start;
+            length = 4 + 108 * STRL_RUN_PLACEMENTS;
+        }
+        if (next_random(random) < 0.1)
+            start = section, length = STRL__SECTION_BYTES;
+        uint64_t at = start + (uint64_t)(next_random(random) * (double)length);
+        if (at < data_bytes)
+            data[at] = next_random(random) < 0.3 ? 0xff : (uint8_t)(data[at] ^ (1 + (unsigned)(next_random(random) * 255)));
+    }
+    reseal_all(data, data_bytes, NULL, NULL);
+}
+
+static void placements_that_lie_are_refused_or_walked(void **state)
+{
+    (void)state;
+    size_t data_bytes;
+    uint8_t *sound = make_array(3 * STRL_RUN_PLACEMENTS - 5, &data_bytes), *data = malloc(data_bytes);
+    assert_non_null(data);
+    uint64_t random = 5;
+    unsigned opened = 0, faults = 0;
+    for (unsigned round = 0; round < 300; round++) {
+        const strl_walk_desc desc = {.memory_bytes = 4u << 20};
+        const strl_camera cameras[] = {look(0.01, 12, 0.01, 0.02, 0.02), look(0.03, 2 * width, 0.03, 0.04, 0.04)};
+        strl_walk *walk;
+        strl_error err = {0};
+        memcpy(data, sound, data_bytes);
+        damage_placements(data, data_bytes, &random);
+        if (strl_walk_open(memory_source(data, data_bytes), &desc, &walk, &err) != STRL_OK) {
+            assert_true(err.message[0]);
+            continue;
+        }
+        opened++;
+        for (unsigned i = 0; i < 40; i++) {
+            strl_draw_list list;
+            if (strl_walk_frame(walk, &cameras[i / 20], &list, &err) != STRL_OK)
+                fail_msg("%s", err.message);
+            strl_walk_pump(walk, UINT64_MAX);
+            assert_true(strl_walk_get_stats(walk)->resident_bytes <= desc.memory_bytes);
+        }
+        faults += strl_walk_get_stats(walk)->faults > 0;
+        strl_walk_close(walk);
+    }
+    assert_true(opened > 50 && opened < 300 && faults > 5);
+    free(data);
+    free(sound);
+}
+
 static void without_memory_calls_fail_and_the_walk_goes_on(void **state)
 {
     (void)state;
@@ -339,6 +405,7 @@ int main(void)
         cmocka_unit_test(a_page_that_fails_is_a_point_until_it_is_repaired),
         cmocka_unit_test(a_source_that_fails_now_and_then_heals),
         cmocka_unit_test(what_is_no_longer_wanted_gives_its_room_back),
+        cmocka_unit_test(placements_that_lie_are_refused_or_walked),
         cmocka_unit_test(without_memory_calls_fail_and_the_walk_goes_on),
     };
     return cmocka_run_group_tests(tests, make_model, drop_model);
