@@ -177,7 +177,7 @@ static void a_settled_list_is_that_of_a_walk_that_has_read_all(void **state)
 static void the_budget_holds_wherever_the_walk_goes(void **state)
 {
     (void)state;
-    const strl_walk_desc desc = {.memory_bytes = 3u << 20};
+    const strl_walk_desc desc = {.memory_bytes = 5u << 18};
     strl_walk *whole = open_whole(), *walk = open_walk(memory_source(bytes, size), &desc);
     uint8_t *seen = calloc(RUNS, 1);
     assert_non_null(seen);
@@ -257,7 +257,7 @@ static void a_source_that_fails_now_and_then_heals(void **state)
 {
     (void)state;
     strl_source *failing;
-    assert_int_equal(strl_source_open_delayed(memory_source(bytes, size), 0, 3, &failing, NULL), STRL_OK);
+    assert_int_equal(strl_source_open_delayed(memory_source(bytes, size), 0, 2, &failing, NULL), STRL_OK);
     watched_source *source = watched_source_open(failing);
     source->hold_percent = 50;
     strl_walk *walk = open_walk(&source->base, NULL), *whole = open_whole();
