@@ -6,6 +6,7 @@
 #include "../tests/container/reseal.h"
 #include "container/container.h"
 #include "container/cut.h"
+#include "container/treelet.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -59,6 +60,31 @@ static void read_tree(strl_container *container, uint32_t tree, strl_arena *aren
         require(last == 0 || id > last);
 }
 
+/* Where the bytes of a run's page pass, all its placements can be read, or say why not. */
+static void read_runs(strl_container *container)
+{
+    const uint64_t count = strl_container_get_info(container)->placement_count;
+    for (uint32_t run = 0; run < strl_container_run_count(container) && run < MOST_ITEMS; run++) {
+        strl_run facts;
+        if (strl_container_run(container, run, &facts, NULL) != STRL_OK)
+            continue;
+        require(facts.far.area >= 0 && facts.far.normal[0] < 1024 && facts.far.normal[1] < 1024);
+        for (int axis = 0; axis < 3; axis++)
+            require(facts.box_min[axis] <= facts.box_max[axis]);
+        require(facts.page.bytes >= 112 && facts.page.bytes <= STRL__TABLE_PAGE_BYTES);
+        uint8_t *page = malloc(facts.page.bytes);
+        require(page != NULL);
+        if (strl_source_read(strl_container_source(container), facts.page.offset, page, facts.page.bytes, NULL) == STRL_OK &&
+            strl_run_check(container, run, &facts, page, facts.page.bytes, NULL) == STRL_OK)
+            for (uint64_t i = (uint64_t)run * STRL_RUN_PLACEMENTS; i < count && i / STRL_RUN_PLACEMENTS == run; i++) {
+                strl_placement placement;
+                if (strl_run_placement(container, i, page, &placement, NULL) == STRL_OK)
+                    require(placement.tree < strl_container_get_info(container)->tree_count);
+            }
+        free(page);
+    }
+}
+
 static void read_all(const uint8_t *data, size_t size)
 {
     strl_source *source;
@@ -78,6 +104,7 @@ static void read_all(const uint8_t *data, size_t size)
         if (strl_container_placement(container, i, &placement, NULL) == STRL_OK)
             require(placement.tree < info->tree_count);
     }
+    read_runs(container);
     for (uint32_t i = 0; i < info->part_count && i < MOST_ITEMS; i++)
         if (strl_container_part(container, i, name, sizeof name, NULL) == STRL_OK)
             require(strlen(name) < sizeof name);

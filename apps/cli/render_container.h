@@ -3,13 +3,9 @@
 #define STRL_CLI_RENDER_CONTAINER_H
 
 #include "container/container.h"
-#include "frame/view.h"
 #include "render_model.h"
 
 /* Bounds over all placements, up axis and unit. */
-strl_status strl_render_container_facts(strl_container *container, strl_render_model *model, strl_error *err);
-/* The world box round a lattice box. */
-void strl_render_world_box(const strl_tree *tree, const double transform[12], const int64_t box_min[3],
-                           const int64_t box_max[3], strl_box *box);
+void strl_render_container_facts(const strl_container *container, strl_render_model *model);
 
 #endif

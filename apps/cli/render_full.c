@@ -6,6 +6,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "container/cut.h"
+#include "container/treelet.h"
 #include "frame/view.h"
 #include "geometry/colour.h"
 #include "interrupt.h"
@@ -123,7 +124,7 @@ static strl_status draw_placement(full_draw *draw, uint64_t index, strl_error *e
         if (status != STRL_OK)
             return status;
         strl_box box;
-        strl_render_world_box(tree, placement.transform, record.box_min, record.box_max, &box);
+        strl_placed_box(tree, placement.transform, record.box_min, record.box_max, box.min, box.max);
         if (!strl_view_sees(&draw->view, &box)) {
             draw->stats->nodes_culled++;
             continue;
@@ -180,12 +181,11 @@ strl_status strl_render_full_open(const strl_render_model_desc *desc, strl_rende
     self->base.klass = &full_class;
     strl_arena_init(&self->arena, 0);
     strl_status status = strl_location_open_container(&desc->location, &self->container, err);
-    if (status == STRL_OK)
-        status = strl_render_container_facts(self->container, &self->base, err);
     if (status != STRL_OK) {
         full_close(&self->base);
         return status;
     }
+    strl_render_container_facts(self->container, &self->base);
     *model = &self->base;
     return STRL_OK;
 }

@@ -140,7 +140,7 @@ static strl_status open_walk(walk_model *self, const strl_render_model_desc *des
         .memory_bytes = desc->memory_bytes, .error_px = desc->error_px, .splat_px = desc->splat_px, .executor = &self->executor};
     status = strl_walk_open(source, &walk, &self->walk, err);
     if (status == STRL_OK) /* up axis and unit are not the walk's business */
-        status = strl_render_container_facts(strl_walk_container(self->walk), &self->base, err);
+        strl_render_container_facts(strl_walk_container(self->walk), &self->base);
     return status;
 }
 

@@ -4,72 +4,113 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/hash.h"
 #include "base/memory.h"
 #include "build/model.h"
 
 /* As many as fit are put into order at once; where there are more, one such window follows the other. */
 #define SHARES_OF_MEMORY 8u
 #define LEAST_AT_ONCE 4096u
-#define CURVE_BITS 21u
+#define LEAST_BOX 16u /* what a walk has boxes over */
 
-typedef struct placed {
-    strl_placement placement;
+/* Where a placement is. */
+typedef struct spot {
     double centre[3]; /* of the tree's box, in the world */
-    uint64_t key;     /* on the curve */
-    uint64_t index;   /* in the order of the inputs, so that equal keys have an order */
-} placed;
+    uint64_t index;   /* in the window, as the inputs have it, so that equal places have an order */
+} spot;
 
 typedef struct placing {
     strl_build_context *context;
-    placed *items; /* [capacity] */
+    strl_placement *items; /* [capacity] */
+    spot *spots;           /* [capacity] */
     size_t count, capacity;
-    uint64_t total; /* of all windows */
     uint32_t part_base; /* of the parts of the input at hand */
 } placing;
 
-static uint64_t spread(uint64_t bits)
+/* ---- order */
+
+static bool comes_before(const spot *a, const spot *b, unsigned axis)
 {
-    uint64_t key = 0;
-    for (unsigned i = 0; i < CURVE_BITS; i++)
-        key |= (bits >> i & 1) << 3 * i;
-    return key;
+    return a->centre[axis] != b->centre[axis] ? a->centre[axis] < b->centre[axis] : a->index < b->index;
 }
 
-static void set_keys(placing *p)
+static void swap(spot *a, spot *b)
 {
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, extent = 0;
-    for (size_t i = 0; i < p->count; i++)
-        for (unsigned k = 0; k < 3; k++) {
-            low[k] = fmin(low[k], p->items[i].centre[k]);
-            high[k] = fmax(high[k], p->items[i].centre[k]);
+    spot other = *a;
+    *a = *b;
+    *b = other;
+}
+
+/* Puts the first `left` of the items along an axis before the others (Hoare 1961, FIND). */
+static void part(spot *items, size_t count, size_t left, unsigned axis)
+{
+    size_t low = 0, high = count - 1;
+    while (low < high) {
+        const spot pivot = items[low + strl__mix64(low ^ high << 32) % (high - low + 1)]; /* no order of the input is a bad one */
+        size_t i = low, j = high;
+        while (i <= j) {
+            while (comes_before(&items[i], &pivot, axis))
+                i++;
+            while (comes_before(&pivot, &items[j], axis))
+                j--;
+            if (i > j)
+                break;
+            swap(&items[i++], &items[j]);
+            if (j-- == 0)
+                break;
         }
-    for (unsigned k = 0; k < 3; k++)
-        extent = fmax(extent, high[k] - low[k]);
-    for (size_t i = 0; i < p->count; i++) {
-        p->items[i].key = 0;
-        for (unsigned k = 0; k < 3; k++) {
-            double at = extent > 0 && isfinite(extent) ? (p->items[i].centre[k] - low[k]) / extent : 0;
-            p->items[i].key |= spread((uint64_t)(fmin(at, 1) * (double)((1u << CURVE_BITS) - 1))) << k;
-        }
+        if (j != SIZE_MAX && left <= j)
+            high = j;
+        else if (left >= i)
+            low = i;
+        else
+            return;
     }
 }
 
-static int by_key(const void *left, const void *right)
+static unsigned longest_axis(const spot *items, size_t count)
 {
-    const placed *a = left, *b = right;
-    if (a->key != b->key)
-        return a->key < b->key ? -1 : 1;
+    double extent[3];
+    for (unsigned k = 0; k < 3; k++) {
+        double low = items[0].centre[k], high = low;
+        for (size_t i = 1; i < count; i++) {
+            low = fmin(low, items[i].centre[k]);
+            high = fmax(high, items[i].centre[k]);
+        }
+        extent[k] = high - low;
+    }
+    return extent[0] >= extent[1] && extent[0] >= extent[2] ? 0 : extent[1] >= extent[2] ? 1 : 2;
+}
+
+static int by_index(const void *left, const void *right)
+{
+    const spot *a = left, *b = right;
     return a->index < b->index ? -1 : a->index > b->index;
+}
+
+/* Halves them across their longest side, again and again; the first half is a power of two. So every 16, every 512 and so on that
+ * begin at a multiple of their number are what one box of a tree of boxes holds. */
+static void put_in_order(spot *items, size_t count)
+{
+    while (count > LEAST_BOX) {
+        size_t left = LEAST_BOX;
+        while (2 * left < count)
+            left *= 2;
+        part(items, count, left, longest_axis(items, count));
+        put_in_order(items, left);
+        items += left;
+        count -= left;
+    }
+    if (count > 1)
+        qsort(items, count, sizeof *items, by_index);
 }
 
 static strl_status write_window(placing *p, strl_error *err)
 {
     strl_status status = STRL_OK;
-    set_keys(p);
-    if (p->count > 1)
-        qsort(p->items, p->count, sizeof *p->items, by_key);
+    put_in_order(p->spots, p->count);
     for (size_t i = 0; i < p->count && !status; i++)
-        status = strl_container_writer_add_placement(p->context->model->writer, &p->items[i].placement, err);
+        status = strl_container_writer_add_placement(p->context->model->writer, &p->items[p->spots[i].index], err);
     p->count = 0;
     return status ? status : strl__build_report(p->context, 0, 0, err);
 }
@@ -80,12 +121,17 @@ static strl_status add(placing *p, uint32_t tree, uint32_t own_part, const doubl
     const strl_model_tree *facts = &context->model->trees[tree];
     if (facts->triangles == 0)
         return STRL_OK; /* of a tree without a triangle there is nothing to see */
-    placed *item = &p->items[p->count++];
-    *item = (placed){.placement = {.tree = tree, .own_part = own_part}, .index = p->total++};
-    memcpy(item->placement.transform, transform, sizeof item->placement.transform);
-    for (unsigned k = 0; k < 3; k++)
-        item->centre[k] = transform[4 * k] * facts->centre[0] + transform[4 * k + 1] * facts->centre[1] +
-                          transform[4 * k + 2] * facts->centre[2] + transform[4 * k + 3];
+    strl_placement *item = &p->items[p->count];
+    spot *at = &p->spots[p->count];
+    item->tree = tree;
+    item->own_part = own_part;
+    memcpy(item->transform, transform, sizeof item->transform);
+    at->index = p->count++;
+    for (unsigned k = 0; k < 3; k++) {
+        double centre = transform[4 * k] * facts->centre[0] + transform[4 * k + 1] * facts->centre[1] +
+                        transform[4 * k + 2] * facts->centre[2] + transform[4 * k + 3];
+        at->centre[k] = isfinite(centre) ? centre : 0;
+    }
     context->result->placements++;
     if (__builtin_add_overflow(context->result->triangles_placed, facts->triangles, &context->result->triangles_placed))
         context->result->triangles_placed = UINT64_MAX;
@@ -119,10 +165,12 @@ static strl_status place_trees(strl_build_context *context, strl_error *err)
     static const double as_it_is[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     strl_build_model *model = context->model;
     placing p = {.context = context};
-    uint64_t fit = context->memory_bytes / SHARES_OF_MEMORY / sizeof *p.items, all = count_placements(model);
-    p.capacity = (size_t)(all < LEAST_AT_ONCE ? LEAST_AT_ONCE : all < fit ? all : fit);
+    uint64_t fit = context->memory_bytes / SHARES_OF_MEMORY / (sizeof *p.items + sizeof *p.spots), all = count_placements(model);
+    p.capacity = (size_t)(all < LEAST_AT_ONCE ? LEAST_AT_ONCE : all < fit ? all : fit / LEAST_AT_ONCE * LEAST_AT_ONCE);
+    p.capacity = p.capacity < LEAST_AT_ONCE ? LEAST_AT_ONCE : p.capacity;
     p.items = strl__alloc(p.capacity, sizeof *p.items);
-    strl_status status = p.items ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu placements", p.capacity);
+    p.spots = strl__alloc(p.capacity, sizeof *p.spots);
+    strl_status status = p.items && p.spots ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu placements", p.capacity);
     if (!status && model->trees[0].input == STRL_EVERY_INPUT)
         status = add(&p, 0, 0, as_it_is, err);
     for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {
@@ -133,6 +181,7 @@ static strl_status place_trees(strl_build_context *context, strl_error *err)
     if (!status && p.count)
         status = write_window(&p, err);
     strl__free(p.items);
+    strl__free(p.spots);
     return status;
 }
 

@@ -77,6 +77,7 @@ strl_status strl_container_open(strl_source *source, strl_container **container,
     made->parts = (strl__table){.name = "parts", .section = sections[STRL__SECTION_PARTS - 1]};
     made->materials = (strl__table){.name = "materials", .section = sections[STRL__SECTION_MATERIALS - 1]};
     made->images = (strl__table){.name = "images", .section = sections[STRL__SECTION_IMAGES - 1]};
+    made->runs = (strl__table){.name = "runs", .section = sections[STRL__SECTION_RUNS - 1]};
     *container = made;
     return STRL_OK;
 }
@@ -98,6 +99,7 @@ void strl_container_close(strl_container *container)
     strl__page_table_deinit(&container->parts);
     strl__page_table_deinit(&container->materials);
     strl__page_table_deinit(&container->images);
+    strl__page_table_deinit(&container->runs);
     strl__free(container->trees);
     strl__opened_forget_meshes(container);
     strl_source_close(container->source);

@@ -50,12 +50,14 @@ void strl__header_encode(strl__header *header, uint8_t bytes[STRL__HEADER_BYTES]
     strl_writer_u64(&out, info->dropped_points);
     for (int i = 0; i < 6; i++)
         strl_writer_f64(&out, info->bounds[i]);
-    const unsigned sections =
-        header->sections[STRL__SECTION_IMAGES - 1].item_count ? STRL__KNOWN_SECTIONS : STRL__REQUIRED_SECTIONS;
+    unsigned sections = 0;
+    for (unsigned i = 0; i < STRL__KNOWN_SECTIONS; i++)
+        sections += header->sections[i].item_count > 0;
     strl_writer_u32(&out, sections);
     strl_writer_u32(&out, 0);
-    for (unsigned i = 0; i < sections; i++)
-        encode_section(&out, &header->sections[i]);
+    for (unsigned i = 0; i < STRL__KNOWN_SECTIONS; i++)
+        if (header->sections[i].item_count > 0)
+            encode_section(&out, &header->sections[i]);
     compute_model_id(bytes, info->model_id);
     memcpy(bytes + STRL__AT_MODEL_ID, info->model_id, 16);
     strl__store_le(bytes + STRL__AT_CHECKSUM, 8, strl__checksum(bytes, STRL__HEADER_BYTES));
@@ -122,7 +124,7 @@ static strl_status decode_facts(strl_cursor *in, strl_container_info *info, strl
     return STRL_OK;
 }
 
-static const char *const section_names[] = {"trees", "placements", "parts", "materials", "images"};
+static const char *const section_names[] = {"trees", "placements", "parts", "materials", "images", "runs"};
 
 static strl_status check_known_section(const strl__section *section, uint64_t file_bytes, strl_error *err)
 {
@@ -131,6 +133,7 @@ static strl_status check_known_section(const strl__section *section, uint64_t fi
     /* An item of a table takes at least 4 bytes; that bounds what any later count can claim. */
     uint64_t most = !table                                      ? STRL__MAX_TREES
                     : section->kind == STRL__SECTION_PLACEMENTS ? file_bytes / STRL__PLACEMENT_BYTES
+                    : section->kind == STRL__SECTION_RUNS       ? file_bytes / STRL__RUN_BYTES
                     : file_bytes / 4 < STRL_NONE - 1            ? file_bytes / 4
                                                                 : STRL_NONE - 1;
     if (section->item_count < 1 || section->item_count > most)
@@ -148,6 +151,22 @@ static strl_status check_known_section(const strl__section *section, uint64_t fi
     char what[32];
     snprintf(what, sizeof what, "section %s", name);
     return strl__ref_check(&section->ref, file_bytes, what, err);
+}
+
+/* Sections that are there only where others ask for them. */
+static strl_status check_optional(const strl__header *header, strl_error *err)
+{
+    const strl__section *sections = header->sections;
+    const uint64_t images = sections[STRL__SECTION_IMAGES - 1].item_count, materials = sections[STRL__SECTION_MATERIALS - 1].item_count;
+    const uint64_t runs = sections[STRL__SECTION_RUNS - 1].item_count, placements = sections[STRL__SECTION_PLACEMENTS - 1].item_count;
+    const uint64_t of_placements = placements > STRL_RUN_PLACEMENTS ? (placements - 1) / STRL_RUN_PLACEMENTS + 1 : 0;
+    if (images && images != materials)
+        return strl__fail(err, STRL_ERR_FORMAT, "section images: %" PRIu64 " items, expected one for each of %" PRIu64
+                          " materials", images, materials);
+    if (runs != of_placements)
+        return strl__fail(err, STRL_ERR_FORMAT, "section runs: %" PRIu64 " items, expected %" PRIu64 " for %" PRIu64 " placements",
+                          runs, of_placements, placements);
+    return STRL_OK;
 }
 
 static strl_status decode_sections(strl_cursor *in, strl__header *header, strl_error *err)
@@ -184,10 +203,9 @@ static strl_status decode_sections(strl_cursor *in, strl__header *header, strl_e
     if (known != STRL__REQUIRED_SECTIONS)
         return strl__fail(err, STRL_ERR_FORMAT, "header: %" PRIu32 " of the %u required sections are present", known,
                           STRL__REQUIRED_SECTIONS);
-    const uint64_t images = header->sections[STRL__SECTION_IMAGES - 1].item_count;
-    if (images && images != header->sections[STRL__SECTION_MATERIALS - 1].item_count)
-        return strl__fail(err, STRL_ERR_FORMAT, "section images: %" PRIu64 " items, expected one for each of %" PRIu64
-                          " materials", images, header->sections[STRL__SECTION_MATERIALS - 1].item_count);
+    strl_status status = check_optional(header, err);
+    if (status != STRL_OK)
+        return status;
     while (strl_cursor_left(in))
         if (strl_cursor_u8(in))
             return strl__fail(err, STRL_ERR_FORMAT, "header: a reserved byte is not zero");

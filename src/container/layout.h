@@ -30,9 +30,10 @@ enum strl__section_kind {
     STRL__SECTION_PARTS = 3,
     STRL__SECTION_MATERIALS = 4,
     STRL__SECTION_IMAGES = 5, /* only where a material has one */
+    STRL__SECTION_RUNS = 6,   /* only where there are more placements than a run holds */
 };
 #define STRL__REQUIRED_SECTIONS 4u
-#define STRL__KNOWN_SECTIONS 5u
+#define STRL__KNOWN_SECTIONS 6u
 
 #define STRL__TREE_BYTES 144u
 #define STRL__MAX_TREES 512u
@@ -58,6 +59,7 @@ enum strl__section_kind {
 #define STRL__TABLE_MAX_REFS 2040u
 #define STRL__INDEX_HEAD_BYTES 8u
 #define STRL__PLACEMENT_BYTES 104u
+#define STRL__RUN_BYTES 80u
 #define STRL__MATERIAL_HEAD_BYTES 4u
 #define STRL__IMAGE_HEAD_BYTES 20u
 #define STRL__MAX_NAME_BYTES 32000u

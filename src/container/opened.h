@@ -33,7 +33,7 @@ struct strl_container {
     strl_source *source; /* owned */
     strl__header header;
     strl__opened_tree *trees; /* [tree_count], owned */
-    strl__table placements, parts, materials, images;
+    strl__table placements, parts, materials, images, runs;
     strl__cached_treelet cache[STRL__CACHED_TREELETS];
     uint64_t uses;
     uint8_t *page; /* the last page read, owned */

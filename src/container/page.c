@@ -7,6 +7,9 @@
 #include "geometry/payload.h"
 #include "geometry/sample_payload.h"
 
+/* Every mesh within the limits of progressive.h decodes in less. */
+#define MOST_SCRATCH_BYTES ((size_t)64 << 20)
+
 strl_status strl_page_check(const strl_page_ref *ref, const void *data, size_t size, strl_error *err)
 {
     if (size != ref->bytes)
@@ -115,6 +118,20 @@ strl_status strl_page_head(const strl_node *record, const void *page, size_t siz
     const uint8_t *payload;
     size_t bytes;
     return find_payload(record, page, size, arena, &payload, head, &bytes, err);
+}
+
+strl_status strl_page_far(const strl_node *record, const void *page, size_t size, strl_far *far, strl_error *err)
+{
+    strl_arena arena;
+    strl_brick_head head;
+    strl_pm mesh;
+    *far = (strl_far){0};
+    strl_arena_init(&arena, MOST_SCRATCH_BYTES);
+    strl_status status = strl_page_mesh(record, page, size, NULL, &arena, &head, &mesh, err);
+    if (status == STRL_OK)
+        *far = strl_far_of_mesh(&mesh, &head);
+    strl_arena_deinit(&arena);
+    return status;
 }
 
 void strl_page_place(strl_payload_reference *reference, const int64_t anchor[3], const strl_node *record)

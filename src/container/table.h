@@ -25,6 +25,9 @@ bool strl__page_table_writer_begins(const strl__page_table_writer *table, uint32
 /* The item is head followed by body; together at most STRL__MAX_NAME_BYTES + 6. */
 strl_status strl__page_table_writer_add(strl__page_table_writer *table, strl__sink *sink, const void *head,
                                         uint32_t head_bytes, const void *body, uint32_t body_bytes, strl_error *err);
+/* The next item will be its page's first. *page: where what is pending was written; at least one item is. */
+strl_status strl__page_table_writer_end_page(strl__page_table_writer *table, strl__sink *sink, strl_treelet_ref *page,
+                                             strl_error *err);
 /* Writes what is pending; section gets depth, count and root. At least one item was added. */
 strl_status strl__page_table_writer_finish(strl__page_table_writer *table, strl__sink *sink, strl__section *section,
                                            strl_error *err);

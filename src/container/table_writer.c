@@ -98,21 +98,27 @@ static strl_status add_ref(strl__page_table_writer *table, strl__sink *sink, uns
     return STRL_OK;
 }
 
-static strl_status flush_leaf(strl__page_table_writer *table, strl__sink *sink, strl_error *err)
+strl_status strl__page_table_writer_end_page(strl__page_table_writer *table, strl__sink *sink, strl_treelet_ref *page,
+                                             strl_error *err)
 {
     uint32_t ends = table->leaf_count * 4;
     strl__store_le(table->page, 4, table->leaf_count);
     memcpy(table->page + 4, table->ends, ends);
     memcpy(table->page + 4 + ends, table->items, table->leaf_bytes);
-    strl_treelet_ref ref;
-    strl_status status = strl__sink_append(sink, table->page, 4 + ends + table->leaf_bytes, &ref, err);
+    strl_status status = strl__sink_append(sink, table->page, 4 + ends + table->leaf_bytes, page, err);
     if (status == STRL_OK)
-        status = add_ref(table, sink, 0, &ref, table->leaf_first, err);
+        status = add_ref(table, sink, 0, page, table->leaf_first, err);
     if (status != STRL_OK)
         return status;
     table->leaf_first += table->leaf_count;
     table->leaf_count = table->leaf_bytes = 0;
     return STRL_OK;
+}
+
+static strl_status flush_leaf(strl__page_table_writer *table, strl__sink *sink, strl_error *err)
+{
+    strl_treelet_ref page;
+    return strl__page_table_writer_end_page(table, sink, &page, err);
 }
 
 bool strl__page_table_writer_begins(const strl__page_table_writer *table, uint32_t bytes)

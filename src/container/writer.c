@@ -58,6 +58,8 @@ strl_status strl_container_writer_create(const strl_container_writer_desc *desc,
     if (status == STRL_OK)
         status = strl__page_table_writer_create(&made->images, err);
     if (status == STRL_OK)
+        status = strl__page_table_writer_create(&made->runs, err);
+    if (status == STRL_OK)
         status = open_files(made, desc, err);
     if (status != STRL_OK)
         strl_container_writer_destroy(made);
@@ -103,7 +105,11 @@ static strl_status add_placement(strl_container_writer *writer, const strl_place
             return strl__fail(err, STRL_ERR_ARGUMENT, "number %d of a placement's transform is not finite", i);
         strl_writer_f64(&out, placement->transform[i]);
     }
+    strl_status status = writer->run_count == STRL_RUN_PLACEMENTS ? strl__writing_end_run(writer, err) : STRL_OK;
+    if (status != STRL_OK)
+        return status;
     add_bounds(writer, placement);
+    writer->run[writer->run_count++] = *placement;
     return strl__page_table_writer_add(writer->placements, &writer->sink, bytes, sizeof bytes, NULL, 0, err);
 }
 
@@ -250,8 +256,12 @@ static strl_status write_sections(strl_container_writer *writer, strl_error *err
     for (uint32_t i = 0; i < STRL__KNOWN_SECTIONS; i++)
         sections[i] = (strl__section){.kind = i + 1};
     strl__sink *sink = &writer->sink;
-    strl_status status =
-        strl__page_table_writer_finish(writer->placements, sink, &sections[STRL__SECTION_PLACEMENTS - 1], err);
+    bool has_runs = strl__page_table_writer_count(writer->runs) > 0;
+    strl_status status = has_runs ? strl__writing_end_run(writer, err) : STRL_OK;
+    if (status == STRL_OK)
+        status = strl__page_table_writer_finish(writer->placements, sink, &sections[STRL__SECTION_PLACEMENTS - 1], err);
+    if (status == STRL_OK && has_runs)
+        status = strl__page_table_writer_finish(writer->runs, sink, &sections[STRL__SECTION_RUNS - 1], err);
     if (status == STRL_OK)
         status = strl__page_table_writer_finish(writer->parts, sink, &sections[STRL__SECTION_PARTS - 1], err);
     if (status == STRL_OK)
@@ -315,6 +325,7 @@ void strl_container_writer_destroy(strl_container_writer *writer)
     strl__page_table_writer_destroy(writer->parts);
     strl__page_table_writer_destroy(writer->materials);
     strl__page_table_writer_destroy(writer->images);
+    strl__page_table_writer_destroy(writer->runs);
     strl__free(writer->trees);
     strl__free(writer->page.data);
     strl__free(writer->path);

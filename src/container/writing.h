@@ -10,6 +10,8 @@
 typedef struct strl__written_tree {
     strl_tree facts;
     strl_treelet_ref root;
+    bool has_far;
+    strl_far far; /* of the root, read back when the first run needs it */
 } strl__written_tree;
 
 struct strl_container_writer {
@@ -18,7 +20,9 @@ struct strl_container_writer {
     strl__sink sink;
     strl_file *spill; /* node records of the tree at hand, by id; owned */
     strl__header header;
-    strl__page_table_writer *placements, *parts, *materials, *images;
+    strl__page_table_writer *placements, *parts, *materials, *images, *runs;
+    strl_placement run[STRL_RUN_PLACEMENTS]; /* the last ones, of a page that has not ended */
+    uint32_t run_count;
     strl__name last_part, last_material; /* what was added last */
     strl__written_tree *trees; /* [tree_count], owned, up to STRL__MAX_TREES */
     size_t tree_capacity;
@@ -41,5 +45,8 @@ strl_status strl__writing_close_page(strl_container_writer *writer, strl_error *
 /* Reads the spilled records back and writes the treelets, last to first; root: the first one's place. */
 strl_status strl__writing_treelets(strl_container_writer *writer, uint32_t node_count, strl_treelet_ref *root,
                                    strl_error *err);
+
+/* Ends the page of placements and notes what its run looks like. */
+strl_status strl__writing_end_run(strl_container_writer *writer, strl_error *err);
 
 #endif

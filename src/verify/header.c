@@ -84,7 +84,8 @@ static void read_section(strl__model *model, strl_cursor *cursor, uint32_t numbe
                 "header: section %u is of unknown kind %u", number, kind);
     HEADER_RULE(model, depth <= 3 && reserved == 0 && (depth == 0 || (kind != STRL__TREES && kind < STRL__SECTIONS)),
                 "header: section %u of kind %u has depth %u and reserved word %u", number, kind, depth, reserved);
-    HEADER_RULE(model, kind != STRL__IMAGES || section.item_count > 0, "header: the section of images has no item");
+    HEADER_RULE(model, (kind != STRL__IMAGES && kind != STRL__RUNS) || section.item_count > 0,
+                "header: the section of kind %u has no item", kind);
     if (kind > 0 && kind < STRL__SECTIONS)
         model->sections[kind] = section;
     strl__v_place_good(model, &section.place, "header: a section", number);
@@ -93,11 +94,16 @@ static void read_section(strl__model *model, strl_cursor *cursor, uint32_t numbe
 static void check_sections(strl__model *model)
 {
     const strl__section *s = model->sections;
-    const uint64_t least[STRL__SECTIONS] = {0, 1, 1, 1, 1, 0};
-    const uint64_t most[STRL__SECTIONS] = {0, 512, UINT64_MAX, UINT32_MAX - 1, UINT32_MAX - 1, UINT32_MAX - 1};
+    const uint64_t least[STRL__SECTIONS] = {0, 1, 1, 1, 1, 0, 0};
+    const uint64_t most[STRL__SECTIONS] = {0, 512, model->file_bytes / 104, UINT32_MAX - 1, UINT32_MAX - 1, UINT32_MAX - 1,
+                                           model->file_bytes / 80};
+    const uint64_t placements = s[STRL__PLACEMENTS].item_count;
+    const uint64_t runs = placements > STRL__RUN_PLACEMENTS ? (placements - 1) / STRL__RUN_PLACEMENTS + 1 : 0;
     HEADER_RULE(model, s[STRL__IMAGES].item_count == 0 || s[STRL__IMAGES].item_count == s[STRL__MATERIALS].item_count,
                 "header: images of %" PRIu64 " materials, expected of all %" PRIu64, s[STRL__IMAGES].item_count,
                 s[STRL__MATERIALS].item_count);
+    HEADER_RULE(model, s[STRL__RUNS].item_count == runs, "header: %" PRIu64 " runs of %" PRIu64 " placements, expected %" PRIu64,
+                s[STRL__RUNS].item_count, placements, runs);
     for (unsigned kind = STRL__TREES; kind < STRL__SECTIONS; kind++)
         HEADER_RULE(model, s[kind].item_count >= least[kind] && s[kind].item_count <= most[kind],
                     "header: section kind %u has %" PRIu64 " items, expected %" PRIu64 " to %" PRIu64, kind,
@@ -274,5 +280,7 @@ void strl__v_trees_deinit(strl__model *model)
         strl__free(model->trees[t].group_first);
     }
     strl__free(model->trees);
+    strl__free(model->runs);
     model->trees = NULL;
+    model->runs = NULL;
 }

@@ -53,7 +53,16 @@ typedef struct strl__section {
     strl__place place;
 } strl__section;
 
-enum { STRL__TREES = 1, STRL__PLACEMENTS, STRL__PARTS, STRL__MATERIALS, STRL__IMAGES, STRL__SECTIONS };
+enum { STRL__TREES = 1, STRL__PLACEMENTS, STRL__PARTS, STRL__MATERIALS, STRL__IMAGES, STRL__RUNS, STRL__SECTIONS };
+
+#define STRL__RUN_PLACEMENTS 512u
+
+/* What the file says of the placements of one page, and their box as they are read. */
+typedef struct strl__vrun {
+    double box[2][3], found[2][3]; /* min, max; world */
+    float area;
+    strl__place page;
+} strl__vrun;
 
 typedef struct strl__model {
     const strl_verify_desc *desc;
@@ -69,6 +78,8 @@ typedef struct strl__model {
     strl__vtree *trees; /* [tree_count], owned */
     uint32_t tree_count;
     strl__hash128 placements; /* sum of the hashes of all of them */
+    strl__vrun *runs; /* [run_count], owned; NULL where all placements are on one page */
+    uint32_t run_count;
     uint64_t record_bytes; /* held by all trees' arrays */
 } strl__model;
 
@@ -78,6 +89,22 @@ strl_status strl__v_read_trees(strl__model *model, bool *sound, strl_error *err)
 strl_status strl__v_read_tables(strl__model *model, strl_error *err);
 strl_status strl__v_read_records(strl__model *model, strl__vtree *tree, bool *sound, strl_error *err);
 void strl__v_trees_deinit(strl__model *model);
+/* Whether what the file says of the area of each run is that of its placements. All payloads must be sound. */
+strl_status strl__v_check_run_areas(strl__model *model, strl_error *err);
+
+/* runs.c, for the tables: an item of the table of runs; its page of placements as the table's index names it; the box of a placement;
+ * what its placements come to when they have been read. */
+strl_status strl__v_runs_create(strl__model *model, strl_error *err);
+void strl__v_run_read(strl__model *model, uint64_t run, const uint8_t *bytes, size_t size);
+void strl__v_run_page(strl__model *model, uint64_t first, uint64_t count, const strl__place *place);
+void strl__v_run_placement(strl__model *model, uint64_t item, const double low[3], const double high[3]);
+void strl__v_run_end(strl__model *model, uint64_t first);
+/* Another reading of the placements, for their areas. area: [tree_count] of the trees as placed as they are, world units. */
+strl_status strl__v_read_areas(strl__model *model, const double *area, strl_error *err);
+/* By how much the transform enlarges areas at most. */
+double strl__v_area_scale(const double transform[12]);
+/* samples: with trees that add up, whose area may be more. */
+void strl__v_run_area(strl__model *model, uint64_t first, double area, bool samples);
 
 /* Whether records of parents, children and group members agree: boxes, errors, groups, counts, pages. */
 strl_status strl__v_check_structure(strl__model *model, strl__vtree *tree, strl_error *err);

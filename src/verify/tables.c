@@ -1,4 +1,4 @@
-/* Paged tables: placements, parts, materials. docs/format.md, "Paged tables". */
+/* Paged tables: placements and runs of them, parts, materials, images. docs/format.md, "Paged tables". */
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>
@@ -21,6 +21,9 @@ typedef struct table {
     unsigned kind;
     const char *name_of_kind;
     double bounds[6]; /* of the placements so far */
+    const double *tree_area; /* [tree_count] NULL: everything is checked; else areas alone are summed up */
+    double area; /* of the page's placements so far */
+    bool samples; /* of a tree that adds up is one of them */
     size_t name_bytes; /* of the name before, in the same page */
     uint8_t name[MOST_NAME_BYTES];
 } table;
@@ -74,8 +77,9 @@ static void check_name(table *self, uint64_t item, const uint8_t *text, size_t b
                bytes, at);
 }
 
-static void widen_bounds(table *self, const strl__vtree *tree, const double m[12])
+static void widen_bounds(table *self, uint64_t item, const strl__vtree *tree, const double m[12])
 {
+    double box[2][3];
     for (unsigned row = 0; row < 3; row++) {
         double low = m[4 * row + 3], high = low;
         for (unsigned k = 0; k < 3; k++) {
@@ -86,7 +90,10 @@ static void widen_bounds(table *self, const strl__vtree *tree, const double m[12
         }
         self->bounds[row] = fmin(self->bounds[row], low);
         self->bounds[3 + row] = fmax(self->bounds[3 + row], high);
+        box[0][row] = low;
+        box[1][row] = high;
     }
+    strl__v_run_placement(self->model, item, box[0], box[1]);
 }
 
 static void check_placement(table *self, uint64_t item, const uint8_t *bytes, size_t size)
@@ -99,12 +106,17 @@ static void check_placement(table *self, uint64_t item, const uint8_t *bytes, si
         m[i] = strl_cursor_f64(&cursor);
         finite = finite && isfinite(m[i]);
     }
+    if (self->tree_area) { /* all else was sound when it was read before */
+        self->area += tree < self->model->tree_count ? self->tree_area[tree] * strl__v_area_scale(m) : 0;
+        self->samples |= tree < self->model->tree_count && !strl__replaces(&self->model->trees[tree]);
+        return;
+    }
     bool good = size == PLACEMENT_BYTES && tree < self->model->tree_count &&
                 own_part <= self->model->sections[STRL__PARTS].item_count && finite;
     TABLE_RULE(self, good, item, "placement %" PRIu64 ": %zu bytes, tree %u of %u, its own part plus one %u, %s", item, size,
                tree, self->model->tree_count, own_part, finite ? "finite" : "not finite");
     if (good) {
-        widen_bounds(self, &self->model->trees[tree], m);
+        widen_bounds(self, item, &self->model->trees[tree], m);
         strl__hash_add(&self->model->placements, strl__hash_placement(tree, strl__v_compares_parts(self->model) ? own_part : 0, m));
     }
 }
@@ -138,6 +150,10 @@ static void check_item(table *self, uint64_t item, const uint8_t *bytes, size_t 
         check_placement(self, item, bytes, size);
         return;
     }
+    if (self->kind == STRL__RUNS) {
+        strl__v_run_read(self->model, item, bytes, size);
+        return;
+    }
     size_t head = self->kind == STRL__MATERIALS ? 4 : 0;
     TABLE_RULE(self, size >= head, item, "%s %" PRIu64 ": %zu bytes are too few", self->name_of_kind, item, size);
     if (size >= head && read_name(self, item, bytes + head, size - head))
@@ -155,6 +171,8 @@ static void check_leaf(table *self, const uint8_t *bytes, size_t size, uint64_t 
         return;
     size_t head = 4 + (size_t)items * 4, before = 0;
     self->name_bytes = 0;
+    self->area = 0;
+    self->samples = false;
     for (uint32_t i = 0; i < items; i++) {
         size_t end = strl_cursor_u32(&cursor);
         good = end >= before && end <= size - head && (i + 1 < items || end == size - head);
@@ -197,6 +215,16 @@ static strl_status check_index(table *self, const uint8_t *bytes, size_t size, u
     return status;
 }
 
+static void end_run(table *self, const strl__place *place, uint64_t first, uint64_t count)
+{
+    if (self->tree_area) {
+        strl__v_run_area(self->model, first, self->area, self->samples);
+        return;
+    }
+    strl__v_run_page(self->model, first, count, place);
+    strl__v_run_end(self->model, first);
+}
+
 static strl_status check_page(table *self, const strl__place *place, uint32_t depth, uint64_t first, uint64_t count,
                               strl_error *err)
 {
@@ -213,6 +241,8 @@ static strl_status check_page(table *self, const strl__place *place, uint32_t de
         status = check_index(self, bytes, place->bytes, depth, first, count, err);
     else if (status == STRL_OK && good)
         check_leaf(self, bytes, place->bytes, first, count);
+    if (status == STRL_OK && good && depth == 0 && self->kind == STRL__PLACEMENTS)
+        end_run(self, place, first, count);
     strl__free(bytes);
     return status;
 }
@@ -231,12 +261,14 @@ static void check_bounds(table *self)
 
 strl_status strl__v_read_tables(strl__model *model, strl_error *err)
 {
-    static const char *const names[STRL__SECTIONS] = {NULL, NULL, "placement", "part", "material", "image"};
-    strl_status status = STRL_OK;
-    for (unsigned kind = STRL__PLACEMENTS; status == STRL_OK && kind < STRL__SECTIONS; kind++) {
+    static const char *const names[STRL__SECTIONS] = {NULL, NULL, "placement", "part", "material", "image", "run"};
+    static const unsigned kinds[] = {STRL__RUNS, STRL__PLACEMENTS, STRL__PARTS, STRL__MATERIALS, STRL__IMAGES};
+    strl_status status = strl__v_runs_create(model, err);
+    for (unsigned i = 0; status == STRL_OK && i < sizeof kinds / sizeof *kinds; i++) {
+        const unsigned kind = kinds[i];
         const strl__section *section = &model->sections[kind];
         if (section->item_count == 0)
-            continue; /* only images may be absent */
+            continue; /* images and runs may be absent */
         table self = {.model = model,
                       .kind = kind,
                       .name_of_kind = names[kind],
@@ -246,4 +278,11 @@ strl_status strl__v_read_tables(strl__model *model, strl_error *err)
             check_bounds(&self);
     }
     return status;
+}
+
+strl_status strl__v_read_areas(strl__model *model, const double *area, strl_error *err)
+{
+    const strl__section *section = &model->sections[STRL__PLACEMENTS];
+    table self = {.model = model, .kind = STRL__PLACEMENTS, .name_of_kind = "placement", .tree_area = area};
+    return check_page(&self, &section->place, section->depth, 0, section->item_count, err);
 }

@@ -171,6 +171,8 @@ static strl_status check_all(strl__model *model, strl_verify_report *report, str
     strl_status status = read_structure(model, report, &sound, err);
     for (uint32_t t = 0; status == STRL_OK && sound && t < model->tree_count; t++)
         status = check_tree(model, &model->trees[t], report, &sound, err);
+    if (status == STRL_OK && sound)
+        status = strl__v_check_run_areas(model, err);
     if (status != STRL_OK || !sound)
         return status;
     if (strl__replaces(&model->trees[0]))

@@ -36,8 +36,11 @@ static strl_status run_at(strl_walk *walk, const strl_view *view, strl__cut_kind
 static strl_status try_finer(strl_walk *walk, const strl_view *view, strl__cut *cut, bool *pending, strl_error *err)
 {
     strl__cut probe;
+    size_t asked = walk->prefetch.count;
     strl_status status = run_at(walk, view, STRL__CUT_PROBE, walk->coarsening - 1, REFINE_SHARE, &probe, err);
     *pending = false;
+    if (probe.overflow) /* it is known without them, and to fetch them might evict what the probe has looked at */
+        walk->prefetch.count = asked;
     if (status != STRL_OK || probe.overflow)
         return status;
     *pending = true;

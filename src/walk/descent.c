@@ -20,16 +20,7 @@ strl_box strl__world_box(const strl_tree *tree, const strl__placement *placement
                          const int64_t max[3])
 {
     strl_box box;
-    for (int row = 0; row < 3; row++) {
-        const double *m = placement->transform + 4 * row;
-        box.min[row] = box.max[row] = m[3];
-        for (int i = 0; i < 3; i++) {
-            double a = m[i] * (tree->origin[i] + tree->step * (double)min[i]);
-            double b = m[i] * (tree->origin[i] + tree->step * (double)max[i]);
-            box.min[row] += a < b ? a : b;
-            box.max[row] += a < b ? b : a;
-        }
-    }
+    strl_placed_box(tree, placement->transform, min, max, box.min, box.max);
     return box;
 }
 
@@ -69,7 +60,15 @@ bool strl__add_candidate(strl__candidates *candidates, strl__node *node, uint32_
 {
     if (!strl__grow(&candidates->items, &candidates->capacity, candidates->count + 1, sizeof *candidates->items))
         return false;
-    candidates->items[candidates->count++] = (strl__candidate){(float)fmin(urgency, MOST_URGENT), treelet, node};
+    candidates->items[candidates->count++] = (strl__candidate){(float)fmin(urgency, MOST_URGENT), treelet, node, NULL};
+    return true;
+}
+
+bool strl__add_run(strl__candidates *candidates, strl__run *run, double px)
+{
+    if (!strl__add_candidate(candidates, NULL, STRL_NONE, px * RECORDS_FIRST))
+        return false;
+    candidates->items[candidates->count - 1].run = run;
     return true;
 }
 

@@ -13,6 +13,8 @@ typedef struct strl__descent {
     strl_error *err;
 } strl__descent;
 
+#define STRL__PREFETCH_SHARE 1e-3 /* what may be wanted later comes after all that is wanted now */
+
 /* What keeps a group's children away, the worst last. */
 typedef enum strl__outlook { STRL__HERE, STRL__RECORDS_ABSENT, STRL__BACKING_OFF } strl__outlook;
 
@@ -26,6 +28,7 @@ bool strl__asks_itself(const strl__descent *c, const strl_node *record);
 bool strl__add_visit(strl__visits *visits, strl__node *node, bool active);
 bool strl__add_node(strl__nodes *nodes, strl__node *node);
 bool strl__add_candidate(strl__candidates *candidates, strl__node *node, uint32_t treelet, double urgency);
+bool strl__add_run(strl__candidates *candidates, strl__run *run, double px);
 
 /* The groups of walk->level into walk->groups, their members chained. */
 strl_status strl__gather_groups(strl_walk *walk, strl_error *err);

@@ -11,7 +11,7 @@ static strl_draw_item make_item(const strl_walk *walk, const strl__active *activ
 {
     const strl__node *node = active->node;
     const strl_node *record = node->record;
-    const strl__placement *placement = &walk->placements[active->placement];
+    const strl__placement *placement = active->placed;
     const strl_tree *tree = walk->trees[placement->tree].tree;
     const strl__mesh *mesh = &node->mesh;
     float error = mesh->errors[active->state];
@@ -60,7 +60,7 @@ static void count_item(strl_walk *walk, const strl_draw_item *item)
 
 strl_status strl__draw_list(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err)
 {
-    double least = walk->far_count ? walk->far_near : INFINITY, largest = walk->far_count ? walk->far_far : 0;
+    double least = walk->far_far > 0 ? walk->far_near : INFINITY, largest = walk->far_far;
     if (!strl__grow(&walk->items, &walk->item_capacity, walk->front.count, sizeof *walk->items))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a draw list of %zu items", walk->front.count);
     for (size_t i = 0; i < walk->front.count; i++) {

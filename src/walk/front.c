@@ -6,15 +6,13 @@
 
 #include <math.h>
 
-#define PREFETCH_SHARE 1e-3 /* what may be wanted later comes after all that is wanted now */
-
 static strl_status add_active(strl__descent *c, strl__node *node, bool open)
 {
     strl__front *front = &c->walk->front;
     if (!strl__grow(&front->items, &front->capacity, front->count + 1, sizeof *front->items))
         return strl__no_memory(c->err);
     strl__active *active = &front->items[front->count++];
-    *active = (strl__active){.node = node, .placement = c->index, .open = open};
+    *active = (strl__active){.node = node, .placement = c->index, .placed = c->placement, .open = open};
     active->box = strl__world_box(c->tree, c->placement, node->record->box_min, node->record->box_max);
     active->sight = strl_view_sight(c->cut->view, &active->box);
     return STRL_OK;
@@ -25,7 +23,7 @@ static strl_status prefetch_children(strl__descent *c, const strl__group *group,
 {
     strl_walk *walk = c->walk;
     strl__outlook worst;
-    double urgency = PREFETCH_SHARE * px / c->cut->allowed_px;
+    double urgency = STRL__PREFETCH_SHARE * px / c->cut->allowed_px;
     bool waits = c->cut->waits; /* no frame waits for what it does not want */
     strl_status status = strl__find_children(c, group, urgency, &walk->prefetch, &worst);
     c->cut->waits = waits;
@@ -108,7 +106,7 @@ static bool want_child(strl__descent *c, strl__node *child, double px)
         return true;
     }
     return front ? strl__add_candidate(&walk->missing, child, STRL_NONE, px)
-                 : strl__add_candidate(&walk->prefetch, child, STRL_NONE, PREFETCH_SHARE * px / c->cut->allowed_px);
+                 : strl__add_candidate(&walk->prefetch, child, STRL_NONE, STRL__PREFETCH_SHARE * px / c->cut->allowed_px);
 }
 
 static strl_status note_split(strl__descent *c, const strl__group *group)
@@ -159,7 +157,7 @@ static strl_status visit_group(strl__descent *c, const strl__group *group)
     if (!complete || !strl__is_asked_for(walk, walk->level.items[group->first].node->record->group))
         return keep(c, group, complete, px);
     strl__outlook worst;
-    strl_status status = strl__find_children(c, group, front ? px : PREFETCH_SHARE * px,
+    strl_status status = strl__find_children(c, group, front ? px : STRL__PREFETCH_SHARE * px,
                                              front ? &walk->missing : &walk->prefetch, &worst);
     if (status != STRL_OK)
         return status;
@@ -226,16 +224,19 @@ strl_status strl__cut_run(strl_walk *walk, strl__cut *cut, strl_error *err)
     cut->bytes = walk->root_bytes;
     if (cut->kind == STRL__CUT_FRONT) {
         walk->wanted.count = walk->split.count = walk->ahead.count = 0;
-        walk->missing.count = walk->prefetch.count = walk->front.count = walk->far_count = 0;
+        walk->missing.count = walk->prefetch.count = walk->front.count = walk->wanted_runs.count = 0;
+        for (unsigned size = 0; size < STRL__FAR_SIZES; size++)
+            walk->far[size].count = 0, walk->far[size].px = 0;
+        walk->far_far = 0;
     }
     strl_status status = keep_roots(walk, cut, err);
     uint32_t i = 0;
     for (;; i++) {
+        const strl__placement *placement = NULL;
         if (status == STRL_OK)
-            status = strl__placements_next(walk, cut, i, &i, err);
-        if (status != STRL_OK || i == walk->placement_count || cut->overflow)
+            status = strl__placements_next(walk, cut, i, &i, &placement, err);
+        if (status != STRL_OK || !placement || cut->overflow)
             break;
-        const strl__placement *placement = &walk->placements[i];
         strl__descent c = {walk, cut, i, placement, walk->trees[placement->tree].tree, err};
         status = visit_placement(&c);
     }
@@ -251,6 +252,10 @@ void strl__cut_commit(strl_walk *walk)
     for (size_t i = 0; i < walk->wanted.count; i++) {
         walk->wanted.items[i]->wanted_frame = walk->frame;
         strl__node_touch(walk, walk->wanted.items[i]);
+    }
+    for (size_t i = 0; i < walk->wanted_runs.count; i++) {
+        walk->wanted_runs.items[i]->wanted_frame = walk->frame;
+        strl__run_touch(walk, walk->wanted_runs.items[i]);
     }
     for (size_t i = 0; i < walk->split.count; i++) {
         strl__node *node = walk->split.items[i].node;

@@ -8,8 +8,9 @@
  * Invariants: (1) a group splits as a whole, only when all its members are active and all children
  * of all members are resident, so that the front is a cut without cracks whatever is resident; (2)
  * nodes of the wanted cut and all their ancestors carry wanted_frame = this frame and are not
- * evicted, so that collapsing never waits; (3) resident_bytes counts meshes, records and
- * reservations of reads under way, and never exceeds memory_bytes. */
+ * evicted, so that collapsing never waits; (3) resident_bytes counts meshes, records,
+ * placements and reservations of reads under way, and never exceeds memory_bytes; (4) a run of placements whose page is not there is
+ * drawn as a point; a page that the front points into carries wanted_frame = this frame. */
 #ifndef STRL_WALK_INTERNAL_H
 #define STRL_WALK_INTERNAL_H
 
@@ -105,32 +106,52 @@ typedef struct strl__placement {
                             allowed error, so that sizes and errors are compared alike */
 } strl__placement;
 
-/* What a tree, a placement or a run of them looks like from very far. */
-typedef struct strl__far {
-    float area; /* of its faces: a tree's in lattice units, else world */
-    uint32_t rgba;
-    uint16_t normal[2];
-} strl__far;
+#define STRL__FAN 16u /* placements, runs or boxes under one box */
+#define STRL__RUN_BOXES (STRL_RUN_PLACEMENTS / STRL__FAN)
 
-typedef struct strl__far_sums {
-    double area, linear[4], normal[3]; /* weighted by area */
-} strl__far_sums;
+/* The placements of a run, and what each STRL__FAN of them look like from outside. */
+typedef struct strl__run_page {
+    strl_box boxes[STRL__RUN_BOXES];
+    strl_far fars[STRL__RUN_BOXES];
+    uint32_t count;
+    strl__placement items[]; /* [count] */
+} strl__run_page;
 
-/* Boxes over runs of placements, or of the boxes of the level below (placements.c). */
+typedef struct strl__run {
+    strl_run facts;
+    strl__run_page *page;          /* owned; resident ones only */
+    struct strl__run *older, *newer; /* residency list; resident ones that may go */
+    struct strl__request *request; /* while pending */
+    strl__residency residency;
+    strl__retry retry;
+    uint64_t wanted_frame;  /* last frame whose front may point into the page */
+    uint64_t touched_frame; /* the same or looked at */
+} strl__run;
+
+/* Boxes over STRL__FAN runs each, or over the boxes of the level below (placements.c). */
 typedef struct strl__bound_level {
     strl_box *boxes; /* [count], owned */
-    strl__far *fars; /* [count], owned */
+    strl_far *fars;  /* [count], owned */
     uint32_t count;
 } strl__bound_level;
 
-#define STRL__BOUND_LEVELS 7u /* for 2^24 placements in runs of 16 */
+#define STRL__BOUND_LEVELS 4u /* for 2^24 placements */
 
 typedef struct strl__walk_tree {
     const strl_tree *tree; /* borrowed from the container */
     strl__node *root;      /* NULL where no placement uses the tree */
-    bool shared;           /* several do */
-    strl__far far;
+    bool used, shared;     /* by a placement; by several. Where there are many placements both are taken to be so. */
+    strl_far far;
 } strl__walk_tree;
+
+/* Points of one size, for what is not drawn itself. */
+typedef struct strl__far_points {
+    strl_vertex *items;
+    size_t count, capacity;
+    double px; /* the largest box that one of them stands for, in pixels */
+} strl__far_points;
+
+#define STRL__FAR_SIZES 7u /* 0: the size of the allowed error; k: 2^k pixels, for runs that are not there yet */
 
 /* A page's bytes, shared by the decode jobs of its nodes. */
 typedef struct strl__page {
@@ -163,16 +184,18 @@ typedef struct strl__request {
     uint64_t token;
     uint64_t touched_frame; /* last frame that wanted something of it */
     uint64_t offset;        /* of the page */
-    strl__treelet *treelet; /* records asked for; NULL = a page for nodes */
+    strl__treelet *treelet; /* records asked for, or */
+    strl__run *run;         /* placements; both NULL = a page for nodes */
     uint32_t node_count;    /* asked for; after the answer: not decoded yet */
     strl__node *nodes[STRL__REQUEST_NODES];
 } strl__request;
 
-/* Something to read: a node's mesh, or the treelet with the children of a node. */
+/* Something to read: a node's mesh, the treelet with the children of a node, or the page of a run. */
 typedef struct strl__candidate {
     float urgency;
     uint32_t treelet; /* index within the tree where it is records; STRL_NONE = the node's mesh */
-    strl__node *node; /* the node, or the one whose treelet names the wanted treelet */
+    strl__node *node; /* the node, or the one whose treelet names the wanted treelet; NULL = a run's page */
+    strl__run *run;
 } strl__candidate;
 
 typedef struct strl__candidates {
@@ -184,6 +207,11 @@ typedef struct strl__nodes {
     strl__node **items;
     size_t count, capacity;
 } strl__nodes;
+
+typedef struct strl__runs {
+    strl__run **items;
+    size_t count, capacity;
+} strl__runs;
 
 typedef struct strl__split {
     strl__node *node;
@@ -242,7 +270,8 @@ typedef struct strl__demands {
 
 typedef struct strl__active {
     strl__node *node;
-    uint32_t placement;
+    uint32_t placement;            /* its number */
+    const strl__placement *placed; /* the placement; its page stays for the frame */
     bool open;        /* of a sample tree: drawn with what is below it */
     uint32_t state;   /* to be drawn in */
     strl_box box;     /* world */
@@ -287,8 +316,9 @@ struct strl_walk {
     double bounds[6];
     strl__walk_tree *trees;
     uint32_t tree_count;
-    strl__placement *placements;
-    uint32_t placement_count;
+    uint32_t placement_count, run_count;
+    strl__run *runs; /* [run_count]; of one alone the page is always there */
+    strl__run *oldest_run, *newest_run;
     strl__bound_level bound_levels[STRL__BOUND_LEVELS];
     uint32_t bound_level_count;
     uint64_t root_bytes; /* meshes of the roots */
@@ -299,7 +329,7 @@ struct strl_walk {
 
     strl__treelets treelets;
     uint64_t treelet_bytes; /* part of resident_bytes */
-    uint64_t placement_bytes; /* the same; 0 where there are few */
+    uint64_t placement_bytes; /* the same: what stays of placements; 0 where there are few */
     uint64_t resident_bytes;
     strl__node *oldest, *newest;
 
@@ -315,6 +345,7 @@ struct strl_walk {
     strl__nodes children;             /* of the group in work */
     strl__nodes wanted;               /* the wanted cut and all above it */
     strl__nodes ahead;                /* resident, likely to be wanted soon */
+    strl__runs wanted_runs;           /* of which the front has placements, or may have */
     strl__splits split, split_before; /* of this frame and the last */
     strl__candidates missing, prefetch;
     strl__front front;
@@ -322,9 +353,8 @@ struct strl_walk {
     size_t item_capacity;
     strl_vertex *points; /* splats of the frame */
     size_t point_count, point_capacity;
-    strl_vertex *far_points; /* of the frame: of placements too small to be told apart */
-    size_t far_count, far_capacity;
-    double far_near, far_far, far_px; /* depths of their boxes; the largest of these */
+    strl__far_points far[STRL__FAR_SIZES]; /* of the frame */
+    double far_near, far_far;              /* depths of their boxes; far_far 0: there is none */
     uint16_t *numbers; /* 0, 1, 2, ...; NULL where there was no splat yet */
     strl_camera camera; /* of the last frame */
     strl_walk_stats stats;
@@ -343,23 +373,44 @@ void strl__mesh_deinit(strl__mesh *mesh);
 void strl__mesh_set_state(strl__mesh *mesh, uint32_t state, uint32_t *first, uint32_t *end);
 
 /* placements.c */
+/* The runs, or all placements where they are one run; tells which trees are used. */
 strl_status strl__placements_load(strl_walk *walk, strl_error *err);
+/* Whether all placements are looked at, wherever the camera is: they need neither boxes nor summaries. */
+bool strl__placements_are_few(const strl_walk *walk);
 /* Boxes over them, and the walk's bounds. Roots must be there. */
 strl_status strl__placements_bound(strl_walk *walk, strl_error *err);
 void strl__placements_deinit(strl_walk *walk);
-/* *next: the first placement from `from` on that the camera may see; placement_count where there is none. Those before it that are
- * too far away to be told apart are drawn as points by a cut that finds the front. */
-strl_status strl__placements_next(strl_walk *walk, const strl__cut *cut, uint32_t from, uint32_t *next, strl_error *err);
+/* *next: the first placement from `from` on that the camera may see, *placed; placement_count where there is none. Those before it
+ * that are too far away to be told apart, or not there yet, are drawn as points by a cut that finds the front. */
+strl_status strl__placements_next(strl_walk *walk, strl__cut *cut, uint32_t from, uint32_t *next, const strl__placement **placed,
+                                  strl_error *err);
+
+void strl__box_include(strl_box *box, const strl_box *other);
+
+/* runs.c */
+uint32_t strl__run_placements(const strl_walk *walk, const strl__run *run);
+uint64_t strl__run_bytes(uint32_t placements); /* of a page in memory */
+strl__run_page *strl__run_page_create(uint32_t placements); /* NULL without memory */
+strl_status strl__run_page_place(const strl_walk *walk, strl__run_page *page, uint32_t within, uint64_t index, const strl_placement *stored,
+                                 strl_error *err);
+/* Boxes and summaries. Roots must be there. */
+void strl__run_page_bound(const strl_walk *walk, strl__run_page *page);
+strl_box strl__placement_box(const strl_walk *walk, const strl__placement *placement);
+strl_far strl__placement_far(const strl_walk *walk, const strl__placement *placement);
+void strl__run_reserve(strl_walk *walk, strl__run *run, strl__request *request); /* absent -> pending; room must be there */
+void strl__run_release(strl_walk *walk, strl__run *run);                         /* pending -> absent */
+/* Pending -> resident; a failure leaves it pending. */
+strl_status strl__run_load(strl_walk *walk, strl__run *run, const void *data, size_t size, strl_error *err);
+void strl__run_touch(strl_walk *walk, strl__run *run); /* now the youngest */
+void strl__run_evict(strl_walk *walk, strl__run *run);
 
 /* far.c */
-void strl__far_of_tree(strl__walk_tree *tree); /* its root must be there */
-strl__far strl__far_of_placement(const strl_walk *walk, const strl__placement *placement);
-void strl__far_add(strl__far_sums *sums, const strl__far *far);
-strl__far strl__far_end(const strl__far_sums *sums);
 /* Whether the box projects to at most the allowed error. *px: to how much. */
 bool strl__is_far(const strl__cut *cut, const strl_box *box, double *px);
-strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl__far *far, double px, strl_error *err);
-strl_draw_item strl__far_item(const strl_walk *walk); /* what all items of far points have in common */
+/* A point for what the box holds, which projects to px; as large as the box where it is not there yet. */
+strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far, double px, bool is_missing,
+                           strl_error *err);
+strl_draw_item strl__far_item(const strl_walk *walk, unsigned size); /* what all items of far points of a size have in common */
 
 /* treelets.c */
 strl__treelet *strl__treelets_find(const strl__treelets *treelets, uint32_t tree, uint32_t index);

@@ -52,7 +52,7 @@ static uint32_t coarsest_state(const projector *p, uint32_t begin, uint32_t fine
 static uint32_t choose_state(const strl_walk *walk, const strl__active *active)
 {
     const strl__mesh *mesh = &active->node->mesh;
-    const projector p = {&active->sight, mesh->errors, walk->placements[active->placement].length_scale, walk->stats.allowed_error_px};
+    const projector p = {&active->sight, mesh->errors, active->placed->length_scale, walk->stats.allowed_error_px};
     /* Beside what is below it a brick shows no splats: its record may open it before its own, smaller cells ask for that. */
     return active->open ? mesh->step_count : coarsest_state(&p, mesh->state, mesh->step_count);
 }

@@ -1,4 +1,4 @@
-/* Reads and decodes. A request is one page of nodes or one treelet; it keeps its slot until every
+/* Reads and decodes. A request is one page of nodes, one treelet or one page of placements; it keeps its slot until every
  * node of it is decoded, so that undecoded bytes are bounded by the number of slots. Decoding is a
  * job per node: the executor's, or the pump's. */
 #include "walk/internal.h"
@@ -204,6 +204,16 @@ static void treelet_failed(strl_walk *walk, strl__request *request, const strl_e
     free_slot(walk, request);
 }
 
+static void run_failed(strl_walk *walk, strl__request *request, const strl_error *error)
+{
+    if (error->status != STRL_ERR_CANCELLED) {
+        strl__back_off(walk, &request->run->retry);
+        strl__note_fault(walk, error);
+    }
+    strl__run_release(walk, request->run);
+    free_slot(walk, request);
+}
+
 static void receive_page(strl_walk *walk, strl__request *request, strl_source_result *result)
 {
     strl_error error = {0};
@@ -243,16 +253,31 @@ static void receive_treelet(strl_walk *walk, strl__request *request, const strl_
     treelet_failed(walk, request, &error);
 }
 
+static void receive_run(strl_walk *walk, strl__request *request, const strl_source_result *result)
+{
+    strl_error error = {0};
+    if (strl__run_load(walk, request->run, result->data, result->size, &error) == STRL_OK) {
+        free_slot(walk, request);
+        return;
+    }
+    strl_source_doubt(walk->source, request->run->facts.page.offset, request->run->facts.page.bytes);
+    run_failed(walk, request, &error);
+}
+
 static void receive(strl_walk *walk, strl__request *request, strl_source_result *result)
 {
     result->error.status = result->status;
     walk->stats.bytes_read += result->status == STRL_OK ? result->size : 0;
     if (result->status != STRL_OK && request->treelet)
         treelet_failed(walk, request, &result->error);
+    else if (result->status != STRL_OK && request->run)
+        run_failed(walk, request, &result->error);
     else if (result->status != STRL_OK)
         page_failed(walk, request, &result->error);
     else if (request->treelet)
         receive_treelet(walk, request, result);
+    else if (request->run)
+        receive_run(walk, request, result);
     else
         receive_page(walk, request, result);
 }
@@ -271,20 +296,25 @@ void strl__requests_receive(strl_walk *walk)
 
 /* ---- submission */
 
+static uint64_t offset_of(const strl__candidate *candidate)
+{
+    return candidate->run ? candidate->run->facts.page.offset : candidate->node->record->page.offset;
+}
+
 static int by_urgency(const void *left, const void *right)
 {
     const strl__candidate *a = left, *b = right;
     if (a->urgency != b->urgency)
         return a->urgency > b->urgency ? -1 : 1;
-    const strl_page_ref *page_a = &a->node->record->page, *page_b = &b->node->record->page;
-    return page_a->offset < page_b->offset ? -1 : page_a->offset > page_b->offset;
+    uint64_t at_a = offset_of(a), at_b = offset_of(b);
+    return at_a < at_b ? -1 : at_a > at_b;
 }
 
 static strl__request *unanswered_page(strl_walk *walk, uint64_t offset)
 {
     for (uint32_t i = 0; i < walk->requests_in_flight; i++) {
         strl__request *request = &walk->requests[i];
-        if (request->used && !request->answered && !request->cancelled && !request->treelet &&
+        if (request->used && !request->answered && !request->cancelled && !request->treelet && !request->run &&
             request->offset == offset && request->node_count < STRL__REQUEST_NODES)
             return request;
     }
@@ -383,6 +413,25 @@ static void ask_for_treelet(strl_walk *walk, const strl__candidate *candidate, u
         treelet_failed(walk, request, &error);
 }
 
+/* As ask_for_node. */
+static bool ask_for_run(strl_walk *walk, const strl__candidate *candidate, uint32_t in_flight, uint64_t evict_before, bool prefetch)
+{
+    strl__run *run = candidate->run;
+    const strl_treelet_ref *page = &run->facts.page;
+    strl_error error = {0};
+    if (run->residency != STRL__ABSENT || !has_slot(walk, in_flight))
+        return true;
+    if (!strl__make_room(walk, strl__run_bytes(strl__run_placements(walk, run)), evict_before))
+        return false;
+    strl__request *request = take_slot(walk);
+    request->run = run;
+    request->prefetch = prefetch;
+    strl__run_reserve(walk, run, request);
+    if (submit(walk, request, page->offset, page->bytes, candidate->urgency, &error) != STRL_OK)
+        run_failed(walk, request, &error);
+    return true;
+}
+
 static void ask_for_all(strl_walk *walk, strl__candidates *candidates, uint32_t in_flight, uint64_t evict_before,
                         bool prefetch)
 {
@@ -393,6 +442,8 @@ static void ask_for_all(strl_walk *walk, strl__candidates *candidates, uint32_t 
         const strl__candidate *candidate = &candidates->items[i];
         if (candidate->treelet != STRL_NONE)
             ask_for_treelet(walk, candidate, in_flight);
+        else if (room && candidate->run)
+            room = ask_for_run(walk, candidate, in_flight, evict_before, prefetch);
         else if (room)
             room = ask_for_node(walk, candidate, in_flight, evict_before, prefetch);
     }

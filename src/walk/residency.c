@@ -1,4 +1,4 @@
-/* What is in memory, under one budget: treelets and meshes, and the reservations of those on their
+/* What is in memory, under one budget: treelets, meshes and placements (runs.c), and the reservations of those on their
  * way. */
 #include "walk/internal.h"
 
@@ -98,9 +98,16 @@ bool strl__make_room(strl_walk *walk, uint64_t bytes, uint64_t evict_before)
     if (bytes > walk->memory_bytes)
         return false;
     while (walk->resident_bytes > walk->memory_bytes - bytes) {
-        /* Wanted nodes are touched last of all, so the oldest one tells for the rest. */
+        /* What is wanted is touched last of all, so the oldest one tells for the rest. */
         strl__node *oldest = walk->oldest;
-        if (!oldest || oldest->wanted_frame == walk->frame || oldest->touched_frame >= evict_before)
+        strl__run *run = walk->oldest_run;
+        bool may_go = oldest && oldest->wanted_frame != walk->frame && oldest->touched_frame < evict_before;
+        if (run && run->wanted_frame != walk->frame && run->touched_frame < evict_before &&
+            (!may_go || run->touched_frame < oldest->touched_frame)) {
+            strl__run_evict(walk, run);
+            continue;
+        }
+        if (!may_go)
             break;
         if (oldest->decoding) { /* as good as wanted */
             oldest->wanted_frame = walk->frame;

@@ -31,7 +31,7 @@ static unsigned size_of(const strl_walk *walk, const strl__active *active)
     double allowed = walk->stats.allowed_error_px;
     if (!(walk->splat_ratio * allowed > 1))
         return SIZES - 1;
-    double size = (double)mesh->errors[active->state] * walk->placements[active->placement].length_scale;
+    double size = (double)mesh->errors[active->state] * active->placed->length_scale;
     double parts = ceil(SIZES * strl_sight_error_px(&active->sight, size) / allowed);
     return parts >= SIZES ? SIZES - 1 : parts >= 1 ? (unsigned)parts - 1 : 0;
 }
@@ -92,7 +92,7 @@ static strl_vertex make_point(const strl_node *record, const strl_splat *splat, 
 
 static void put_points(strl_walk *walk, const strl__active *active, shown added, size_t at)
 {
-    const strl_tree *tree = walk->trees[walk->placements[active->placement].tree].tree;
+    const strl_tree *tree = walk->trees[active->placed->tree].tree;
     for (uint32_t i = 0; i < added.count; i++)
         walk->points[at + i] = make_point(active->node->record, &added.splats[i], tree->box_min);
 }
@@ -167,11 +167,11 @@ static strl_status add_items(strl_walk *walk, const strl_draw_item *shape, const
 }
 
 /* Of points of one placement. */
-static strl_draw_item shape_of(const strl_walk *walk, uint32_t placement_index, double px)
+static strl_draw_item shape_of(const strl_walk *walk, const strl__active *active, double px)
 {
-    const strl__placement *placement = &walk->placements[placement_index];
+    const strl__placement *placement = active->placed;
     const strl_tree *tree = walk->trees[placement->tree].tree;
-    strl_draw_item item = {.placement = placement_index,
+    strl_draw_item item = {.placement = active->placement,
                            .own_part = placement->own_part,
                            .step = tree->step,
                            .point_px = (float)fmin(fmax(px, 1), STRL__MOST_POINT_PX),
@@ -187,7 +187,7 @@ static strl_draw_item shape_of(const strl_walk *walk, uint32_t placement_index, 
 static double missing_px(const strl_walk *walk, const strl__active *active)
 {
     const strl__mesh *mesh = &active->node->mesh;
-    double size = (double)mesh->errors[mesh->step_count - 1] * walk->placements[active->placement].length_scale;
+    double size = (double)mesh->errors[mesh->step_count - 1] * active->placed->length_scale;
     return walk->splat_ratio * strl_sight_error_px(&active->sight, size);
 }
 
@@ -204,13 +204,13 @@ static strl_status list_splats(strl_walk *walk, strl_draw_list *list, strl_error
         count_sizes(walk, i, next, count);
         for (unsigned k = 0; k < SIZES && !status; at += count[k++]) {
             double px = walk->splat_ratio * walk->stats.allowed_error_px * (k + 1) / SIZES;
-            const strl_draw_item shape = shape_of(walk, front->items[i].placement, px);
+            const strl_draw_item shape = shape_of(walk, &front->items[i], px);
             status = add_items(walk, &shape, walk->points + at, count[k], list, err);
         }
     }
     for (size_t i = 0; i < front->count && !status; i++) {
         uint32_t count = missing_splats(&front->items[i]).count;
-        const strl_draw_item shape = shape_of(walk, front->items[i].placement, count ? missing_px(walk, &front->items[i]) : 0);
+        const strl_draw_item shape = shape_of(walk, &front->items[i], count ? missing_px(walk, &front->items[i]) : 0);
         status = add_items(walk, &shape, walk->points + at, count, list, err);
         at += count;
     }
@@ -227,14 +227,18 @@ strl_status strl__draw_splats(strl_walk *walk, strl_draw_list *list, strl_error 
     }
     for (size_t i = 0; i < walk->front.count && !status; i++)
         status = add_missing(walk, &walk->front.items[i], err);
-    if (status || walk->point_count + walk->far_count == 0)
+    size_t points = walk->point_count;
+    for (unsigned size = 0; size < STRL__FAR_SIZES; size++)
+        points += walk->far[size].count;
+    if (status || points == 0)
         return status;
     if (!fill_numbers(walk))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for splats");
-    const strl_draw_item far = strl__far_item(walk);
     status = list_splats(walk, list, err);
-    if (status == STRL_OK)
-        status = add_items(walk, &far, walk->far_points, walk->far_count, list, err);
+    for (unsigned size = 0; size < STRL__FAR_SIZES && !status; size++) {
+        const strl_draw_item far = strl__far_item(walk, size);
+        status = add_items(walk, &far, walk->far[size].items, walk->far[size].count, list, err);
+    }
     list->items = walk->items;
     return status;
 }

@@ -69,6 +69,8 @@ static strl_status load_root(strl_walk *walk, uint32_t tree, strl_error *err)
     status = read_range(walk, page->offset, page->bytes, &data, err);
     if (status == STRL_OK && (status = strl_page_check(page, data, page->bytes, err)) != STRL_OK)
         strl_source_doubt(walk->source, page->offset, page->bytes);
+    if (status == STRL_OK && !strl__placements_are_few(walk))
+        status = strl_page_far(root->record, data, page->bytes, &walk->trees[tree].far, err);
     if (status == STRL_OK)
         status = strl__mesh_create(root->record, data, page->bytes, NULL, walk->labels, walk->trees[tree].shared, &mesh, err);
     if (status == STRL_OK)
@@ -86,9 +88,9 @@ static strl_status load_trees(strl_walk *walk, strl_error *err)
     for (uint32_t tree = 0; tree < walk->tree_count; tree++)
         walk->trees[tree].tree = strl_container_tree(walk->container, tree);
     strl_status status = strl__placements_load(walk, err);
-    for (uint32_t i = 0; status == STRL_OK && i < walk->placement_count; i++)
-        if (!walk->trees[walk->placements[i].tree].root)
-            status = load_root(walk, walk->placements[i].tree, err);
+    for (uint32_t tree = 0; status == STRL_OK && tree < walk->tree_count; tree++)
+        if (walk->trees[tree].used)
+            status = load_root(walk, tree, err);
     return status ? status : strl__placements_bound(walk, err);
 }
 
@@ -161,9 +163,11 @@ void strl_walk_close(strl_walk *walk)
                            walk->front.items,
                            walk->items,
                            walk->points,
-                           walk->far_points,
+                           walk->wanted_runs.items,
                            walk->numbers,
                            walk};
+    for (unsigned size = 0; size < STRL__FAR_SIZES; size++)
+        strl__free(walk->far[size].items);
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         strl__free(owned[i]);
 }

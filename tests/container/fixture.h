@@ -29,6 +29,7 @@ typedef struct fixture {
     char path[128];
     uint32_t node_count;
     strl_node *nodes; /* page fields unset */
+    uint32_t copies;  /* placed besides the one that is always there */
 } fixture;
 
 /* A strip of steps + 1 triangles; each step adds one vertex and one triangle at its end. */
@@ -156,6 +157,7 @@ static inline void fixture_setup(fixture *self, uint32_t levels, uint32_t fan)
     assert_non_null(mkdtemp(self->folder));
     snprintf(self->path, sizeof self->path, "%s/model.stroll", self->folder);
     self->nodes = fixture_records(levels, fan, &self->node_count);
+    self->copies = 0;
 }
 
 static inline void fixture_teardown(fixture *self)
@@ -182,6 +184,12 @@ static inline strl_tree fixture_tree(uint32_t node_count)
                        .step = 0.25,
                        .node_count = node_count,
                        .leaf_geometric = 0.5f};
+}
+
+/* Copy i of the tree: here and there, turned and mirrored. */
+static inline strl_placement fixture_copy(uint32_t i)
+{
+    return (strl_placement){.transform = {i % 2 ? 1 : -1, 0, 0, 5 + 100. * (i % 16), 0, 0, -1, 0.5 * i, 0, 1 + i % 3, 0, i}};
 }
 
 /* The mesh of node 0 as a reader will have it, by which others are told. */
@@ -241,6 +249,10 @@ static inline strl_status fixture_add_all(const fixture *self, strl_container_wr
     const strl_placement placement = {.transform = {1, 0, 0, 5, 0, 0, -1, 0, 0, 1, 0, 0}};
     if (status == STRL_OK)
         status = strl_container_writer_add_placement(writer, &placement, err);
+    for (uint32_t i = 0; status == STRL_OK && i < self->copies; i++) {
+        const strl_placement copy = fixture_copy(i);
+        status = strl_container_writer_add_placement(writer, &copy, err);
+    }
     for (uint32_t i = 0; status == STRL_OK && i < FIXTURE_PARTS; i++) {
         char name[32];
         snprintf(name, sizeof name, "part %u of the façade", i);
@@ -294,6 +306,34 @@ static inline uint8_t *fixture_load(const char *path, size_t *size)
     return bytes;
 }
 
+/* Every run and its page, as who walks reads them: placements are those of the table. */
+static inline strl_status fixture_read_runs(strl_container *container, uint64_t *digest, strl_error *err)
+{
+    const strl_container_info *info = strl_container_get_info(container);
+    strl_status status = STRL_OK;
+    for (uint32_t run = 0; status == STRL_OK && run < strl_container_run_count(container); run++) {
+        strl_run facts;
+        status = strl_container_run(container, run, &facts, err);
+        if (status != STRL_OK)
+            break;
+        uint8_t *page = malloc(facts.page.bytes);
+        assert_non_null(page);
+        status = strl_source_read(strl_container_source(container), facts.page.offset, page, facts.page.bytes, err);
+        if (status == STRL_OK)
+            status = strl_run_check(container, run, &facts, page, facts.page.bytes, err);
+        for (uint64_t i = (uint64_t)run * STRL_RUN_PLACEMENTS;
+             status == STRL_OK && i < info->placement_count && i / STRL_RUN_PLACEMENTS == run; i++) {
+            strl_placement placement;
+            status = strl_run_placement(container, i, page, &placement, err);
+            *digest = strl__mix64(*digest ^ strl__checksum(placement.transform, sizeof placement.transform) ^ placement.tree);
+        }
+        free(page);
+        *digest = strl__mix64(*digest ^ strl__checksum(facts.box_min, sizeof facts.box_min) ^ facts.far.rgba ^ facts.far.normal[0]);
+        *digest = strl__mix64(*digest ^ strl__checksum(facts.box_max, sizeof facts.box_max) ^ (uint64_t)(facts.far.area * 4));
+    }
+    return status;
+}
+
 /* Reads everything there is; *digest depends on all of it. */
 static inline strl_status fixture_read_all(strl_container *container, uint64_t *digest, strl_error *err)
 {
@@ -320,6 +360,8 @@ static inline strl_status fixture_read_all(strl_container *container, uint64_t *
         status = strl_container_placement(container, i, &placement, err);
         *digest = strl__mix64(*digest ^ strl__checksum(placement.transform, sizeof placement.transform));
     }
+    if (status == STRL_OK)
+        status = fixture_read_runs(container, digest, err);
     char name[64];
     for (uint32_t i = 0; status == STRL_OK && i < info->part_count; i++) {
         status = strl_container_part(container, i, name, sizeof name, err);

@@ -69,6 +69,26 @@ static inline void reseal__table(reseal *self, uint64_t offset, uint32_t bytes, 
     reseal__store(self, checksum_at, offset, bytes);
 }
 
+/* The pages that runs name, of one leaf of their table. */
+static inline void reseal__run_pages(reseal *self, uint64_t offset, uint32_t bytes)
+{
+    uint64_t count = bytes >= 4 ? reseal__get(self, offset, 4) : 0;
+    for (uint64_t i = 0; i < count && 4 + 4 * count + (i + 1) * STRL__RUN_BYTES <= bytes; i++) {
+        uint64_t at = offset + 4 + 4 * count + i * STRL__RUN_BYTES, page = reseal__get(self, at + 64, 8);
+        uint32_t page_bytes = (uint32_t)reseal__get(self, at + 60, 4);
+        if (reseal__range(self, page, page_bytes))
+            reseal__store(self, at + 72, page, page_bytes);
+    }
+}
+
+/* Behind the placements, whose index may have changed but not their leaves. */
+static inline void reseal__runs(reseal *self, uint64_t offset, uint32_t bytes, uint64_t checksum_at, uint32_t depth)
+{
+    if (depth == 0 && offset <= self->size && bytes <= self->size - offset)
+        reseal__run_pages(self, offset, bytes);
+    reseal__table(self, offset, bytes, checksum_at, depth);
+}
+
 static inline void reseal__trees(reseal *self, uint64_t offset, uint32_t bytes, uint64_t checksum_at)
 {
     if (!reseal__range(self, offset, bytes))
@@ -102,6 +122,8 @@ static inline void reseal_all(uint8_t *data, size_t size, void (*visit)(void *, 
         uint32_t bytes = (uint32_t)reseal__get(&self, at + 24, 4);
         if (kind == STRL__SECTION_TREES)
             reseal__trees(&self, offset, bytes, at + 32);
+        else if (kind == STRL__SECTION_RUNS)
+            reseal__runs(&self, offset, bytes, at + 32, (uint32_t)reseal__get(&self, at + 4, 4));
         else if (kind <= STRL__KNOWN_SECTIONS)
             reseal__table(&self, offset, bytes, at + 32, (uint32_t)reseal__get(&self, at + 4, 4));
     }

@@ -21,15 +21,27 @@ static void golden_path(char path[512], const char *name)
     snprintf(path, 512, "%s/tests/container/golden/%s", root ? root : ".", name);
 }
 
-static uint8_t *make_container(uint32_t levels, size_t *size)
+static uint8_t *make_copies(uint32_t levels, uint32_t copies, size_t *size)
 {
     fixture self;
     strl_error err;
     fixture_setup(&self, levels, 3);
+    self.copies = copies;
     assert_ok(fixture_write(&self, &err), &err);
     uint8_t *bytes = fixture_load(self.path, size);
     fixture_teardown(&self);
     return bytes;
+}
+
+static uint8_t *make_container(uint32_t levels, size_t *size)
+{
+    return make_copies(levels, 0, size);
+}
+
+/* One placement more than a page holds. */
+static uint8_t *container_of_runs(size_t *size)
+{
+    return make_copies(1, STRL_RUN_PLACEMENTS, size);
 }
 
 static uint8_t *small_container(size_t *size)
@@ -166,7 +178,7 @@ static void a_flipped_byte_under_right_checksums_never_crashes(void **state)
     free(bytes);
 }
 
-typedef enum place { HEADER, TREE, TREELET, NODE_0, NODE_1, PLACEMENTS, PARTS, PAGE } place;
+typedef enum place { HEADER, TREE, TREELET, NODE_0, NODE_1, PLACEMENTS, PARTS, PAGE, RUNS, RUN_PAGE } place;
 
 /* One damage: `bytes` bytes of value, at an offset from the place; checksums are made right afterwards. */
 typedef struct damage {
@@ -225,6 +237,33 @@ static const damage damages[] = {
 };
 #define DAMAGES (sizeof damages / sizeof *damages)
 
+/* The same of v1-runs.stroll; these are made when they are needed. RUNS: the table's leaf, of two items that end at 8 and lie from 12
+ * on; RUN_PAGE: the first page of placements, of 512 items that lie from 2052 on. */
+static const damage run_damages[] = {
+    {"runs of too few placements", HEADER, STRL__AT_SECTIONS + STRL__SECTION_BYTES + 8, 8, 512},
+    {"runs too few", HEADER, STRL__AT_SECTIONS + 4 * STRL__SECTION_BYTES + 8, 8, 1},
+    {"runs not there", HEADER, 160, 4, 4},
+    {"runs as deep as can't be", HEADER, STRL__AT_SECTIONS + 4 * STRL__SECTION_BYTES + 4, 4, 4},
+    {"run that is too short", RUNS, 4, 4, 79},
+    {"run with a box that is no number", RUNS, 12, 8, 0x7ff8000000000000u},
+    {"run with a box without end", RUNS, 12 + 40, 8, 0x7ff0000000000000u},
+    {"run with a box upside down", RUNS, 12 + 24, 8, 0xc130000000000000u},
+    {"run with an area below nothing", RUNS, 12 + 48, 4, 0xbf800000},
+    {"run with an area that is no number", RUNS, 12 + 48, 4, 0x7fc00000},
+    {"run with a normal off its square", RUNS, 12 + 56, 2, 1024},
+    {"run with a page of another size", RUNS, 12 + 60, 4, 55296},
+    {"run with a page that is not there", RUNS, 12 + 64, 8, (uint64_t)1 << 40},
+    {"run with a page between others", RUNS, 12 + 64, 8, 4160 + 32},
+    {"run with a page that is another piece", RUNS, 12 + 64, 8, 4096},
+    {"page of too many placements", RUN_PAGE, 0, 4, 513},
+    {"page with a placement that is too long", RUN_PAGE, 4, 4, 105},
+    {"placement of no tree", RUN_PAGE, 2052, 4, 1},
+    {"placement of no part", RUN_PAGE, 2056, 4, 9},
+    {"placement with a number without end", RUN_PAGE, 2060, 8, 0x7ff0000000000000u},
+    {"placement with what is no number", RUN_PAGE, 2060 + 88, 8, 0x7ff8000000000000u},
+};
+#define RUN_DAMAGES (sizeof run_damages / sizeof *run_damages)
+
 static uint64_t locate(const uint8_t *bytes, place where)
 {
     uint64_t trees = strl__load_le(bytes + STRL__AT_SECTIONS + 16, 8), treelet = strl__load_le(bytes + trees + 120, 8);
@@ -246,6 +285,10 @@ static uint64_t locate(const uint8_t *bytes, place where)
         return strl__load_le(bytes + STRL__AT_SECTIONS + (size_t)2 * STRL__SECTION_BYTES + 16, 8);
     case PAGE:
         return strl__load_le(bytes + node + 208, 8);
+    case RUNS:
+        return strl__load_le(bytes + STRL__AT_SECTIONS + (size_t)4 * STRL__SECTION_BYTES + 16, 8);
+    case RUN_PAGE:
+        return strl__load_le(bytes + locate(bytes, RUNS) + 12 + 64, 8);
     }
     return 0;
 }
@@ -297,6 +340,36 @@ static void store(const char *name, const uint8_t *bytes, size_t size)
     assert_int_equal(fclose(file), 0);
 }
 
+/* A container of runs with a damage under right checksums, malloc'ed. */
+static uint8_t *damaged_runs(const uint8_t *bytes, size_t size, const damage *what)
+{
+    uint8_t *copy = malloc(size);
+    assert_non_null(copy);
+    memcpy(copy, bytes, size);
+    strl__store_le(copy + locate(bytes, what->place) + what->at, what->bytes, what->value);
+    reseal_all(copy, size, NULL, NULL);
+    return copy;
+}
+
+static void update_runs(json_t *expected, json_t *refused)
+{
+    size_t size;
+    uint8_t *bytes = container_of_runs(&size);
+    store("v1-runs.stroll", bytes, size);
+    store("../../../fuzz/corpus/container/v1-runs.stroll", bytes, size);
+    json_object_set_new(expected, "v1-runs.stroll", describe(bytes, size));
+    for (size_t i = 0; i < RUN_DAMAGES; i++) {
+        uint8_t *copy = damaged_runs(bytes, size, &run_damages[i]);
+        strl_error err = {0};
+        uint64_t digest;
+        if (fixture_try(copy, size, &digest, &err) == STRL_OK)
+            fail_msg("%s is accepted", run_damages[i].file);
+        json_object_set_new(refused, run_damages[i].file, json_string(err.message));
+        free(copy);
+    }
+    free(bytes);
+}
+
 static void update_golden(void)
 {
     size_t size;
@@ -317,6 +390,7 @@ static void update_golden(void)
             fail_msg("%s is accepted", what->file);
         json_object_set_new(refused, what->file, json_string(err.message));
     }
+    update_runs(expected, refused);
     json_object_set_new(expected, "refused", refused);
     free(bytes);
     bytes = make_container(6, &size); /* 136 nodes: two treelets */
@@ -347,7 +421,7 @@ static void the_committed_containers_read_as_committed(void **state)
     (void)state;
     if (getenv("STRL_UPDATE_GOLDEN"))
         update_golden();
-    static const char *const names[] = {"v1-small.stroll", "v1-treelets.stroll"};
+    static const char *const names[] = {"v1-small.stroll", "v1-treelets.stroll", "v1-runs.stroll"};
     json_t *expected = load_expected();
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         size_t size;
@@ -369,7 +443,7 @@ static void each_committed_bad_container_is_refused_with_its_sentence(void **sta
 {
     (void)state;
     json_t *expected = load_expected(), *refused = json_object_get(expected, "refused");
-    assert_int_equal(json_object_size(refused), DAMAGES);
+    assert_int_equal(json_object_size(refused), DAMAGES + RUN_DAMAGES);
     for (size_t i = 0; i < DAMAGES; i++) {
         const char *sentence = json_string_value(json_object_get(refused, damages[i].file));
         assert_non_null(sentence);
@@ -384,6 +458,49 @@ static void each_committed_bad_container_is_refused_with_its_sentence(void **sta
         free(bytes);
     }
     json_decref(expected);
+}
+
+static void each_damage_of_runs_is_refused_with_its_sentence(void **state)
+{
+    (void)state;
+    size_t size;
+    char path[512];
+    golden_path(path, "v1-runs.stroll");
+    uint8_t *bytes = fixture_load(path, &size);
+    json_t *expected = load_expected(), *refused = json_object_get(expected, "refused");
+    for (size_t i = 0; i < RUN_DAMAGES; i++) {
+        uint8_t *copy = damaged_runs(bytes, size, &run_damages[i]);
+        strl_error err = {0};
+        uint64_t digest;
+        assert_int_not_equal(fixture_try(copy, size, &digest, &err), STRL_OK);
+        assert_string_equal(err.message, json_string_value(json_object_get(refused, run_damages[i].file)));
+        free(copy);
+    }
+    json_decref(expected);
+    free(bytes);
+}
+
+/* In the table of runs every byte; of placements one in 97. */
+static void a_flipped_byte_of_runs_is_detected_or_harmless(void **state)
+{
+    (void)state;
+    size_t size;
+    uint8_t *bytes = container_of_runs(&size), *copy = malloc(size);
+    assert_non_null(copy);
+    const uint64_t runs = locate(bytes, RUNS), page = locate(bytes, RUN_PAGE);
+    for (size_t i = 0; i < 172 + 55300 / 97; i++) {
+        uint64_t at = i < 172 ? runs + i : page + (i - 172) * 97;
+        strl_error err = {0};
+        uint64_t digest;
+        memcpy(copy, bytes, size);
+        copy[at] ^= 0x41;
+        assert_refused(copy, size);
+        reseal_all(copy, size, NULL, NULL);
+        if (fixture_try(copy, size, &digest, &err) != STRL_OK)
+            assert_true(err.message[0]);
+    }
+    free(copy);
+    free(bytes);
 }
 
 static void a_sentence_names_the_file(void **state)
@@ -422,6 +539,8 @@ int main(void)
         cmocka_unit_test(a_source_that_ends_early_gives_its_own_sentence),
         cmocka_unit_test(a_flipped_byte_is_detected_wherever_it_means_something),
         cmocka_unit_test(a_flipped_byte_under_right_checksums_never_crashes),
+        cmocka_unit_test(each_damage_of_runs_is_refused_with_its_sentence),
+        cmocka_unit_test(a_flipped_byte_of_runs_is_detected_or_harmless),
         cmocka_unit_test(a_sentence_names_the_file),
         cmocka_unit_test(a_count_that_the_file_cannot_hold_takes_no_memory),
     };

@@ -25,6 +25,7 @@
 typedef struct model {
     char folder[64];
     char input[96], good[96], bad[96];
+    uint32_t copies; /* in the planted one, each turned, mirrored or sheared; 0 = it is placed once, as it is */
 } model;
 
 /* A grid of rows x columns; closed: wrapped both ways round a torus. */
@@ -58,6 +59,7 @@ static inline void model_write_ply(const char *path, unsigned rows, unsigned col
 static inline void model_setup(model *self, unsigned rows, unsigned columns, bool closed)
 {
     strcpy(self->folder, "/tmp/strl-verify-XXXXXX");
+    self->copies = 0;
     assert_non_null(mkdtemp(self->folder));
     snprintf(self->input, sizeof self->input, "%s/input.ply", self->folder);
     snprintf(self->good, sizeof self->good, "%s/good.stroll", self->folder);
@@ -110,6 +112,16 @@ static inline void model__copy_node(strl_container *from, strl_container_writer 
     strl_arena_deinit(&arena);
 }
 
+static inline void model__place(const model *self, strl_container_writer *to)
+{
+    strl_error err = {0};
+    for (uint32_t i = 0; i < self->copies; i++) {
+        double turn = 0.1 * i, c = cos(turn), s = sin(turn), flip = i % 3 ? 1 : -2;
+        const strl_placement copy = {.transform = {c, -s, 0.01 * i, 20. * (i % 32), s, c, 0, 20. * (i / 32), 0, i % 5 * 0.3, flip, 0}};
+        model__check(strl_container_writer_add_placement(to, &copy, &err), &err);
+    }
+}
+
 /* Writes self->bad. */
 static inline void model_plant(const model *self, model_fault fault, void *context)
 {
@@ -126,6 +138,7 @@ static inline void model_plant(const model *self, model_fault fault, void *conte
     for (uint32_t id = 0; id < tree->node_count; id++)
         model__copy_node(from, to, id, fault, context);
     model__check(strl_container_writer_end_tree(to, &err), &err);
+    model__place(self, to);
     model__check(strl_container_writer_finish(to, &bytes, &err), &err);
     strl_container_writer_destroy(to);
     strl_container_close(from);

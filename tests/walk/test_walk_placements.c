@@ -157,13 +157,15 @@ static void placements_share_keys_and_uploads(void **state)
     strl_renderer_destroy(renderer);
 }
 
-/* Roots are kept, whether one of their placements is seen or not: what comes into view is drawn at once. */
+/* Roots are kept, whether one of their placements is seen or not, and so are placements while there is room: what comes back into
+ * view is drawn at once. */
 static void what_comes_back_into_view_is_there_at_once(void **state)
 {
     (void)state;
     const strl_walk_desc desc = {.memory_bytes = 8u << 20};
     strl_walk *walk = open_walk(memory_source(shared.bytes, shared.size), &desc);
     const strl_camera away = look(60, 5, -40, 60, -140), there = look(60, 300, 61, 60, 60);
+    settle(walk, &there, 500);
     for (unsigned frame = 0; frame < 100; frame++)
         assert_int_equal(walk_frame(walk, &away).count, 0);
     const strl_draw_list list = walk_frame(walk, &there);

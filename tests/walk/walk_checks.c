@@ -71,6 +71,7 @@ static strl_status watched_read(strl_source *source, uint64_t offset, void *data
     watched_source *self = (watched_source *)source;
     if (self->walking)
         fail_msg("a frame waits for a read");
+    self->read_bytes += size;
     return strl_source_read(self->inner, offset, data, size, err);
 }
 

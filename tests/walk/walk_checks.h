@@ -23,6 +23,7 @@ typedef struct watched_source {
     uint64_t wanted_bytes, most_wanted_bytes; /* asked for and not answered: now, and at most */
     uint32_t asked[256]; /* bytes, by the token's last byte, which is the walk's slot */
     uint64_t came_bytes;
+    uint64_t read_bytes; /* while somebody waited */
     strl_source_result held; /* waits for the link */
     bool holds;
 } watched_source;
