@@ -107,7 +107,9 @@ def a_request_that_dribbles_in_is_ended(folder):
         with server.connect() as kept:
             kept.sendall(head("GET", "/model.stroll", close=False, Range="bytes=0-5"))
             check(read_answer(kept).status == 206 and is_ended(kept))
-        server.wait_for('rejected_total{reason="timeout"}', 4)
+        server.wait_for('rejected_total{reason="timeout"}', 3)
+        server.wait_for('rejected_total{reason="idle"}', 1)
+        check(server.metrics()['rejected_total{reason="timeout"}'] == 3, server.metrics())
 
 
 def a_reader_that_does_not_read_is_ended(folder):
