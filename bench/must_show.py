@@ -4,9 +4,9 @@
     bench/must_show.py --data DIR [--models a,b] [--parts build,images,...] [--frames N] [--again] [--write-docs]
 
 A model is a file of DIR (NAME.ply, .stl, .obj, .glb, or those with .zst), an archive (NAME.tar or .tar.zst) whose .gltf files
-make one model, or isosurface_N, boxes_N or plant_N (isosurface_10m), which is generated, with _shuffled behind it in a random
-order, with _stl behind that as STL. --models replaces each part's own
-models. Parts:
+make one model, or isosurface_N, boxes_N, plant_N, chessboard_N or landscape_N (isosurface_10m), which is generated, with
+_shuffled behind it in a random order, with _stl, _obj or _placed (glTF with copies) behind that as such a file. --models
+replaces each part's own models. Parts:
 
     build         one build under --memory 1G: counts, bytes per triangle, peak memory, root      (all models)
     images        orbit and fly-through against the input as read: coverage, depth; sheets        (all models)
@@ -28,6 +28,8 @@ models. Parts:
     kills         a build killed at random moments and resumed, until --kills of them            (isosurface_10m)
     cap           a build under the system's own limit, which ends a program that passes it   (isosurface_10m, plant_1m)
     walk_cold     a walk under --memory 600M, the file cold and warm                   (isosurface_10m, isosurface_372m)
+    theorem       sample trees: how many fronts' cells show none of their visible triangles  (chessboard, isosurface, scans, landscape)
+    splats        sample trees with splats of 1, 3 and 5 pixels against the input as read        (landscape_2m_obj, dragon_scans)
 
 The largest scene takes 9 GB of --scratch, its build 30 GB more. Parts scale, shapes and walk_cold delete the scenes that
 they have made (--keep leaves them).
@@ -48,6 +50,7 @@ import counts
 import file_parts
 import measure
 import promise_parts
+import sample_parts
 import scale_parts
 import scene_parts
 import sheets
@@ -58,7 +61,7 @@ MODELS = ("terrain_n49e011", "dragon_scans", "iso_engine", "motorBike", "turbine
 PATHS = ("orbit", "flythrough")
 SUFFIXES = (".ply", ".stl", ".obj", ".glb")
 ARCHIVES = (".tar", ".tar.zst")
-SCENE = re.compile(r"(isosurface|boxes|plant|chessboard|landscape)_(\d+)([kmg]?)(_shuffled)?(_stl|_placed)?")
+SCENE = re.compile(r"(isosurface|boxes|plant|chessboard|landscape)_(\d+)([kmg]?)(_shuffled)?(_stl|_placed|_obj)?")
 ARRAY = re.compile(r"(\w+)_x(\d+)")  # so many copies of a model
 BACKEND_FRAMES = 8
 ROOMY = ("--memory", "4G", "--gpu-memory", "4G")  # images are of one pixel, whatever that takes
@@ -134,7 +137,7 @@ class Bench:
         if not scene and not array:
             return None
         placed = array or scene[5] == "_placed" or scene[1] == "plant"
-        return self.scratch / f"{model}.{'gltf' if placed else 'stl' if scene[5] else 'ply'}"
+        return self.scratch / f"{model}.{'gltf' if placed else (scene[5] or '_ply')[1:]}"
 
     def forget_scenes(self, models):
         """Those that anybody can generate again."""
@@ -383,7 +386,7 @@ PARTS = {"build": (part_build, MODELS), "images": (part_images, MODELS), "psnr":
          "sizes": (part_sizes, ("isosurface_1m", "isosurface_10m", "dragon_scans", "terrain_n49e011", "iso_cthead", "boxes_1m")),
          "dependencies": (part_dependencies, ("isosurface_10m",)),
          "walk": (part_walk, (("isosurface_1m", "isosurface_10m"),)), "roots": (part_roots, ("",)), **scale_parts.PARTS,
-         **promise_parts.PARTS, **file_parts.PARTS, **scene_parts.PARTS}
+         **promise_parts.PARTS, **file_parts.PARTS, **scene_parts.PARTS, **sample_parts.PARTS}
 
 
 def models_of(part, chosen):
@@ -437,6 +440,7 @@ def parse_options():
     parser.add_argument("--runs", type=int, default=3,
                         help="builds of each model in parts scale, shapes and claims; one of what is over 20 M triangles (3)")
     parser.add_argument("--kills", type=int, default=50, help="of builds in part kills (50)")
+    parser.add_argument("--theorem-pairs", type=int, default=1_000_000, help="of cells and eyes in part theorem (1,000,000)")
     parser.add_argument("--again", action="store_true", help="measure what the log has already")
     parser.add_argument("--keep", action="store_true", help="keep the frames, and the scenes that parts delete")
     parser.add_argument("--write-docs", action="store_true", help="put the figures of the log into the tables, the counts and the errors")

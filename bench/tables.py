@@ -126,6 +126,37 @@ def walk_rows(records):
             yield (record["model"], name, *(number(float(figures[column]), digits) for column in ("median", "q1", "q3", "p99")))
 
 
+def share_text(bounds):
+    return "-" if bounds is None else f"{bounds[0]:.2g} to {bounds[1]:.2g}"
+
+
+def theorem_rows(records):
+    for record in records_of(records, "theorem"):
+        for row in record["rows"]:
+            yield (record["model"], row["asked"], number(row["candidates"]),
+                   f"{number(row['triangles_median'])}, {number(row['triangles_most'])}", number(row["pairs"]),
+                   number(row["hidden"]), share_text(row["hidden_bounds"]), number(row["holds_of_all"]), number(row["premise"]),
+                   number(row["broken"]), share_text(row["broken_bounds"]), number(row["holds"]), number(row["failing_cells"]))
+
+
+def unsampled_rows(records):
+    for record in records_of(records, "theorem"):
+        row = record["rows"][0]
+        yield (record["model"], number(row["pairs"]), percent(row["unsampled"] / row["pairs"]),
+               percent(row["above_unsampled"] / row["pairs"]))
+
+
+def splat_rows(records):
+    for record in records_of(records, "splats"):
+        for row in record["rows"]:
+            compare = row["compare"]
+            either = max(1, compare["covered_in_either"])
+            yield (record["model"], row["path"], row["splat"], compare["frames"], percent(compare["differing_pixels"] / either, 2),
+                   percent(compare["visibly_differing_pixels"] / either, 2), number(compare["psnr_median_db"]),
+                   number(compare["psnr_min_db"]), number(compare["uncovered_pixels"]), number(compare["overcovered_pixels"]),
+                   percent(compare["depth_within"], 2), number(int(row["triangles"]["median"])), number(int(row["splats"]["median"])))
+
+
 def root_rows(records):
     for record in records_of(records, "root"):
         report, root = record["report"], record["report"].get("root_triangles")
@@ -527,6 +558,15 @@ TABLES = (
     ("large", "Walks through large scenes",
      ("model and structure", "triangles stored", "triangles placed", "placements", "container", "frame_ms, median", "p99", "select_ms, median",
       "triangles", "splats", "draws", "pages read a frame", "missing nodes, p99"), large_rows),
+    ("theorem", "Sample trees: cells of which no visible triangle is drawn",
+     ("model", "p", "cells that can fail", "triangles of one, median, most", "pairs of cell and eye", "fail", "share, 95 %",
+      "not above 1 - p", "pairs of the premise", "of these fail", "share, 95 %", "not above 1 - p", "cells that ever fail"),
+     theorem_rows),
+    ("theorem", "Sample trees: pairs without a drawn triangle in 16 x 16 samples",
+     ("model", "pairs of cell and eye", "drawn: the cell's and what is above it", "drawn: what is above it"), unsampled_rows),
+    ("splats", "Sample trees with splats, against the input as read",
+     ("model", "path", "splat px", "frames", "pixels that differ", "by more than 16 of 255", "PSNR median dB", "least dB",
+      "uncovered", "overcovered", "depth within", "triangles a frame", "splats a frame"), splat_rows),
     ("roots", "Roots", ("file", "triangles in", "root triangles", f"at most {MOST_ROOT_TRIANGLES:,}"), root_rows),
 )
 

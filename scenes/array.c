@@ -34,7 +34,7 @@ typedef struct array_scene {
     array_corner *corners;    /* [3 * AT_ONCE] */
     float low[3], high[3];
     uint64_t count, copies; /* triangles */
-    bool has_normals, has_texcoords;
+    bool has_normals;
     int up;
 } array_scene;
 

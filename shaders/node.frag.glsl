@@ -3,6 +3,7 @@
 in highp vec3 v_view;
 in highp vec3 v_normal;
 in highp vec4 v_colour;
+flat in highp float v_spread;
 flat in highp uint v_shift;
 
 uniform highp vec4 u_projection;
@@ -27,6 +28,19 @@ int bayer(ivec2 pixel)
     return ((x & 1) << 5) | ((y & 1) << 4) | ((x & 2) << 2) | ((y & 2) << 1) | ((x & 4) >> 1) | ((y & 4) >> 2);
 }
 
+#ifdef STRL_ALPHA
+/* Of what is spread, more is seen of the faces that are turned to the eye. Their directions lie about the mean normal like a power of the
+ * cosine: the mean of squares is `along` it and `across` it; `turned` is the mean of normals as often as they are seen. What is seen faces
+ * the eye by the root of the mean square, of any direction by 2 / 3. */
+void spread(vec3 normal, vec3 to_eye, inout float facing, inout float up)
+{
+    float mean = 1.0 - 0.5 * v_spread, along = mean / (2.0 - mean), across = 0.5 - 0.5 * along;
+    vec3 turned = across * to_eye + (along - across) * dot(normal, to_eye) * normal;
+    facing = sqrt(max(dot(turned, to_eye), 0.0)) * mix(1.0, 1.1547, v_spread);
+    up = dot(normalize(turned), u_sky_up);
+}
+#endif
+
 void main()
 {
     vec3 normal = v_normal;
@@ -49,6 +63,10 @@ void main()
     float facing = dot(normal, to_eye);
     float up = dot(facing < 0.0 ? -normal : normal, u_sky_up);
     facing = abs(facing);
+#ifdef STRL_ALPHA
+    if (v_spread > 0.0)
+        spread(normal, to_eye, facing, up);
+#endif
     vec3 light = AMBIENT + facing * (facing * u_headlight + mix(GROUND, SKY, 0.5 + 0.5 * up));
     out_colour = vec4(encoded_of(v_colour.rgb * light), 1.0);
 #ifdef STRL_SYMMETRIC_DEPTH

@@ -26,6 +26,7 @@ uniform highp vec4 u_section; /* view space: drawn is dot(xyz, p) + w >= 0 */
 out highp vec3 v_view;
 out highp vec3 v_normal;
 out highp vec4 v_colour;
+flat out highp float v_spread; /* of the directions that a splat stands for: 0 = one, 1 = any */
 flat out highp uint v_shift; /* of the pattern that thins out; 0 for triangles */
 invariant gl_Position;
 
@@ -75,7 +76,8 @@ void main()
 
     gl_PointSize = intBitsToFloat(high.w);
     v_shift = high.w != 0 ? hash(uvec3(in_position)) : 0u;
-    vec3 normal = decode_normal(in_normal);
+    vec3 normal = decode_normal(in_normal & 1023u);
+    v_spread = float(in_normal.x >> 10) / 63.0;
     v_view = view;
     v_normal = vec3(dot(ITEM_ROW(3).xyz, normal), dot(ITEM_ROW(4).xyz, normal), dot(ITEM_ROW(5).xyz, normal));
     vec3 tint = vec3(ITEM_ROW(3).w, ITEM_ROW(4).w, ITEM_ROW(5).w);

@@ -26,7 +26,7 @@ typedef struct compare_options {
 /* Over all frames. */
 typedef struct compare_totals {
     size_t frames;
-    uint64_t uncovered, overcovered, both, depth_outside;
+    uint64_t uncovered, overcovered, both, depth_outside, either, differing, visibly_differing;
     size_t worst_coverage_frame, worst_depth_frame, worst_psnr_frame;
     uint64_t worst_coverage, worst_outside;
     double *psnr_db; /* [frames], owned; of frames in which something is covered the first psnr_count */
@@ -74,6 +74,9 @@ static void add_frame(compare_totals *totals, size_t frame, const strl_compare_f
     totals->overcovered += result->overcovered;
     totals->both += result->both;
     totals->depth_outside += result->depth_outside;
+    totals->either += result->either;
+    totals->differing += result->differing;
+    totals->visibly_differing += result->visibly_differing;
     if (coverage > totals->worst_coverage)
         totals->worst_coverage = coverage, totals->worst_coverage_frame = frame;
     if (result->depth_outside > totals->worst_outside)
@@ -213,10 +216,11 @@ static void print_json(const compare_options *o, const compare_totals *t, bool h
 {
     printf("{\"frames\":%zu,\"error_px\":%.6g,\"uncovered_pixels\":%" PRIu64 ",\"overcovered_pixels\":%" PRIu64
            ",\"worst_coverage_frame\":%zu,"
-           "\"covered_in_both\":%" PRIu64
+           "\"covered_in_both\":%" PRIu64 ",\"covered_in_either\":%" PRIu64 ",\"differing_pixels\":%" PRIu64
+           ",\"visibly_differing_pixels\":%" PRIu64
            ",\"depth_within\":%.8f,\"worst_depth_frame\":%zu,\"psnr_min_db\":%.4f,\"psnr_median_db\":%.4f,"
            "\"worst_psnr_frame\":%zu,\"least_psnr_db\":%.6g,\"holds\":%s}\n",
-           t->frames, o->error_px, t->uncovered, t->overcovered, t->worst_coverage_frame, t->both, depth_share(t),
+           t->frames, o->error_px, t->uncovered, t->overcovered, t->worst_coverage_frame, t->both, t->either, t->differing, t->visibly_differing, depth_share(t),
            t->worst_depth_frame, t->psnr_least, t->psnr_median, t->worst_psnr_frame, o->least_psnr_db,
            holds ? "true" : "false");
 }
@@ -228,8 +232,9 @@ static void print_text(const compare_totals *t)
            t->overcovered, t->worst_coverage_frame);
     printf("depth     %.4f %% of %" PRIu64 " pixels within the range (worst frame %zu)\n", 100 * depth_share(t),
            t->both, t->worst_depth_frame);
-    printf("colour    PSNR median %.2f dB, least %.2f dB (frame %zu)\n", t->psnr_median, t->psnr_least,
-           t->worst_psnr_frame);
+    printf("colour    PSNR median %.2f dB, least %.2f dB (frame %zu); %.2f %% of the covered pixels differ, %.2f %% by more than 16 of 255\n",
+           t->psnr_median, t->psnr_least, t->worst_psnr_frame, 100 * (double)t->differing / (double)t->either,
+           100 * (double)t->visibly_differing / (double)t->either);
 }
 
 static int run(strl_cli_args *args)

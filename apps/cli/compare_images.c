@@ -3,8 +3,10 @@
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdlib.h>
 
 #define MOST_DB 100.0
+#define VISIBLE_STEPS 16 /* of 255 */
 
 typedef struct frame_size {
     int width, height;
@@ -79,6 +81,21 @@ static double psnr(const strl_compare_side *a, const strl_compare_side *b, size_
     return fmin(MOST_DB, 10 * log10(255.0 * 255.0 * 3 * (double)*either / sum));
 }
 
+static void count_differing(const strl_compare_side *a, const strl_compare_side *b, size_t pixels, strl_compare_frame *result)
+{
+    for (size_t p = 0; p < pixels; p++) {
+        int most = 0;
+        if (!covered(a->depth, p) && !covered(b->depth, p))
+            continue;
+        for (size_t c = 0; c < 3; c++) {
+            int difference = abs(a->rgb[3 * p + c] - b->rgb[3 * p + c]);
+            most = difference > most ? difference : most;
+        }
+        result->differing += most > 0;
+        result->visibly_differing += most > VISIBLE_STEPS;
+    }
+}
+
 void strl_compare_images(const strl_compare_side *reference, const strl_compare_side *image, uint32_t width,
                          uint32_t height, double error_px, double focal_px, strl_compare_frame *result)
 {
@@ -90,4 +107,5 @@ void strl_compare_images(const strl_compare_side *reference, const strl_compare_
             compare_depth(reference->depth, image->depth, size, x, y, error_px / focal_px, result);
         }
     result->psnr_db = psnr(reference, image, (size_t)width * height, &result->either);
+    count_differing(reference, image, (size_t)width * height, result);
 }

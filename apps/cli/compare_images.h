@@ -20,6 +20,8 @@ typedef struct strl_compare_frame {
         depth_outside; /* of them, those whose depth leaves the range of the reference's 3x3 neighbourhood, widened by
                                error_px * z / focal_px */
     uint64_t either;      /* pixels covered in either */
+    uint64_t differing;   /* of them, those of another colour */
+    uint64_t visibly_differing; /* of them, those of which a channel differs by more than 16 of 255 */
     double psnr_db;       /* over RGB of those; at most 100; 100 where there is none */
 } strl_compare_frame;
 

@@ -46,7 +46,7 @@ static const char vertex_shader[] =
     "}\n"
     "vec3 decoded(uvec2 octahedral)\n"
     "{\n"
-    "    vec2 p = vec2(octahedral) * (2.0 / 1023.0) - 1.0;\n"
+    "    vec2 p = vec2(octahedral & 1023u) * (2.0 / 1023.0) - 1.0;\n" /* the spread of splats lies above */
     "    float z = 1.0 - abs(p.x) - abs(p.y), fold = max(-z, 0.0);\n"
     "    p += vec2(p.x >= 0.0 ? -fold : fold, p.y >= 0.0 ? -fold : fold);\n"
     "    return normalize(vec3(p, z));\n"

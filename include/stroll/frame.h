@@ -19,10 +19,15 @@ typedef struct strl_camera {
     uint32_t width, height; /* pixels of the output: what a pixel error counts in */
 } strl_camera;
 
+/* How far the faces that a splat stands for differ in direction, in normal[0] of its vertex: 0 = they are parallel, to
+ * STRL_SPREAD_MOST = any direction. Light falls on what is spread more evenly than on a face of the mean normal. */
+#define STRL_SPREAD_SHIFT 10
+#define STRL_SPREAD_MOST 63u
+
 /* A vertex as the GPU reads it: 20 bytes. */
 typedef struct strl_vertex {
     int32_t position[3]; /* lattice units from the item's anchor; see strl_positions */
-    uint16_t normal[2];  /* octahedral, 0..1023 each */
+    uint16_t normal[2];  /* octahedral, 0..1023 each; of splats the bits of normal[0] above these ten are their spread */
     uint8_t rgba[4];     /* vertex colour x material colour, sRGB-encoded */
 } strl_vertex;
 

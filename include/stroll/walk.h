@@ -37,7 +37,7 @@ typedef struct strl_walk_desc {
     uint64_t memory_bytes;     /* hard bound of decoded nodes and node records held; 0 = 512 MiB. Pages that wait for decoding
                                   come on top: requests_in_flight of them at most */
     double error_px;           /* allowed pixel error; 0 = 1 */
-    double splat_px;           /* of sample trees: cells that cover no more than a square of this side are drawn as splats of it;
+    double splat_px;           /* of sample trees: cells that cover no more than a square of this side are drawn as splats of at most it;
                                   0 = error_px. Where error_px is changed later, it changes in proportion */
     uint32_t requests_in_flight; /* 0 = 16, of a remote source 64; at most 256. Of a remote source fewer, as bandwidth and
                                     latency want it */

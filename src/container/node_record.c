@@ -185,6 +185,9 @@ static strl_status check_counts(const strl_node *node, uint32_t id, const strl_t
         return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": the rung is %" PRIu32 ", expected %d %s in a tree of structure %d", id,
                           node->rung, STRL_RUNG_SAMPLED, tree->structure == STRL_STRUCTURE_SAMPLES ? "alone" : "never",
                           (int)tree->structure);
+    if (tree->structure == STRL_STRUCTURE_SAMPLES && node->decode_parent != STRL_NONE)
+        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": decode parent is %" PRIu32 ", expected none in a sample tree", id,
+                          node->decode_parent);
     if (node->group_size == 0)
         return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": the group's size is 0, expected at least 1", id);
     if (node->decode_parent != STRL_NONE && node->decode_parent != node->parent)

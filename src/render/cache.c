@@ -123,6 +123,8 @@ void strl__cache_commit(strl_cache_entry *entry, const strl_draw_item *item, uin
 
 bool strl__item_is_translucent(const strl_draw_item *item)
 {
+    if (item->point_px > 0)
+        return true;
     for (uint32_t v = 0; v < item->vertex_count; v++)
         if (item->vertices[v].rgba[3] != 255)
             return true;

@@ -19,7 +19,7 @@ typedef struct strl_cache_entry {
     uint64_t frame;      /* the list whose indices these are; 0 = unknown */
     uint64_t batch;      /* the backend's: the batch of draws that uses it last */
     uint64_t bytes;
-    bool translucent;    /* some vertex has alpha below 255 */
+    bool translucent;    /* some vertex has alpha below 255, or they are splats */
     uint64_t styles_version;     /* of the uploaded vertices, counted from 1; 0 = without */
     bool styled, hides, hidden;  /* as uploaded: some vertex is not plain; some, all vertices are hidden */
     bool lines;          /* indices are expanded to lines */

@@ -51,9 +51,10 @@ static strl_status check_numbers(const strl_draw_item *item, strl_error *err)
 static strl_status check_vertex(const strl_draw_item *item, uint32_t v, strl_error *err)
 {
     const strl_vertex *vertex = &item->vertices[v];
+    uint32_t most[2] = {item->point_px > 0 ? UINT16_MAX : NORMAL_MOST, NORMAL_MOST};
     for (int i = 0; i < 2; i++)
-        if (vertex->normal[i] > NORMAL_MOST)
-            return fail_item(item, err, "a normal's coordinate", vertex->normal[i], NORMAL_MOST);
+        if (vertex->normal[i] > most[i])
+            return fail_item(item, err, "a normal's coordinate", vertex->normal[i], most[i]);
     if (item->positions == STRL_POSITIONS_FLOAT)
         return STRL_OK;
     for (int i = 0; i < 3; i++) {

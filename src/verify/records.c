@@ -101,7 +101,7 @@ static void check_ranges(treelets *self, uint32_t id, strl__vnode *n)
 {
     const strl__vtree *tree = self->tree;
     RECORD_RULE(self,
-                (tree->structure == 3 ? n->rung == 4 : n->rung <= 3) && n->level < tree->level_count && n->group < tree->group_count && n->group_size >= 1 &&
+                (tree->structure == 3 ? n->rung == 4 && !n->told_by_parent : n->rung <= 3) && n->level < tree->level_count && n->group < tree->group_count && n->group_size >= 1 &&
                     n->group_size <= tree->node_count,
                 id, "tree %u node %u: rung %u, level %u of %u, group %u of %u with %u members", tree->index, id,
                 n->rung, n->level, tree->level_count, n->group, tree->group_count, n->group_size);

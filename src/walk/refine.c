@@ -64,10 +64,8 @@ static void apply_state(strl_walk *walk, strl__node *node, uint32_t state, bool 
     uint32_t before = mesh->state;
     uint32_t count_before = 3 * mesh->triangle_end[before], count = 3 * mesh->triangle_end[state];
     uint32_t first = UINT32_MAX, end = 0;
-    if (state > before)
-        walk->stats.vertex_splits += state - before;
-    else
-        walk->stats.vertex_collapses += before - state;
+    uint32_t moves = mesh->splat_end ? 0 : state > before ? state - before : before - state; /* in a brick no vertex moves */
+    *(state > before ? &walk->stats.vertex_splits : &walk->stats.vertex_collapses) += moves;
     if (state != before)
         strl__mesh_set_state(mesh, state, &first, &end);
     if (!was_drawn) {

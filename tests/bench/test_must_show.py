@@ -14,6 +14,7 @@ sys.path[:0] = [str(ROOT / "bench"), str(ROOT / "tests" / "support")]
 sys.dont_write_bytecode = True
 import measure
 import must_show
+import sample_parts
 import sanitized
 import sheets
 import tables
@@ -21,7 +22,7 @@ import tables
 MODELS = ("isosurface_3k", "isosurface_6k")
 ONE_EACH = ("build", "images_orbit", "images_flythrough", "psnr_orbit", "psnr_flythrough", "verify", "backends",
             "rate", "bytes", "sizes", "dependencies", "walk", "scale", "shapes", "cap", "walk_cold", "claims", "decode", "kills",
-            "model", "assembly", "sampled", "chessboard")
+            "model", "assembly", "sampled", "chessboard", "theorem", "splats")
 
 
 class Test:
@@ -44,7 +45,7 @@ class Test:
         command = [sys.executable, "-B", ROOT / "bench" / "must_show.py", "--data", self.data, "--stroll", self.program,
                    "--scratch", self.folder / "scratch", "--log", self.log, "--docs", self.docs,
                    "--counts", self.counts, "--errors", self.errors, "--kills", 2, "--models", ",".join(models), "--frames", 2, "--size", "160x90", "--pairs", 1,
-                   "--runs", 1, *words]
+                   "--runs", 1, "--theorem-pairs", 2000, *words]
         return subprocess.run([str(word) for word in command], capture_output=True, text=True)
 
     def test_parts(self):
@@ -82,6 +83,20 @@ class Test:
         text = self.docs.read_text()
         self.check("growth stands under the tables", f"from {MODELS[0]} to {MODELS[1]}: x " in text and
                    f"Frame work from {MODELS[0]} to {MODELS[1]} on one path" in text, text[-1500:])
+
+    def test_samples(self):
+        def near(bounds, low, high):
+            return abs(bounds[0] - low) < 1e-5 and abs(bounds[1] - high) < 1e-5
+        bounds = [sample_parts.share_bounds(*pair) for pair in ((0, 100), (5, 100), (100, 100), (0, 0))]
+        self.check("intervals are those of Clopper and Pearson", near(bounds[0], 0, 0.036217) and
+                   near(bounds[1], 0.016432, 0.112835) and near(bounds[2], 0.963783, 1) and bounds[3] is None, bounds)
+        records = measure.Log(self.log, {}).latest()
+        for model in MODELS:
+            rows = records["theorem", model]["rows"]
+            self.check(f"each triangle of {model} has its cell, and no premise is broken", all(row["lost"] == 0 for row in rows) and
+                       rows[0]["pairs"] == 2000 and rows[0]["premise"] > 1000 and rows[0]["broken"] == 0 and rows[0]["holds"], rows[0])
+            sizes = {(row["path"], row["splat"]) for row in records["splats", model]["rows"]}
+            self.check("splats of three sizes are compared on two paths", len(sizes) == 6, sizes)
 
     def test_tables(self):
         text = self.docs.read_text()
@@ -177,7 +192,7 @@ def main():
         return 77
     with tempfile.TemporaryDirectory() as folder:
         test = Test(program, pathlib.Path(folder))
-        for part in (test.test_parts, test.test_tables, test.test_scale, test.test_origins, test.test_sheet, test.test_png,
+        for part in (test.test_parts, test.test_samples, test.test_tables, test.test_scale, test.test_origins, test.test_sheet, test.test_png,
                      test.test_resume, test.test_refusals):
             part()
         return 1 if test.failures else 0

@@ -29,7 +29,7 @@ def placements_are_built_and_verified(folder):
     model.glb(f"{folder}/sheets.glb")
     result = build(f"{folder}/sheets.glb", f"{folder}/sheets.stroll")
     check_result(result)
-    assert (result["triangles_in"], result["parts"], result["materials"]) == (1800, 1, 1), result
+    assert (result["triangles_in"], result["parts"], result["materials"]) == (1800, 10, 1), result
     assert (result["trees"], result["placements"], result["triangles_placed"]) == (1, 9, 9 * 1800), result
     must("verify", f"{folder}/sheets.stroll", "--against", f"{folder}/sheets.glb")
     info = json.loads(must("info", f"{folder}/sheets.stroll", "--json").output)

@@ -151,6 +151,19 @@ class Test:
         status, answer, error = self.compare(off(10), "--psnr", "28")
         self.check("--psnr sets the limit", status == 0, (status, answer, error))
 
+    def test_differing(self):
+        """Of pixels covered in either: a frame has 640, and the background does not count."""
+        def change(frame, colour, depth):
+            colour[0][0] = [200, 0, 0]
+            if frame == 1:
+                colour[10][10], colour[11][11], colour[12][12] = ([v + by for v in colour[10][10]] for by in (1, 16, 17))
+                depth[2][3] = 11  # covered here alone
+                colour[2][3] = [255, 255, 255]
+
+        status, answer, error = self.compare(change, "--psnr", "0")
+        self.check("pixels that differ are counted, and those that do visibly", answer["differing_pixels"] == 4 and
+                   answer["visibly_differing_pixels"] == 2 and answer["covered_in_either"] == FRAMES * 640 + 1, (answer, error))
+
     def test_refusals(self):
         status, answer, error = self.compare(None, eye_x=1e-9)
         self.check("other cameras are refused", status == 1 and "different cameras" in error, error)
@@ -176,7 +189,8 @@ class Test:
 def main():
     with tempfile.TemporaryDirectory() as root:
         test = Test(os.path.abspath(sys.argv[1]), root)
-        for part in (test.test_equal, test.test_coverage, test.test_depth, test.test_colour, test.test_refusals):
+        for part in (test.test_equal, test.test_coverage, test.test_depth, test.test_colour, test.test_differing,
+                     test.test_refusals):
             part()
         return 1 if test.failures else 0
 

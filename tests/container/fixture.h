@@ -238,7 +238,7 @@ static inline strl_status fixture_add_all(const fixture *self, strl_container_wr
         status = fixture_add_node(writer, &self->nodes[0], &self->nodes[id], id, err);
     if (status == STRL_OK)
         status = strl_container_writer_end_tree(writer, err);
-    const strl_placement placement = {0, {1, 0, 0, 5, 0, 0, -1, 0, 0, 1, 0, 0}};
+    const strl_placement placement = {.transform = {1, 0, 0, 5, 0, 0, -1, 0, 0, 1, 0, 0}};
     if (status == STRL_OK)
         status = strl_container_writer_add_placement(writer, &placement, err);
     for (uint32_t i = 0; status == STRL_OK && i < FIXTURE_PARTS; i++) {

@@ -345,7 +345,7 @@ static void a_failed_writer_refuses_to_finish(void **state)
     uint64_t bytes;
     assert_ok(strl_container_writer_create(&desc, &writer, &err), &err);
     assert_ok(fixture_add_all(&self, writer, &err), &err);
-    const strl_placement nowhere = {9, {0}};
+    const strl_placement nowhere = {.tree = 9};
     assert_int_equal(strl_container_writer_add_placement(writer, &nowhere, &err), STRL_ERR_ARGUMENT);
     assert_int_equal(strl_container_writer_finish(writer, &bytes, &err), STRL_ERR_ARGUMENT);
     assert_true(bytes == 0);

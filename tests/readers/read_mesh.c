@@ -95,7 +95,8 @@ static strl_status add_pieces(strl_reader *reader, json_t *result, strl_error *e
         json_t *numbers = json_array();
         for (unsigned i = 0; i < 12; i++)
             json_array_append_new(numbers, json_real(placement.transform[i]));
-        json_array_append_new(placements, json_pack("[I,o]", (json_int_t)placement.piece, numbers));
+        json_array_append_new(placements, json_pack("[I,o,s]", (json_int_t)placement.piece, numbers,
+                                                    strl_reader_part_name(reader, placement.part)));
     }
     strl_reader_drops drops;
     strl_reader_drops_get(reader, &drops);

@@ -35,7 +35,7 @@ def add_sheet(model, side, shift=0.0, **members):
 def check_placements(found, wanted):
     """wanted: pairs of piece and rows."""
     assert found["placement_count"] == len(wanted), (found["placement_count"], len(wanted))
-    for (piece, got), (wanted_piece, rows) in zip(found["placements"], wanted):
+    for (piece, got, _), (wanted_piece, rows) in zip(found["placements"], wanted):
         flat = [x for row in rows for x in row]
         assert piece == wanted_piece and max(abs(a - b) for a, b in zip(got, flat)) < 1e-6, (piece, got, flat)
 
@@ -55,7 +55,9 @@ def meshes_of_many_uses_are_pieces_in_their_own_coordinates(folder):
         assert piece["hash"] == w.position_hash(w.triangles(*sheet(side, shift))), piece
     above, mirror = w.compose((1, 2, 3), turn), w.compose(scale=(-2, 2, 2))
     check_placements(found, [(1, above), (2, w.multiply(above, w.compose((0, 0, 3)))), (1, mirror), (2, mirror)])
-    assert found["hint"] == 50 + 3200 + 5000 and found["parts"][:2] == ["pipe", "mesh 2"], found["parts"]
+    # Placements have the names that copies would have; what is placed has its own beside them.
+    assert [name for _, _, name in found["placements"]] == ["pipe", "pipe/node 0", "pipe (node 3)", "pipe/node 2"], found["placements"]
+    assert found["hint"] == 50 + 3200 + 5000 and found["parts"][4:6] == ["pipe (mesh 1)", "mesh 2"], found["parts"]
     whole = read(f"{folder}/a.glb")
     assert whole["count"] == 50 + 2 * 3200 + 2 * 5000, whole["count"]
 

@@ -381,6 +381,39 @@ static void hidden_and_marked_parts_are_drawn_so_and_back(void **state)
     patches_deinit(&all);
 }
 
+/* A placement that is a part as a whole looks as if all of its vertices were of it, and costs no upload. */
+static void placements_are_parts_as_a_whole(void **state)
+{
+    (void)state;
+    static picture by_label, by_placement;
+    static strl_vertex_label labels[3][PATCH_VERTICES];
+    static const strl_renderer_desc descs[] = {{.backend = STRL_BACKEND_GL45}, {.backend = STRL_BACKEND_GL3},
+                                               {.backend = STRL_BACKEND_GL3, .gles = true}};
+    const uint8_t styles[] = {STRL_PART_HIDDEN, STRL_PART_MARKED};
+    const strl_draw_options options = {.part_styles = styles, .part_count = 2};
+    patches all;
+    patches_init(&all, (patches_desc){.side = 3, .flat = true});
+    for (uint32_t part = 0; part < 3; part++)
+        for (int v = 0; v < PATCH_VERTICES; v++)
+            labels[part][v].part = part;
+    strl_camera camera = patches_camera(&all, WIDTH, HEIGHT, 0.6);
+    for (size_t d = 0; d < sizeof descs / sizeof *descs; d++) {
+        for (uint32_t i = 0; i < all.count; i++)
+            all.items[i].labels = labels[i % 3], all.items[i].own_part = 0;
+        shoot_once(descs[d], &camera, &all.list, &options, &by_label);
+        for (uint32_t i = 0; i < all.count; i++)
+            all.items[i].labels = NULL, all.items[i].own_part = i % 3 + 1;
+        strl_renderer *renderer = make(descs[d]);
+        shoot(renderer, &camera, &all.list, NULL, &by_placement);
+        shoot(renderer, &camera, &all.list, &options, &by_placement);
+        assert_int_equal(by_placement.stats.uploaded_vertices, 0);
+        assert_int_equal(by_placement.stats.items, 6);
+        assert_int_equal(count_different(&by_label, &by_placement, 2), 0); /* mixed in bytes there, in floats here */
+        strl_renderer_destroy(renderer);
+    }
+    patches_deinit(&all);
+}
+
 static double linear_of(double encoded)
 {
     encoded /= 255;
@@ -560,6 +593,7 @@ int main(void)
         cmocka_unit_test(depth_is_the_distance_along_the_view),
         cmocka_unit_test(a_section_cuts_what_lies_before_it),
         cmocka_unit_test(hidden_and_marked_parts_are_drawn_so_and_back),
+        cmocka_unit_test(placements_are_parts_as_a_whole),
         cmocka_unit_test(supersampling_is_the_mean_of_the_larger_image_in_linear_light),
         cmocka_unit_test(float_positions_draw_like_lattice_positions),
         cmocka_unit_test(a_placement_moves_the_model_and_not_its_look),

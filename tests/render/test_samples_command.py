@@ -4,12 +4,15 @@
 usage: test_samples_command.py PROGRAM"""
 import json
 import os
+import pathlib
+import struct
 import sys
 from random import Random
 
-sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "build"))
+sys.path[:0] = [os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", folder) for folder in ("build", "support")]
 sys.dont_write_bytecode = True
 from building import assert_refused, build, must, run, run_tests  # noqa: E402
+from png import read_png  # noqa: E402
 
 TRIANGLES = "60K"
 CAMERAS = ("eye 9 -7 6 target 0 0 4 up 0 0 1 fov 50", "eye 1 -2 3 target 0 3 5 up 0 0 1 fov 70",
@@ -116,6 +119,37 @@ def other_errors_draw_fewer_triangles_and_splats(folder):
         assert (null["triangles"], null["splats"], null["nodes"]) == (stats["triangles"], stats["splats"], stats["nodes"]), null
 
 
+def confetti(path, count):
+    """Small white triangles of any direction in a cube, without normals."""
+    random = Random(7)
+    corners = []
+    for _ in range(count):
+        at = [random.uniform(-1, 1) for _ in range(3)]
+        corners += (at[k] + random.gauss(0, 0.012) for _ in range(3) for k in range(3))
+    head = (f"ply\nformat binary_little_endian 1.0\nelement vertex {3 * count}\nproperty float x\nproperty float y\nproperty float z\n"
+            f"element face {count}\nproperty list uchar uint vertex_indices\nend_header\n")
+    indices = b"".join(struct.pack("<B3I", 3, 3 * i, 3 * i + 1, 3 * i + 2) for i in range(count))
+    with open(path, "wb") as file:
+        file.write(head.encode() + struct.pack(f"<{len(corners)}f", *corners) + indices)
+
+
+def splats_of_confetti_are_as_bright_as_it(folder):
+    """In linear light, over the middle of the image, which both cover."""
+    source, out = os.path.join(folder, "in.ply"), os.path.join(folder, "out.stroll")
+    confetti(source, 60000)
+    build(source, out, "--structure", "samples")
+    for backend in BACKENDS:
+        for eye in ("25 3 2", "0.5 0.2 -25"):
+            words = ("--camera", f"eye {eye} target 0 0 0 up 0 1 0 fov 12", "--backend", backend)
+            light = []
+            for error in ("1e-6", "14"):
+                _, stats = render(out, folder, "--error", error, *words)
+                rows = read_png(pathlib.Path(folder) / "image.png")
+                middle = [value for row in rows[70:110] for value in row[3 * 100:3 * 140]]
+                light.append(sum((value / 255) ** 2.2 for value in middle) / len(middle))
+            assert stats["splats"] > 100 and 0.88 < light[1] / light[0] < 1.12, (backend, eye, light)
+
+
 def a_wireframe_shows_splats_as_they_are(folder):
     """ES draws its own lines."""
     _, out, _ = plant(folder)
@@ -134,6 +168,26 @@ def within_little_memory_it_coarsens(folder):
         assert stats["allowed_error_px"] > 0.5 and 0 < stats["triangles"] < ample["triangles"], stats
 
 
+def large_triangles_are_all_drawn_however_many_lie_in_a_cell(folder):
+    """Each spans the model: none may wait in a brick that never opens, nor vanish where small ones become splats."""
+    source, out, count, small = os.path.join(folder, "in.ply"), os.path.join(folder, "out.stroll"), 20000, 30000
+    dice = Random(5)
+    with open(source, "w", encoding="ascii") as file:
+        file.write(f"ply\nformat ascii 1.0\nelement vertex {3 * (count + small)}\nproperty float x\nproperty float y\nproperty float z\n"
+                   f"element face {count + small}\nproperty list uchar int vertex_indices\nend_header\n")
+        for t in range(count + small):
+            middle, reach = ([0, 0, 0], 1) if t < count else ([dice.uniform(-1, 1) for _ in range(3)], 1e-3)
+            for _ in range(3):
+                file.write(" ".join(f"{middle[k] + reach * dice.uniform(-1, 1):.5f}" for k in range(3)) + "\n")
+        file.writelines(f"3 {3 * t} {3 * t + 1} {3 * t + 2}\n" for t in range(count + small))
+    build(source, out, "--structure", "samples")
+    stats = os.path.join(folder, "stats.jsonl")
+    for camera, most in (("eye 9 -7 6 target 0 0 0 up 0 0 1 fov 30", "1"), ("eye 90 -70 60 target 0 0 0 up 0 0 1 fov 30", "1")):
+        must("render", out, "--camera", camera, "--error", most, "--backend", "null", "--stats", stats, "--quiet")
+        frame = json.loads(read(stats))
+        assert frame["triangles"] >= count and frame["missing_nodes"] == 0, frame
+
+
 def any_order_of_the_input_gives_the_same_triangles(folder):
     source, _, _ = plant(folder)
     shuffled, out = os.path.join(folder, "shuffled.ply"), os.path.join(folder, "shuffled.stroll")
@@ -142,7 +196,7 @@ def any_order_of_the_input_gives_the_same_triangles(folder):
     assert json.loads(must("verify", out, "--json", "--against", source).output)["ok"]
 
 
-run_tests(what_samples_cannot_do_is_refused, info_tells_what_it_is, verify_proves_it_and_not_against_another,
+run_tests(what_samples_cannot_do_is_refused, large_triangles_are_all_drawn_however_many_lie_in_a_cell, info_tells_what_it_is, verify_proves_it_and_not_against_another,
           extract_gives_what_is_above_a_front, as_the_error_goes_to_nothing_the_image_is_the_full_one,
           a_wireframe_shows_splats_as_they_are, other_errors_draw_fewer_triangles_and_splats, within_little_memory_it_coarsens,
-          any_order_of_the_input_gives_the_same_triangles)
+          splats_of_confetti_are_as_bright_as_it, any_order_of_the_input_gives_the_same_triangles)

@@ -414,7 +414,7 @@ static void a_lie_in_a_record_is_found(void **state)
         {"the rung of a mesh", 9, 1, 0, STRL_VERIFY_RECORDS},
         {"the rung of clusters", 9, 1, 3, STRL_VERIFY_RECORDS},
         {"a group of two", 16, 4, 2, STRL_VERIFY_GROUPS},
-        {"told by its parent", 20, 4, record.parent, STRL_VERIFY_PAYLOADS},
+        {"told by its parent", 20, 4, record.parent, STRL_VERIFY_RECORDS},
         {"a step", 184, 4, 1, STRL_VERIFY_RECORDS},
         {"a group without error", 160, 4, 0, STRL_VERIFY_ERRORS},
         {"no least size", 144, 4, 0, STRL_VERIFY_ERRORS},

@@ -121,6 +121,22 @@ static void hidden_parts_and_what_is_cut_off_are_not_picked(void **state)
     assert_true(strl_pick_style_bounds(&list, styles, 2, STRL_PART_MARKED, bounds));
     assert_true(fabs(bounds[2] - 4) < 1e-9 && fabs(bounds[5] - 4) < 1e-9 && bounds[0] < bounds[3]);
     assert_false(strl_pick_style_bounds(&list, styles, 1, STRL_PART_MARKED, bounds));
+
+    /* The placement's own part is what is picked and hidden; the part that its vertices name still counts. */
+    uint8_t three[3] = {STRL_PART_PLAIN, STRL_PART_PLAIN, STRL_PART_PLAIN};
+    filter = (strl_pick_filter){.part_styles = three, .part_count = 3};
+    items[1].own_part = 3;
+    assert_true(strl_pick_list(&list, &down, &filter, &pick));
+    assert_true(pick.part == 2 && pick.material == 8);
+    three[2] = STRL_PART_MARKED;
+    assert_true(strl_pick_style_bounds(&list, three, 3, STRL_PART_MARKED, bounds));
+    assert_true(fabs(bounds[2] - 4) < 1e-9 && fabs(bounds[5] - 4) < 1e-9);
+    three[2] = STRL_PART_HIDDEN;
+    assert_true(strl_pick_list(&list, &down, &filter, &pick));
+    assert_int_equal(pick.part, 0);
+    three[2] = STRL_PART_PLAIN, three[1] = STRL_PART_HIDDEN;
+    assert_true(strl_pick_list(&list, &down, &filter, &pick));
+    assert_int_equal(pick.part, 0);
     patches_deinit(&all);
 }
 

@@ -365,12 +365,14 @@ static void gather(const strl_octree *octree, uint32_t child, uint32_t level, br
 /* What the children of an octant at `level` store, and with is_whole all that is below them. */
 static void gather_children(const strl_octree *octree, const strl_octant *octant, uint32_t level, bool is_whole, brick_content *content)
 {
+    /* Large triangles first: they are drawn as soon as the brick is. */
+    for (uint32_t i = 0; i < octant->child_count; i++)
+        if (octree->octant[octant->child[i]].is_large)
+            gather(octree, octant->child[i], level, content);
     for (uint32_t i = 0; i < octant->child_count; i++) {
         const strl_octant *child = &octree->octant[octant->child[i]];
-        if (child->is_large) {
-            gather(octree, octant->child[i], level, content);
+        if (child->is_large)
             continue;
-        }
         content->level_count = level + 1 > content->level_count ? level + 1 : content->level_count;
         content->cell[level][content->cell_count[level]++] = octant->child[i];
         content->size[level] = fmaxf(content->size[level], size_of(octree, child));
@@ -423,13 +425,21 @@ static brick_content cut_front(brick_content *whole)
     return front;
 }
 
-/* Too much for one brick: some leaves beside the next one, which goes on in the same way. All are of one size, so they open at once; the splats
- * are with those that have something below. *parent: the last. */
+/* Large triangles that go to bricks below open these while they are longer than the allowed error, as cells do. */
+static void open_for_large(const strl_octree *octree, const brick_content *left, brick_content *front)
+{
+    for (uint32_t i = 0; i < left->count && left->level[i] == 0; i++)
+        front->size[0] = fmaxf(front->size[0], strl_octree_extent(&octree->triangle[left->triangle[i]]));
+}
+
+/* Too much for one brick: some leaves beside the next one, which goes on in the same way. The splats are with those that have something
+ * below. *parent: the last. */
 static strl_status add_beside(strl_brick_set *set, const strl_octree *octree, brick_content *whole, uint32_t *parent,
                               strl_arena *arena, strl_error *err)
 {
     brick_content front = cut_front(whole);
     uint32_t leaf;
+    open_for_large(octree, whole, &front);
     strl_status status = add_brick(set, octree, &front, *parent, arena, parent, err);
     for (uint32_t i = 0; i < LEAVES_BESIDE && whole->count > STRL_BRICK_TRIANGLES && !status; i++) {
         front = cut_front(whole);

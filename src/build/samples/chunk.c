@@ -124,7 +124,7 @@ static strl_risen rise(const strl_octree *octree, uint32_t triangle, float weigh
     return (strl_risen){octree->triangle[triangle], octree->key[triangle], weight, octree->limit[triangle]};
 }
 
-/* Those of order[] that are too large for a cell of `depth` go to risen, as long as there is room. Returns how many stay. */
+/* Those of order[] that are too large for a cell of `depth` go to risen, as long as there is room; *count of them stay. False: no memory. */
 static bool let_rise(const strl_octree *octree, uint32_t *order, uint32_t *count, uint32_t depth, uint32_t most, strl_chunks *chunks)
 {
     uint32_t kept = 0;
@@ -317,7 +317,6 @@ static strl_status finish(void *context, uint64_t index, unsigned slot, unsigned
     for (size_t i = 0; i < made->chunks.count && !status; i++) {
         stage->triangles += made->sets[i].triangles;
         stage->vertices += made->sets[i].vertices;
-        stage->nodes += made->sets[i].count;
         status = append_set(stage, &made->chunks.chunk[i], &made->sets[i], err);
     }
     if (!status && (!strl__grow(&all->chunk, &all->capacity, all->count + made->chunks.count, sizeof *all->chunk) ||

@@ -53,7 +53,7 @@ typedef struct strl_sample_stage {
     double coupons;
     strl_spill *bricks;
     strl_chunks chunks;
-    uint64_t done, triangles, vertices, nodes;
+    uint64_t done, triangles, vertices;
 } strl_sample_stage;
 
 /* All pieces: stage "sort". Uses up the buckets. */
