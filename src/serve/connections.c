@@ -102,8 +102,8 @@ uint32_t strl__connections_end_idle(strl__connections *self, uint64_t timeout_ns
         if (!slot->handle || slot->paused || slot->ended || now_ns <= since_ns || now_ns - since_ns < timeout_ns)
             continue;
         slot->ended = true;
+        *idle += atomic_load(&slot->is_between); /* before: its thread ends the request at once */
         strl_socket_end(slot->socket);
-        *idle += atomic_load(&slot->is_between);
         count++;
     }
     strl_mutex_unlock(&self->mutex);

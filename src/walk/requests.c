@@ -334,8 +334,7 @@ static void submit_page(strl_walk *walk, strl__request *request, strl__node *nod
 }
 
 /* False where no room could be made: then nothing less urgent may take it either. */
-static bool ask_for_node(strl_walk *walk, const strl__candidate *candidate, uint32_t in_flight, uint64_t evict_before,
-                         bool prefetch)
+static bool ask_for_node(strl_walk *walk, const strl__candidate *candidate, uint32_t in_flight, uint64_t evict_before)
 {
     strl__node *node = candidate->node;
     if (node->residency != STRL__ABSENT)
@@ -351,7 +350,6 @@ static bool ask_for_node(strl_walk *walk, const strl__candidate *candidate, uint
     }
     if (!request) {
         request = take_slot(walk);
-        request->prefetch = prefetch;
         submit_page(walk, request, node, candidate->urgency);
         return true;
     }
@@ -383,8 +381,7 @@ static void ask_for_treelet(strl_walk *walk, const strl__candidate *candidate, u
         treelet_failed(walk, request, &error);
 }
 
-static void ask_for_all(strl_walk *walk, strl__candidates *candidates, uint32_t in_flight, uint64_t evict_before,
-                        bool prefetch)
+static void ask_for_all(strl_walk *walk, strl__candidates *candidates, uint32_t in_flight, uint64_t evict_before)
 {
     bool room = true;
     if (candidates->count > 1)
@@ -394,7 +391,7 @@ static void ask_for_all(strl_walk *walk, strl__candidates *candidates, uint32_t 
         if (candidate->treelet != STRL_NONE)
             ask_for_treelet(walk, candidate, in_flight);
         else if (room)
-            room = ask_for_node(walk, candidate, in_flight, evict_before, prefetch);
+            room = ask_for_node(walk, candidate, in_flight, evict_before);
     }
 }
 
@@ -413,9 +410,9 @@ static void forget_stale(strl_walk *walk)
 void strl__requests_submit(strl_walk *walk)
 {
     walk->room = strl_source_room(walk->source);
-    ask_for_all(walk, &walk->missing, walk->requests_in_flight, walk->frame + 1, false);
+    ask_for_all(walk, &walk->missing, walk->requests_in_flight, walk->frame + 1);
     uint64_t idle_since = walk->frame > SPARE_FRAMES ? walk->frame - SPARE_FRAMES : 0;
     if (walk->missing.count == 0)
-        ask_for_all(walk, &walk->prefetch, (walk->requests_in_flight + 1) / 2, idle_since, true);
+        ask_for_all(walk, &walk->prefetch, (walk->requests_in_flight + 1) / 2, idle_since);
     forget_stale(walk);
 }
