@@ -200,6 +200,62 @@ static void answers_under_way_hold_no_more_memory_than_they_may(void **state)
     assert_true(refused >= 1);
 }
 
+/* A copy of the smallest container of several treelets. */
+static void put_container(void)
+{
+    char path[400];
+    const char *root = getenv("STRL_TEST_ROOT");
+    static uint8_t bytes[1 << 20];
+    snprintf(path, sizeof path, "%s/tests/container/golden/v1-treelets.stroll", root ? root : ".");
+    FILE *from = fopen(path, "rb");
+    assert_non_null(from);
+    size_t size = fread(bytes, 1, sizeof bytes, from);
+    fclose(from);
+    snprintf(path, sizeof path, "%s/model.stroll", strl_test_path("served"));
+    FILE *to = fopen(path, "wb");
+    assert_non_null(to);
+    assert_int_equal(fwrite(bytes, 1, size, to), size);
+    fclose(to);
+}
+
+typedef struct asker {
+    strl_thread *thread;
+    uint16_t port;
+    unsigned answered, wrong;
+} asker;
+
+static void ask_for_nodes(void *context)
+{
+    asker *self = context;
+    for (unsigned i = 0; i < 40; i++) {
+        int client = ask(self->port, "/model.stroll?subtrees=0:0/65535");
+        int status = status_of(client);
+        self->answered += status == 200;
+        self->wrong += status != 200;
+        wait_for_end(client);
+    }
+}
+
+/* Two threads answer, so that one query at a time is at work; none is refused for that. */
+static void queries_that_come_together_take_turns(void **state)
+{
+    (void)state;
+    const strl_server_desc desc = {.threads = 2};
+    asker askers[CLIENTS];
+    put_container();
+    strl_server *server = must_open(&desc);
+    for (unsigned i = 0; i < CLIENTS; i++) {
+        askers[i] = (asker){.port = strl_server_port(server)};
+        assert_int_equal(strl_thread_start(&askers[i].thread, ask_for_nodes, &askers[i], NULL), STRL_OK);
+    }
+    for (unsigned i = 0; i < CLIENTS; i++) {
+        strl_thread_join(askers[i].thread);
+        assert_int_equal(askers[i].answered, 40);
+        assert_int_equal(askers[i].wrong, 0);
+    }
+    strl_server_close(server, 0);
+}
+
 typedef struct told {
     atomic_uint count;
     char sentence[400];
@@ -233,6 +289,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(closing_ends_answers_that_wait_for_bandwidth),
         cmocka_unit_test(closing_while_connections_arrive_loses_none_to_others),
+        cmocka_unit_test(queries_that_come_together_take_turns),
         cmocka_unit_test(the_owner_is_told_what_a_stranger_is_not),
         cmocka_unit_test(answers_under_way_hold_no_more_memory_than_they_may),
     };
