@@ -69,17 +69,33 @@ static void check_name(const char *text, size_t size)
     check((kind == STRL__CACHE_ENTRY) == (strlen(name) == strlen(again)));
 }
 
-/* An entry that is taken is the one that would be written. */
+static uint64_t number_at(const uint8_t *bytes)
+{
+    uint64_t value = 0;
+    for (unsigned i = 8; i-- > 0;)
+        value = value << 8 | bytes[i];
+    return value;
+}
+
+/* An entry that is taken says what it is, by its layout; the one that is written is taken, and not with any bit of it
+ * another. */
 static void check_entry(const uint8_t *data, size_t size)
 {
     strl__cache_key key = {.offset = 0x1234};
     uint8_t head[STRL__CACHE_HEAD_BYTES];
     if (size < sizeof head)
         return;
+    const uint8_t *content = data + sizeof head;
     key.size = (uint32_t)(size - sizeof head);
     memcpy(key.model, data + 16, sizeof key.model);
-    strl__cache_entry_head(&key, data + sizeof head, head);
-    check(strl__cache_entry_check(&key, data, data + sizeof head) == (memcmp(head, data, sizeof head) == 0));
+    if (strl__cache_entry_check(&key, data, content))
+        check(memcmp(data, "stroll cache 1\n", 16) == 0 && number_at(data + 32) == 0x1234 &&
+              number_at(data + 40) == size - sizeof head && number_at(data + 56) == 0);
+    strl__cache_entry_head(&key, content, head);
+    check(memcmp(head + 16, data + 16, 16) == 0 && number_at(head + 32) == 0x1234);
+    check(strl__cache_entry_check(&key, head, content));
+    head[data[0] % sizeof head] ^= (uint8_t)(1u << data[1] % 8);
+    check(!strl__cache_entry_check(&key, head, content));
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)

@@ -1,6 +1,8 @@
 /* stroll serve: a folder of containers over HTTP, until a signal ends it. */
 #include <errno.h>
 #include <inttypes.h>
+#include <signal.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -30,14 +32,8 @@ static const char notes[] =
 /* Lines of several threads go to one stream, each whole. */
 typedef struct journal {
     FILE *file; /* NULL = nobody wants to know */
+    atomic_bool failed;
 } journal;
-
-static void put_line(void *context, const char *line)
-{
-    const journal *self = context;
-    if (self->file)
-        fprintf(self->file, "%s\n", line);
-}
 
 static void put_complaint(void *context, const char *sentence)
 {
@@ -45,9 +41,23 @@ static void put_complaint(void *context, const char *sentence)
     fprintf(stderr, "stroll: %s\n", sentence);
 }
 
+/* Once: a disk that is full is so for each line. */
+static void complain_of_log(journal *self, int code)
+{
+    if (!atomic_exchange(&self->failed, true) && self->file != stderr)
+        fprintf(stderr, "stroll: warning: lines of the access log are lost: %s\n", strerror(code));
+}
+
+static void put_line(void *context, const char *line)
+{
+    journal *self = context;
+    if (self->file && fprintf(self->file, "%s\n", line) < 0)
+        complain_of_log(self, errno);
+}
+
 static strl_status open_journal(const char *path, bool quiet, journal *self, strl_error *err)
 {
-    self->file = quiet ? NULL : stderr;
+    *self = (journal){.file = quiet ? NULL : stderr};
     if (!path)
         return STRL_OK;
     self->file = fopen(path, "ae");
@@ -59,8 +69,8 @@ static strl_status open_journal(const char *path, bool quiet, journal *self, str
 
 static void close_journal(journal *self)
 {
-    if (self->file && self->file != stderr)
-        fclose(self->file);
+    if (self->file && self->file != stderr && fclose(self->file) != 0)
+        complain_of_log(self, errno);
 }
 
 /* A server that runs out of files fails here and there later on. */
@@ -92,6 +102,7 @@ static strl_status serve(const strl_server_desc *desc, bool quiet, strl_error *e
 {
     strl_server *server;
     strl_cli_catch_interrupts();
+    signal(SIGPIPE, SIG_IGN); /* who reads the log may go, the server stays */
     strl_status status = allow_files(desc, err);
     if (status == STRL_OK)
         status = strl_server_open(desc, &server, err);

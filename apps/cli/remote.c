@@ -15,7 +15,7 @@ static void make_above(const char *folder)
         return;
     memcpy(above, folder, length);
     above[length] = 0;
-    strl_path_make_directory(above, NULL);
+    strl_path_make_private_directory(above, NULL);
 }
 
 strl_status strl_cli_locate(strl_cli_remote *remote, const char *name, strl_location *location, strl_error *err)
@@ -25,7 +25,7 @@ strl_status strl_cli_locate(strl_cli_remote *remote, const char *name, strl_loca
         return STRL_OK;
     location->cache = remote->cache;
     if (remote->cache)
-        return strl_path_make_directory(remote->cache, err);
+        return strl_path_make_private_directory(remote->cache, err);
     strl_cli_cache_folder(remote->folder, sizeof remote->folder);
     if (remote->folder[0]) {
         make_above(remote->folder);

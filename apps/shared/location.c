@@ -6,6 +6,7 @@
 #include "base/fail.h"
 #include "container/layout.h"
 #include "platform/file.h"
+#include "source/source.h"
 
 bool strl_location_is_remote(const char *name)
 {
@@ -20,9 +21,10 @@ strl_status strl_location_open_source(const strl_location *location, unsigned th
     *source = NULL;
     if (!strl_location_is_remote(name))
         return strl_source_open_file(name, threads, source, err);
+    char shown[201];
     if (strncasecmp(name, "http://", 7) != 0 && strncasecmp(name, "https://", 8) != 0)
-        return strl__fail(err, STRL_ERR_UNSUPPORTED, "%.200s: models are read from files, http:// and https:// alone",
-                          name);
+        return strl__fail(err, STRL_ERR_UNSUPPORTED, "%s: models are read from files, http:// and https:// alone",
+                          strl__address_shown(name, shown, sizeof shown));
     return strl_source_open_http(name, &desc, source, err);
 }
 

@@ -50,6 +50,8 @@ bool strl_path_exists(const char *path);
 strl_status strl_path_rename(const char *from, const char *to, strl_error *err); /* replaces; then syncs the folder */
 strl_status strl_path_remove(const char *path, strl_error *err);                 /* a missing file is not an error */
 strl_status strl_path_make_directory(const char *path, strl_error *err);         /* existing is not an error */
+/* The same, but one that is made is for its owner alone. */
+strl_status strl_path_make_private_directory(const char *path, strl_error *err);
 /* A new folder of this process alone; `pattern` ends in XXXXXX, which becomes its name. */
 strl_status strl_path_make_temporary(char *pattern, strl_error *err);
 /* A folder with anything in it stays. */

@@ -1,4 +1,4 @@
-/* A folder of small files that several processes share without a lock: a file appears under its name when it is whole,
+/* A folder of small files of one user that several processes share without a lock: a file appears under its name when it is whole,
  * and not before. The time of its last change is the time of its last use. */
 #ifndef STRL_PLATFORM_SHELF_H
 #define STRL_PLATFORM_SHELF_H
@@ -9,8 +9,10 @@
 
 #include "stroll/error.h"
 
+typedef struct strl_shelf strl_shelf; /* one that is looked through */
+
 typedef struct strl_shelf_entry {
-    const char *name; /* borrowed for the call */
+    const char *name; /* borrowed until the next call */
     uint64_t bytes;
     uint64_t used_ns; /* since the epoch of the system's clock */
 } strl_shelf_entry;
@@ -18,9 +20,11 @@ typedef struct strl_shelf_entry {
 /* What strl_shelf_entry.used_ns is compared with. */
 uint64_t strl_shelf_now_ns(void);
 
-/* Every regular file in the folder, in no order; links are none. visit returns false to end. */
-strl_status strl_shelf_visit(const char *path, bool (*visit)(void *context, const strl_shelf_entry *entry),
-                              void *context, strl_error *err);
+/* Looks through the folder: every regular file, in no order; links are none. */
+strl_status strl_shelf_open(const char *path, strl_shelf **shelf, strl_error *err);
+void strl_shelf_close(strl_shelf *shelf); /* NULL is legal */
+/* The next entry; its name is NULL at the end, and "" where it is no file. */
+strl_status strl_shelf_next(strl_shelf *shelf, strl_shelf_entry *entry, strl_error *err);
 
 typedef struct strl_shelf_piece {
     const void *data;

@@ -24,6 +24,7 @@ void strl_once_run(strl_once *once, void (*run)(void));
 void strl_mutex_init(strl_mutex *mutex);
 void strl_mutex_deinit(strl_mutex *mutex);
 void strl_mutex_lock(strl_mutex *mutex);
+bool strl_mutex_try_lock(strl_mutex *mutex); /* false where another thread has it */
 void strl_mutex_unlock(strl_mutex *mutex);
 void strl_condition_init(strl_condition *condition);
 void strl_condition_deinit(strl_condition *condition);

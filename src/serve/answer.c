@@ -10,12 +10,19 @@
 
 #define SENTENCE_TYPE "text/plain; charset=utf-8"
 
+void strl__site_complain(strl__site *site, const char *sentence)
+{
+    if (site->complain)
+        site->complain(site->context, sentence);
+}
+
 void strl__answer_text(strl__answer *answer, const char *type, strl_writer *out)
 {
     strl__body *body = out->failed ? NULL : strl__body_create();
     answer->type = type;
     if (body) {
-        body->head = out->data;
+        uint8_t *fitting = out->size > 0 ? strl__realloc(out->data, out->size, 1) : NULL; /* it is held until it is sent */
+        body->head = fitting ? fitting : out->data;
         body->head_bytes = out->size;
         answer->body = body;
     } else {
@@ -61,15 +68,16 @@ bool strl__open_served(strl__site *site, const char *path, strl_file **file, str
         *file = NULL;
         found = STRL_FOUND_FAILED;
     }
-    /* The system's reasons are not for strangers, but for the owner they are in its own log. */
     if (found == STRL_FOUND_NOTHING)
         strl__answer_sentence(answer, 404, "there is no such file");
     else if (found == STRL_FOUND_BARRED)
         strl__answer_sentence(answer, 403, "the file may not be read");
     else if (found == STRL_FOUND_FAILED)
         strl__answer_sentence(answer, 503, "the file cannot be opened now");
-    if (found == STRL_FOUND_FAILED)
+    if (found == STRL_FOUND_FAILED) {
+        strl__site_complain(site, err.message);
         answer->retry_s = 1;
+    }
     return found == STRL_FOUND;
 }
 

@@ -27,6 +27,8 @@ typedef struct strl__answer {
     bool close;       /* the connection, afterwards */
     bool is_page;
     unsigned retry_s; /* 0 = not said */
+    bool is_later;    /* there is none yet: ask again when others have ended */
+    double work;      /* what it cost beyond a plain request, in requests */
     char etag[STRL__ETAG_BYTES], modified[STRL__DATE_BYTES], range[72]; /* "" = not said */
     char location[3 * STRL__PATH_BYTES + 8];
 } strl__answer;
@@ -38,9 +40,17 @@ typedef struct strl__site {
     strl__metrics metrics;
     strl__connections connections;
     uint64_t answer_bytes;
+    uint64_t held_most;          /* bytes of memory of all answers that are under way */
+    _Atomic uint64_t held_bytes;
+    uint32_t most_queries;       /* at work at once */
+    _Atomic uint32_t queries;
+    void (*complain)(void *context, const char *sentence); /* NULL = nobody wants to know */
+    void *context;
 } strl__site;
 
-/* Always gives an answer; the caller destroys its body. */
+/* The system's reasons are not for strangers, but for the owner. */
+void strl__site_complain(strl__site *site, const char *sentence);
+/* Gives an answer, or is_later; the caller destroys its body. */
 void strl__answer_request(strl__site *site, strl__request *request, strl__answer *answer);
 /* A status with a sentence as its body. */
 void strl__answer_sentence(strl__answer *answer, unsigned status, const char *format, ...)

@@ -5,9 +5,15 @@
 #include "serve/answer.h"
 #include "serve/select.h"
 
-static void refuse(strl__answer *answer, strl_status status, const strl_error *err)
+#define NODES_A_REQUEST 1024.0  /* looked at, cost as much as a plain request */
+#define BYTES_A_REQUEST 131072.0 /* of node records read */
+
+static void refuse(strl__site *site, strl__answer *answer, strl_status status, const strl_error *err)
 {
     switch (status) {
+    case STRL_ERR_CANCELLED:
+        answer->is_later = true;
+        break;
     case STRL_ERR_ARGUMENT:
         strl__answer_sentence(answer, 400, "%s", err->message);
         break;
@@ -16,6 +22,8 @@ static void refuse(strl__answer *answer, strl_status status, const strl_error *e
         strl__answer_sentence(answer, 422, "the file cannot be asked for nodes: %s", err->message);
         break;
     default:
+        if (status != STRL_ERR_LIMIT)
+            strl__site_complain(site, err->message);
         /* What has been looked up so far is kept, so asking again goes on from there. */
         strl__answer_sentence(answer, 503, "%s", status == STRL_ERR_LIMIT ? err->message : "the file cannot be read now");
         answer->retry_s = 1;
@@ -50,7 +58,7 @@ static void give(strl__site *site, strl_file *file, const strl_file_info *info, 
     answer->body = body;
 }
 
-void strl__answer_query(strl__site *site, const strl__query *query, const char *path, strl__answer *answer)
+static void answer_now(strl__site *site, const strl__query *query, const char *path, strl__answer *answer)
 {
     strl_file *file;
     strl_file_info info;
@@ -66,11 +74,23 @@ void strl__answer_query(strl__site *site, const strl__query *query, const char *
         status = strl__select(model->container, query, most, &selection, &err);
     if (status == STRL_OK)
         strl__selection_head(&selection, strl_container_get_info(model->container), query->tree, head);
+    if (model)
+        answer->work = selection.visited / NODES_A_REQUEST + (double)(STRL__LOOKUP_BYTES - model->left_bytes) / BYTES_A_REQUEST;
     strl__models_return(&site->models, model);
     if (status == STRL_OK) {
         give(site, file, &info, &selection, head, answer);
     } else {
         strl_file_close(file, NULL);
-        refuse(answer, status, &err);
+        refuse(site, answer, status, &err);
     }
+}
+
+/* A query may take the thread that it runs on for a while, and all that this thread serves waits. */
+void strl__answer_query(strl__site *site, const strl__query *query, const char *path, strl__answer *answer)
+{
+    if (atomic_fetch_add(&site->queries, 1) < site->most_queries)
+        answer_now(site, query, path, answer);
+    else
+        answer->is_later = true;
+    atomic_fetch_sub(&site->queries, 1);
 }

@@ -34,6 +34,11 @@ uint64_t strl__body_bytes(const strl__body *body)
     return bytes;
 }
 
+uint64_t strl__body_memory(const strl__body *body)
+{
+    return sizeof *body + body->head_bytes + body->piece_count * sizeof *body->pieces;
+}
+
 static size_t copy_some(const uint8_t *from, uint64_t from_bytes, uint64_t at, uint8_t *to, size_t size)
 {
     uint64_t left = from_bytes - at;

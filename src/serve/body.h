@@ -28,6 +28,8 @@ typedef struct strl__body {
 strl__body *strl__body_create(void);
 void strl__body_destroy(strl__body *body); /* NULL is legal */
 uint64_t strl__body_bytes(const strl__body *body);
+/* Of memory, as long as it is not destroyed. */
+uint64_t strl__body_memory(const strl__body *body);
 /* The next bytes, at most size; *got 0 = the end. Fails where the file is not any more what it was. */
 strl_status strl__body_read(strl__body *body, void *data, size_t size, size_t *got, strl_error *err);
 

@@ -57,6 +57,7 @@ strl__connection *strl__connections_add(strl__connections *self, void *handle, i
         slot->paused = slot->ended = false;
         slot->exchange = NULL;
         atomic_store(&slot->progress_ns, strl_clock_ns());
+        atomic_store(&slot->is_between, false);
         slot->handle = handle;
         self->count++;
     }
@@ -88,9 +89,10 @@ void strl__connection_progress(strl__connection *connection)
         atomic_store(&connection->progress_ns, strl_clock_ns());
 }
 
-uint32_t strl__connections_end_idle(strl__connections *self, uint64_t timeout_ns)
+uint32_t strl__connections_end_idle(strl__connections *self, uint64_t timeout_ns, uint32_t *idle)
 {
     uint32_t count = 0;
+    *idle = 0;
     /* Held over all of it: a connection is removed before its socket is closed, so no socket here is another's. */
     strl_mutex_lock(&self->mutex);
     uint64_t now_ns = strl_clock_ns();
@@ -100,6 +102,7 @@ uint32_t strl__connections_end_idle(strl__connections *self, uint64_t timeout_ns
         if (!slot->handle || slot->paused || slot->ended || now_ns <= since_ns || now_ns - since_ns < timeout_ns)
             continue;
         slot->ended = true;
+        *idle += atomic_load(&slot->is_between); /* before: its thread ends the request at once */
         strl_socket_end(slot->socket);
         count++;
     }
@@ -116,26 +119,30 @@ bool strl__connections_pause(strl__connections *self, strl__connection *connecti
     return !closing;
 }
 
-/* One of the suspended, which is not so any more; NULL = none is left. Whoever asks is the only one who resumes. */
-static void *next_paused(strl__connections *self, bool closing)
+/* One of the suspended from *at on, which is not so any more; NULL = none is left. Whoever asks is the only one who
+ * resumes. */
+static void *next_paused(strl__connections *self, bool closing, uint32_t *at)
 {
     void *handle = NULL;
     strl_mutex_lock(&self->mutex);
     self->closing |= closing;
-    for (uint32_t i = 0; !handle && i < self->capacity; i++)
-        if (self->slots[i].handle && self->slots[i].paused) {
-            self->slots[i].paused = false;
-            atomic_store(&self->slots[i].progress_ns, strl_clock_ns());
-            handle = self->slots[i].handle;
-        }
+    for (; !handle && *at < self->capacity; ++*at) {
+        strl__connection *slot = &self->slots[*at];
+        if (!slot->handle || !slot->paused)
+            continue;
+        slot->paused = false;
+        atomic_store(&slot->progress_ns, strl_clock_ns());
+        handle = slot->handle;
+    }
     strl_mutex_unlock(&self->mutex);
     return handle;
 }
 
 void strl__connections_resume(strl__connections *self, bool closing, void (*resume)(void *handle))
 {
-    /* Outside of the lock, for the library has locks of its own; what is suspended is not closed meanwhile. */
-    uint32_t left = self->capacity; /* one that is suspended anew at once must not keep us here */
-    for (void *handle; left-- > 0 && (handle = next_paused(self, closing));)
+    /* Outside of the lock, for the library has locks of its own; what is suspended is not closed meanwhile. Once over all
+     * of them: one that is suspended anew at once waits for the next time, and when all ends nothing is suspended anew. */
+    uint32_t at = 0;
+    for (void *handle; (handle = next_paused(self, closing, &at));)
         resume(handle);
 }

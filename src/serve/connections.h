@@ -22,6 +22,7 @@ typedef struct strl__connection {
     bool ended;
     void *exchange; /* the request at work, of its thread's; NULL = none */
     _Atomic uint64_t progress_ns;
+    atomic_bool is_between; /* a request was answered and no other has begun */
 } strl__connection;
 
 typedef struct strl__connections {
@@ -40,8 +41,9 @@ strl__connection *strl__connections_add(strl__connections *self, void *handle, i
 void strl__connections_remove(strl__connections *self, strl__connection *connection);
 uint32_t strl__connections_count(strl__connections *self);
 void strl__connection_progress(strl__connection *connection); /* NULL is legal */
-/* Ends what has made no progress for timeout_ns; returns how many that were. */
-uint32_t strl__connections_end_idle(strl__connections *self, uint64_t timeout_ns);
+/* Ends what has made no progress for timeout_ns; returns how many that were. *idle: how many of these were between two
+ * requests. */
+uint32_t strl__connections_end_idle(strl__connections *self, uint64_t timeout_ns, uint32_t *idle);
 
 /* Notes that a connection has been suspended. False where the server closes: then the caller resumes it at once. */
 bool strl__connections_pause(strl__connections *self, strl__connection *connection);

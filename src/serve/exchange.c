@@ -9,6 +9,7 @@
 #include "serve/text.h"
 
 #define CHUNK_BYTES ((size_t)64 << 10)
+#define SMALL_BYTES ((uint64_t)4 << 10) /* of memory of an answer */
 #define SHOWN_BYTES ((size_t)1024) /* of a target in the log */
 
 static strl__connection *connection_of(struct MHD_Connection *connection)
@@ -64,6 +65,7 @@ static void end(strl__exchange *self, unsigned library_status, bool aborted)
     if (answered && aborted)
         atomic_fetch_add(&metrics->aborted, 1);
     self->connection->exchange = NULL;
+    atomic_store(&self->connection->is_between, true);
     strl__connection_progress(self->connection);
     log_exchange(self, duration_ns);
     atomic_fetch_sub(&self->server->under_way, 1);
@@ -90,6 +92,7 @@ void *strl__exchange_begin(void *cls, const char *target, struct MHD_Connection 
     made->server = cls;
     made->connection = connection;
     connection->exchange = made;
+    atomic_store(&connection->is_between, false);
     made->start_ns = strl_clock_ns();
     made->shown = strl__strdup(target ? target : "");
     made->target = strl__strdup(target ? target : "");
@@ -102,6 +105,8 @@ void *strl__exchange_begin(void *cls, const char *target, struct MHD_Connection 
 /* What the library holds while it sends. It outlives the exchange, but is not asked for bytes then. */
 typedef struct carrier {
     strl__exchange *exchange;
+    strl__site *site;
+    uint64_t held_bytes;
     strl__body *body; /* owned */
     struct MHD_Connection *handle;
 } carrier;
@@ -110,17 +115,23 @@ static void release_carrier(void *cls)
 {
     carrier *self = cls;
     strl__body_destroy(self->body);
+    atomic_fetch_sub(&self->site->held_bytes, self->held_bytes);
     strl__free(self);
 }
 
-/* The library asks again once the connection is resumed. */
-static ssize_t wait_for_bandwidth(carrier *self)
+/* Small ones are bounded by the connections. */
+static uint64_t held_bytes_of(const strl__body *body)
 {
-    strl__exchange *exchange = self->exchange;
-    MHD_suspend_connection(self->handle);
+    uint64_t bytes = strl__body_memory(body);
+    return bytes > SMALL_BYTES ? bytes : 0;
+}
+
+/* The library asks again once the connection is resumed. */
+static void wait_a_while(strl__exchange *exchange, struct MHD_Connection *handle)
+{
+    MHD_suspend_connection(handle);
     if (!strl__connections_pause(&exchange->server->site.connections, exchange->connection))
-        MHD_resume_connection(self->handle);
-    return 0;
+        MHD_resume_connection(handle);
 }
 
 static ssize_t read_chunk(void *cls, uint64_t at, char *data, size_t size)
@@ -132,10 +143,12 @@ static ssize_t read_chunk(void *cls, uint64_t at, char *data, size_t size)
     if (at != self->body->done || size == 0)
         return MHD_CONTENT_READER_END_WITH_ERROR;
     size_t allowed = atomic_load(&server->stopping) ? size : strl__flow_take(&server->flow, size, strl_clock_ns());
-    if (allowed == 0)
-        return wait_for_bandwidth(self);
+    if (allowed == 0) {
+        wait_a_while(self->exchange, self->handle);
+        return 0;
+    }
     if (strl__body_read(self->body, data, allowed, &got, &err) != STRL_OK) {
-        strl__server_complain(server, err.message);
+        strl__site_complain(&server->site, err.message);
         return MHD_CONTENT_READER_END_WITH_ERROR;
     }
     strl__connection_progress(self->exchange->connection);
@@ -200,7 +213,8 @@ static struct MHD_Response *make_response(strl__exchange *exchange, struct MHD_C
         strl__body_destroy(body);
         return NULL;
     }
-    *made = (carrier){exchange, body, connection};
+    *made = (carrier){exchange, &exchange->server->site, held_bytes_of(body), body, connection};
+    atomic_fetch_add(&made->site->held_bytes, made->held_bytes);
     size_t block = bytes < CHUNK_BYTES ? (size_t)bytes : CHUNK_BYTES;
     struct MHD_Response *response = MHD_create_response_from_callback(bytes, block, read_chunk, made, release_carrier);
     if (!response)
@@ -208,8 +222,21 @@ static struct MHD_Response *make_response(strl__exchange *exchange, struct MHD_C
     return response;
 }
 
+/* An answer that nobody takes holds its memory until its time is over, and one after the other may be asked for. */
+static void refuse_memory(strl__site *site, strl__answer *answer)
+{
+    uint64_t bytes = answer->body ? held_bytes_of(answer->body) : 0;
+    if (bytes == 0 || bytes + atomic_load(&site->held_bytes) <= site->held_most)
+        return;
+    strl__body_destroy(answer->body);
+    *answer = (strl__answer){.retry_s = 1, .close = answer->close};
+    atomic_fetch_add(&site->metrics.rejected[STRL__REJECTED_MEMORY], 1);
+    strl__answer_sentence(answer, 503, "answers that are on their way hold too much memory");
+}
+
 enum MHD_Result strl__exchange_send(strl__exchange *exchange, struct MHD_Connection *connection, strl__answer *answer)
 {
+    refuse_memory(&exchange->server->site, answer);
     struct MHD_Response *response = make_response(exchange, connection, answer->body);
     answer->body = NULL;
     if (!response)
@@ -275,8 +302,16 @@ enum MHD_Result strl__exchange_answer(void *cls, struct MHD_Connection *connecti
             return MHD_YES;
     }
     strl__answer answer;
-    if (!is_over_limits(self, &answer))
+    if (self->is_admitted || !is_over_limits(self, &answer)) {
+        self->is_admitted = true;
+        strcpy(self->target, self->shown); /* an earlier try has taken it apart */
         strl__answer_request(&self->server->site, &self->request, &answer);
+        if (answer.is_later) {
+            wait_a_while(self, connection);
+            return MHD_YES;
+        }
+        strl__rates_charge(&self->server->rates, &self->connection->peer, answer.work, strl_clock_ns());
+    }
     answer.close |= self->request.has_body;
     return strl__exchange_send(self, connection, &answer);
 }

@@ -10,7 +10,7 @@ typedef struct strl__exchange {
     uint64_t start_ns;
     char *shown, *target; /* owned; as it came, and what parsing writes to */
     char method[24];
-    bool head_read;
+    bool head_read, is_admitted;
     strl__request request;
     unsigned host_lines, length_lines, encoding_lines;
     unsigned status;      /* of the answer; 0 = none */

@@ -49,11 +49,16 @@ static double refilled(double tokens, double full, double per_second, uint64_t s
     return fmin(full, tokens + per_second * (double)since_ns * 1e-9);
 }
 
+static double full_of(const strl__rates *rates)
+{
+    return fmax(1, 2 * rates->per_second);
+}
+
 unsigned strl__rates_take(strl__rates *rates, const strl_peer *peer, uint64_t now_ns)
 {
     if (rates->per_second <= 0)
         return 0;
-    double full = fmax(1, 2 * rates->per_second);
+    double full = full_of(rates);
     now_ns += now_ns == 0;
     const strl__rate_slot key = key_of(peer);
     unsigned wait_s = 0;
@@ -68,6 +73,18 @@ unsigned strl__rates_take(strl__rates *rates, const strl_peer *peer, uint64_t no
         wait_s = (unsigned)fmin(3600, ceil((1 - slot->tokens) / rates->per_second));
     strl_mutex_unlock(&rates->mutex);
     return wait_s;
+}
+
+void strl__rates_charge(strl__rates *rates, const strl_peer *peer, double requests, uint64_t now_ns)
+{
+    if (rates->per_second <= 0)
+        return;
+    double full = full_of(rates);
+    const strl__rate_slot key = key_of(peer);
+    strl_mutex_lock(&rates->mutex);
+    strl__rate_slot *slot = find(rates, &key, full, now_ns + (now_ns == 0));
+    slot->tokens = fmax(-full, slot->tokens - requests);
+    strl_mutex_unlock(&rates->mutex);
 }
 
 void strl__flow_init(strl__flow *flow, uint64_t bytes_per_second)

@@ -9,6 +9,7 @@
 #include "serve/text.h"
 
 #define MOST_ENTRIES 2000u
+#define MOST_LOOKED_AT 100000u /* names of a folder, whatever they are */
 
 typedef struct entry {
     char *name; /* owned */
@@ -20,6 +21,7 @@ typedef struct entry {
 typedef struct listing {
     entry *entries; /* [count], owned */
     size_t count, capacity;
+    uint32_t looked_at;
     bool truncated, failed;
 } listing;
 
@@ -38,9 +40,10 @@ static bool is_shown(const char *name, bool is_folder)
 static bool take_entry(void *context, const char *name, bool is_folder)
 {
     listing *all = context;
-    if (!is_shown(name, is_folder))
+    bool is_last = ++all->looked_at > MOST_LOOKED_AT;
+    if (!is_last && !is_shown(name, is_folder))
         return true;
-    if (all->count == MOST_ENTRIES) {
+    if (is_last || all->count == MOST_ENTRIES) {
         all->truncated = true;
         return false;
     }
@@ -194,7 +197,8 @@ void strl__answer_listing(strl__site *site, const char *path, bool json, strl__a
 {
     listing all = {0};
     strl_writer out = {0};
-    strl_found found = strl_folder_list(site->folder, path, take_entry, &all, NULL);
+    strl_error err = {0};
+    strl_found found = strl_folder_list(site->folder, path, take_entry, &all, &err);
     if (found == STRL_FOUND && !all.failed) {
         if (all.count > 0)
             qsort(all.entries, all.count, sizeof *all.entries, compare_entries);
@@ -212,6 +216,7 @@ void strl__answer_listing(strl__site *site, const char *path, bool json, strl__a
         strl__answer_sentence(answer, found == STRL_FOUND_BARRED ? 403 : 404, "%s",
                               found == STRL_FOUND_BARRED ? "the folder may not be read" : "there is no such folder");
     } else {
+        strl__site_complain(site, all.failed ? "no memory to list a folder" : err.message);
         strl__answer_sentence(answer, 503, "the folder cannot be listed now");
         answer->retry_s = 1;
     }

@@ -12,7 +12,7 @@ static const struct {
     {500000000, "0.5"},    {1000000000, "1"},     {5000000000, "5"},     {30000000000, "30"},   {120000000000, "120"},
 };
 
-static const char *const reasons[STRL__REJECTIONS] = {"connections", "address", "rate", "timeout", "protocol"};
+static const char *const reasons[STRL__REJECTIONS] = {"connections", "address", "rate", "timeout", "idle", "protocol", "memory"};
 
 void strl__metrics_count_request(strl__metrics *metrics, unsigned status, uint64_t duration_ns)
 {

@@ -15,8 +15,10 @@ typedef enum strl__rejection {
     STRL__REJECTED_CONNECTIONS, /* too many at once */
     STRL__REJECTED_ADDRESS,     /* too many of one address */
     STRL__REJECTED_RATE,
-    STRL__REJECTED_TIMEOUT,  /* a connection that was ended */
+    STRL__REJECTED_TIMEOUT,  /* a connection that was ended in the middle of something */
+    STRL__REJECTED_IDLE,     /* and one between two requests */
     STRL__REJECTED_PROTOCOL, /* no HTTP that the library takes */
+    STRL__REJECTED_MEMORY,   /* answers that nobody reads hold too much of it */
     STRL__REJECTIONS
 } strl__rejection;
 

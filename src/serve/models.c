@@ -230,7 +230,13 @@ strl_status strl__models_borrow(strl__models *models, const strl_file *file, con
     strl_mutex_unlock(&models->mutex);
     if (status != STRL_OK)
         return status;
-    strl_mutex_lock(&(*model)->mutex);
+    if (!strl_mutex_try_lock(&(*model)->mutex)) {
+        strl_mutex_lock(&models->mutex);
+        (*model)->users--;
+        strl_mutex_unlock(&models->mutex);
+        *model = NULL;
+        return strl__fail(err, STRL_ERR_CANCELLED, "another query is at work in the container");
+    }
     status = ready(*model, err);
     if (status != STRL_OK) {
         strl__models_return(models, *model);

@@ -7,7 +7,7 @@
 #include "platform/file.h"
 #include "platform/thread.h"
 
-#define STRL__KNOWN_FACTS 1024u
+#define STRL__KNOWN_FACTS 4096u /* twice those of the longest listing */
 #define STRL__OPEN_MODELS 16u
 #define STRL__MODEL_BYTES ((uint64_t)64 << 20)       /* of memory that one may take */
 #define STRL__ALL_MODELS_BYTES ((uint64_t)128 << 20) /* of memory that those kept may take together */
@@ -56,7 +56,7 @@ void strl__models_facts(strl__models *models, strl_file *file, const strl_file_i
 void strl__model_etag(const strl__model_facts *facts, const strl_file_info *info, char *etag, size_t size);
 
 /* For one query: locked and opened. STRL_ERR_FORMAT or _UNSUPPORTED: it is no container, or one too large to look nodes up
- * in; STRL_ERR_LIMIT: one place too few. */
+ * in; STRL_ERR_LIMIT: one place too few; STRL_ERR_CANCELLED: another query is at work in it, nothing is waited for. */
 strl_status strl__models_borrow(strl__models *models, const strl_file *file, const strl_file_info *info,
                                 strl__model **model, strl_error *err);
 void strl__models_return(strl__models *models, strl__model *model); /* NULL is legal */

@@ -25,7 +25,6 @@ typedef struct choice {
     strl__selection *out;
     run *runs; /* [count], a heap: the lowest next first */
     uint32_t count;
-    uint32_t visited;
     uint64_t last_treelet, last_page; /* offsets of the pieces that were added last; 0 = none, for there is the header */
     uint32_t last_node;               /* answered last; STRL_NONE = none */
 } choice;
@@ -143,7 +142,7 @@ static strl_status visit_lowest(choice *self, strl_error *err)
 /* What is too much work is cut like what is too many bytes, but for the first node: that would be no answer. */
 static strl_status visit_bounded(choice *self, strl_error *err)
 {
-    strl_status status = ++self->visited > STRL__VISITED_NODES ? STRL_ERR_LIMIT : visit_lowest(self, err);
+    strl_status status = ++self->out->visited > STRL__VISITED_NODES ? STRL_ERR_LIMIT : visit_lowest(self, err);
     if (status != STRL_ERR_LIMIT || self->out->node_count == 0)
         return status;
     uint32_t id = self->runs[0].next;
@@ -175,6 +174,12 @@ static void order_pieces(strl__selection *out)
         out->pieces[kept++] = out->pieces[i];
     }
     out->count = kept;
+    /* They are held until the last byte is sent. */
+    strl__piece *fitting = kept > 0 ? strl__realloc(out->pieces, kept, sizeof *out->pieces) : NULL;
+    if (fitting) {
+        out->pieces = fitting;
+        out->capacity = kept;
+    }
 }
 
 static strl_status check_query(const strl_container *container, const strl__query *query, strl_error *err)
@@ -219,7 +224,7 @@ strl_status strl__select(strl_container *container, const strl__query *query, ui
 void strl__selection_deinit(strl__selection *selection)
 {
     strl__free(selection->pieces);
-    *selection = (strl__selection){.next_node = STRL_NONE};
+    *selection = (strl__selection){.next_node = STRL_NONE, .visited = selection->visited};
 }
 
 void strl__selection_head(const strl__selection *selection, const strl_container_info *info, uint32_t tree,

@@ -15,6 +15,7 @@ typedef struct strl__selection {
     size_t count, capacity;
     uint64_t bytes;      /* of the pieces and their frames */
     uint32_t node_count; /* nodes that are answered */
+    uint32_t visited;    /* that were looked at */
     bool cut;
     uint32_t next_node; /* where cut: what was asked for and is lower is answered, and nothing else; else STRL_NONE */
 } strl__selection;

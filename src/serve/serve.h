@@ -10,6 +10,7 @@
 #define STRL_SERVE_CONNECTIONS 256u
 #define STRL_SERVE_REQUEST_BYTES (32u << 10)
 #define STRL_SERVE_ANSWER_BYTES ((uint64_t)32 << 20)
+#define STRL_SERVE_HELD_BYTES ((uint64_t)64 << 20)
 #define STRL_SERVE_TIMEOUT_NS ((uint64_t)30000000000)
 
 typedef struct strl_server strl_server;
@@ -24,6 +25,7 @@ typedef struct strl_server_desc {
     uint32_t threads;                 /* 0 = by the processors, 2 to 8 */
     uint32_t request_bytes;           /* of a request's head, roughly; 0 = 32 KiB */
     uint64_t answer_bytes;            /* most of bytes of a query's answer; 0 = 32 MiB */
+    uint64_t held_bytes;              /* of memory of answers under way, 503 beyond it; 0 = 64 MiB */
     uint64_t bandwidth;               /* bytes a second of all answers together; 0 = no limit */
     double rate;                      /* requests a second of one address; 0 = no limit */
     uint64_t timeout_ns;              /* without progress, then a connection is ended; 0 = 30 s */

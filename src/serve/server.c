@@ -23,12 +23,6 @@ void strl__server_log(strl_server *server, const char *line)
         server->log(server->context, line);
 }
 
-void strl__server_complain(strl_server *server, const char *sentence)
-{
-    if (server->complain)
-        server->complain(server->context, sentence);
-}
-
 /* The library's remarks are on what clients did; they quote them, so they are escaped and go to the log alone. */
 static void take_remark(void *cls, const char *format, va_list values) __attribute__((format(printf, 2, 0)));
 static void take_remark(void *cls, const char *format, va_list values)
@@ -42,15 +36,47 @@ static void take_remark(void *cls, const char *format, va_list values)
     strl__server_log(cls, line);
 }
 
+/* The library has one such function for the process: it is set once, and tells all servers. */
+static strl_once running_once = STRL_ONCE_INIT;
+static strl_mutex running_mutex;
+static strl_server *running; /* under the mutex */
+
 static void panic(void *cls, const char *file, unsigned line, const char *reason)
 {
-    (void)file, (void)line;
+    (void)cls, (void)file, (void)line;
     char sentence[300];
     snprintf(sentence, sizeof sentence, "the HTTP library found a fault of its own and gives up: %.200s",
              reason ? reason : "it does not say which");
     sentence[strcspn(sentence, "\n")] = 0;
-    strl__server_complain(cls, sentence);
+    strl_mutex_lock(&running_mutex);
+    for (strl_server *server = running; server; server = server->next_running)
+        strl__site_complain(&server->site, sentence);
     abort();
+}
+
+static void init_running(void)
+{
+    strl_mutex_init(&running_mutex);
+    MHD_set_panic_func(panic, NULL);
+}
+
+static void add_running(strl_server *server)
+{
+    strl_once_run(&running_once, init_running);
+    strl_mutex_lock(&running_mutex);
+    server->next_running = running;
+    running = server;
+    strl_mutex_unlock(&running_mutex);
+}
+
+static void remove_running(const strl_server *server)
+{
+    strl_mutex_lock(&running_mutex);
+    strl_server **at = &running;
+    while (*at != server)
+        at = &(*at)->next_running;
+    *at = server->next_running;
+    strl_mutex_unlock(&running_mutex);
 }
 
 /* ---- connections ---- */
@@ -78,7 +104,8 @@ static void resume(void *handle)
     MHD_resume_connection(handle);
 }
 
-/* Looks after what no request drives: connections without progress, connections that wait for bandwidth, idle models. */
+/* Looks after what no request drives: connections without progress, connections that wait for bandwidth or for their turn to
+ * query, idle models. */
 static void tend(void *context)
 {
     strl_server *server = context;
@@ -87,8 +114,9 @@ static void tend(void *context)
     while (!atomic_load(&server->stopping)) {
         strl_sleep_ns(tick_ns);
         strl__connections_resume(&server->site.connections, false, resume);
-        uint32_t ended = strl__connections_end_idle(&server->site.connections, server->timeout_ns);
-        atomic_fetch_add(&metrics->rejected[STRL__REJECTED_TIMEOUT], ended);
+        uint32_t idle, ended = strl__connections_end_idle(&server->site.connections, server->timeout_ns, &idle);
+        atomic_fetch_add(&metrics->rejected[STRL__REJECTED_TIMEOUT], ended - idle);
+        atomic_fetch_add(&metrics->rejected[STRL__REJECTED_IDLE], idle);
         if (strl_clock_ns() - models_ns < IDLE_MODEL_NS / 4)
             continue;
         models_ns = strl_clock_ns();
@@ -128,7 +156,6 @@ static size_t keep_as_it_is(void *cls, struct MHD_Connection *connection, char *
 static strl_status start_daemon(strl_server *server, const strl_server_desc *desc, strl_error *err)
 {
     size_t request_bytes = desc->request_bytes ? desc->request_bytes : STRL_SERVE_REQUEST_BYTES;
-    MHD_set_panic_func(panic, server);
     server->daemon = MHD_start_daemon(
         MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_ERROR_LOG | MHD_USE_ITC | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL,
         strl__exchange_answer, server,
@@ -165,8 +192,11 @@ static void adopt(strl_server *server, const strl_server_desc *desc)
     server->timeout_ns = desc->timeout_ns ? desc->timeout_ns : STRL_SERVE_TIMEOUT_NS;
     server->site.answer_bytes = desc->answer_bytes ? desc->answer_bytes : STRL_SERVE_ANSWER_BYTES;
     server->log = desc->log;
-    server->complain = desc->complain;
     server->context = desc->context;
+    server->site.complain = desc->complain;
+    server->site.context = desc->context;
+    server->site.held_most = desc->held_bytes ? desc->held_bytes : STRL_SERVE_HELD_BYTES;
+    server->site.most_queries = threads_of(desc) - 1; /* one thread is left for what does not take long */
     strl__models_init(&server->site.models);
     strl__rates_init(&server->rates, desc->rate);
     strl__flow_init(&server->flow, desc->bandwidth);
@@ -179,6 +209,7 @@ strl_status strl_server_open(const strl_server_desc *desc, strl_server **server,
     if (!made)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a server");
     adopt(made, desc);
+    add_running(made);
     strl_status status = prepare(made, desc, err);
     if (status == STRL_OK)
         status = strl_socket_listen(desc->host ? desc->host : "127.0.0.1", desc->port, &made->listener, &made->port, err);
@@ -209,13 +240,15 @@ static void let_answers_end(strl_server *server, uint64_t grace_ns)
 
 static void stop_daemon(strl_server *server, uint64_t grace_ns)
 {
-    int listener = MHD_quiesce_daemon(server->daemon); /* ours again */
-    strl_socket_close(listener);
+    int listener = MHD_quiesce_daemon(server->daemon);
+    if (listener >= 0)
+        strl_socket_end(listener); /* ours again, but the library's threads may still know its number */
     let_answers_end(server, grace_ns);
     atomic_store(&server->stopping, true);
     strl_thread_join(server->tender);
     strl__connections_resume(&server->site.connections, true, resume); /* the library cannot end what is suspended */
     MHD_stop_daemon(server->daemon);
+    strl_socket_close(listener);
 }
 
 void strl_server_close(strl_server *server, uint64_t grace_ns)
@@ -226,7 +259,7 @@ void strl_server_close(strl_server *server, uint64_t grace_ns)
         stop_daemon(server, grace_ns);
     else
         strl_socket_close(server->listener);
-    MHD_set_panic_func(NULL, NULL);
+    remove_running(server);
     strl_folder_close(server->site.folder);
     strl__connections_deinit(&server->site.connections);
     strl__models_deinit(&server->site.models);

@@ -17,15 +17,14 @@ struct strl_server {
     char *origin; /* owned; "" = nobody's */
     uint64_t timeout_ns;
     void (*log)(void *context, const char *line);
-    void (*complain)(void *context, const char *sentence);
     void *context;
     strl_thread *tender;
     atomic_bool stopping;
     _Atomic uint32_t under_way; /* requests whose answers have not ended */
+    strl_server *next_running;  /* for the library's panic */
 };
 
 void strl__server_log(strl_server *server, const char *line);
-void strl__server_complain(strl_server *server, const char *sentence);
 
 /* Callbacks of the library; cls is the server. */
 void *strl__exchange_begin(void *cls, const char *target, struct MHD_Connection *connection);

@@ -17,9 +17,14 @@ void strl__cache_close(strl__cache *cache); /* NULL is legal */
 
 /* Counts what is there; what is beyond the cap goes. put does the same now and then. */
 void strl__cache_trim(strl__cache *cache);
+/* A small step of that, for who must not be kept waiting; false when it is done. The next call begins anew. */
+bool strl__cache_trim_step(strl__cache *cache);
+/* A step of what put would do before it writes so many bytes; false when nothing is left of that. */
+bool strl__cache_room_step(strl__cache *cache, uint32_t size);
 /* Fills key->size bytes. An entry that is not whole is removed. */
 bool strl__cache_get(strl__cache *cache, const strl__cache_key *key, void *data);
-/* After the first write that fails (full disk, folder that cannot be written) nothing is written any more. */
+/* After the first write that fails (full disk, folder that cannot be written), and where the folder cannot be brought
+ * below the cap, nothing is written any more. */
 void strl__cache_put(strl__cache *cache, const strl__cache_key *key, const void *data);
 void strl__cache_drop(strl__cache *cache, const strl__cache_key *key);
 

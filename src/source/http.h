@@ -114,6 +114,7 @@ typedef struct strl__http {
     size_t kept_bytes;
     strl_error changed;     /* status not STRL_OK: the model is another one now, and this says so */
     uint32_t outages;       /* requests in a row that did not reach the server */
+    uint32_t refusals;      /* answers in a row that it is asked too much */
     uint64_t not_before_ns; /* for all requests */
     strl__pace pace;
     strl_network_stats stats;
@@ -140,6 +141,9 @@ uint64_t strl__http_random(strl__http *http);
 /* ---- http_url.c */
 /* Normalises and checks. *url and *shown are the caller's (strl__free). */
 strl_status strl__http_url(const char *text, char **url, char **shown, bool *secure, strl_error *err);
+/* Where a redirect from `url` led to, with the user and the password of `url` where that is the same server. The caller's;
+ * NULL without memory. */
+char *strl__http_url_target(const char *url, const char *led_to);
 
 /* ---- http_disk.c */
 void strl__http_disk_run(void *http); /* the disk thread */

@@ -147,13 +147,23 @@ static void look_up(strl__http *http, strl__http_read *read)
     }
 }
 
-/* Once, when there is time: the cap may be a smaller one than last time. */
-static void trim(strl__http *http, bool *trimmed)
+/* Once, when there is time: the cap may be a smaller one than last time. In steps, for a read may come. */
+static bool trim_some(strl__http *http)
 {
-    *trimmed = true;
     strl_mutex_unlock(&http->mutex);
-    strl__cache_trim(http->cache);
+    bool more = strl__cache_trim_step(http->cache);
     strl_mutex_lock(&http->mutex);
+    return more;
+}
+
+/* So that no read waits behind looking a large folder through. */
+static bool make_room_some(strl__http *http)
+{
+    uint32_t size = (uint32_t)http->kept->size;
+    strl_mutex_unlock(&http->mutex);
+    bool more = strl__cache_room_step(http->cache, size);
+    strl_mutex_lock(&http->mutex);
+    return more;
 }
 
 void strl__http_disk_run(void *context)
@@ -167,10 +177,12 @@ void strl__http_disk_run(void *context)
             drop_one(http);
         else if (!http->disk_closing && (read = strl__http_read_most_urgent(http, STRL__HTTP_NEW, UINT64_MAX)))
             look_up(http, read);
+        else if (http->kept && make_room_some(http))
+            continue;
         else if (http->kept)
             write_one(http);
         else if (!trimmed)
-            trim(http, &trimmed);
+            trimmed = !trim_some(http);
         else
             strl_condition_wait(&http->disk_work, &http->mutex);
     }

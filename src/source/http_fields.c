@@ -45,8 +45,7 @@ static text trimmed(const char *begin, size_t size)
 bool strl__http_parse_range(const char *bytes, size_t size, strl__http_fields *fields)
 {
     text in = trimmed(bytes, size);
-    fields->has_range = true;
-    fields->range_known = fields->total_known = false;
+    fields->range_known = false;
     fields->first = fields->last = fields->identity.total = 0;
     if (in.end - in.at < 6 || strncasecmp(in.at, "bytes", 5) != 0)
         return false;
@@ -60,7 +59,6 @@ bool strl__http_parse_range(const char *bytes, size_t size, strl__http_fields *f
     if (!take(&in, '/') || !take_number(&in, &total) || in.at != in.end)
         return false;
     bool sound = unsatisfied || (fields->first <= fields->last && fields->last < total);
-    fields->total_known = sound;
     fields->range_known = sound && !unsatisfied;
     fields->identity.total = sound ? total : 0;
     return fields->range_known;

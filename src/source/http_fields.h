@@ -19,18 +19,16 @@ typedef struct strl__http_identity {
 typedef struct strl__http_fields {
     unsigned status;  /* 0 before the first line */
     size_t bytes;     /* of header so far */
-    bool has_range;   /* Content-Range is there */
-    bool range_known; /* and is "bytes first-last/total" */
+    bool range_known; /* Content-Range is there, and is "bytes first-last/total" */
     uint64_t first, last;
-    bool total_known; /* of Content-Range, also "bytes * /total" */
-    strl__http_identity identity;
+    strl__http_identity identity; /* its total also of "bytes * /total" (without the space); 0 = not known */
     char encoding[32]; /* of the content; "" = as it is */
 } strl__http_fields;
 
 /* One line as it comes, with or without its end. A status line begins the next answer: all before it is forgotten. */
 void strl__http_fields_line(strl__http_fields *fields, const char *line, size_t size);
 
-/* "bytes 0-4095/1234". False where it is anything else; *total_known also of "bytes * /1234" (without the space). */
+/* "bytes 0-4095/1234". False where it is anything else. */
 bool strl__http_parse_range(const char *text, size_t size, strl__http_fields *fields);
 /* A strong entity tag, copied with its quotes. False where it is weak, broken or too long: then tag is "". */
 bool strl__http_parse_etag(const char *text, size_t size, char *tag, size_t tag_size);

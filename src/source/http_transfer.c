@@ -271,7 +271,7 @@ static void succeed(strl__http_transfer *transfer)
     curl_off_t sent = 0, began = 0;
     char *effective = NULL;
     long redirects = 0;
-    http->outages = 0;
+    http->outages = http->refusals = 0;
     if (curl_easy_getinfo(transfer->easy, CURLINFO_PRETRANSFER_TIME_T, &sent) == CURLE_OK &&
         curl_easy_getinfo(transfer->easy, CURLINFO_STARTTRANSFER_TIME_T, &began) == CURLE_OK && began > sent)
         strl__pace_add_latency(&http->pace, (uint64_t)(began - sent) * 1000u);
@@ -280,14 +280,17 @@ static void succeed(strl__http_transfer *transfer)
     if (redirects == 0 || !effective)
         return;
     strl__free(http->target); /* where it led to: the next requests need no redirect */
-    http->target = strl__strdup(effective);
+    http->target = strl__http_url_target(http->url, effective);
 }
 
-/* Mutex held. The server itself was not reached: that is a failed attempt of everything that waits. */
+/* Mutex held. The server itself was not reached: that is a failed attempt of everything that waits. Requests that fail
+ * together are of one outage, which is one attempt: what they bring back does not pay for each of the others. */
 static void note_outage(strl__http_transfer *transfer, uint64_t now_ns)
 {
     strl__http *http = transfer->http;
     uint64_t base_ns = (uint64_t)http->desc.backoff_ms * 1000000u;
+    if (now_ns < http->not_before_ns)
+        return;
     http->outages++;
     http->not_before_ns = now_ns + strl__backoff_ns(base_ns, http->outages, strl__http_random(http));
     for (size_t i = http->read_count; i-- > 0;)
@@ -295,20 +298,43 @@ static void note_outage(strl__http_transfer *transfer, uint64_t now_ns)
             strl__http_read_again(http, http->reads[i], &transfer->error, now_ns);
 }
 
+/* Mutex held. A server that is asked too much is asked for nothing else either. Answers to requests that were under way
+ * together are one refusal. */
+static void slow_down(strl__http *http, uint64_t now_ns)
+{
+    uint64_t base_ns = (uint64_t)http->desc.backoff_ms * 1000000u;
+    if (now_ns < http->not_before_ns)
+        return;
+    http->refusals++;
+    http->not_before_ns = now_ns + strl__backoff_ns(base_ns, http->refusals, strl__http_random(http));
+}
+
 /* Mutex held. A server that says when to come back is obeyed, within reason. */
 static void obey_retry_after(strl__http_transfer *transfer, uint64_t now_ns)
 {
     strl__http *http = transfer->http;
     curl_off_t seconds = 0;
-    if (curl_easy_getinfo(transfer->easy, CURLINFO_RETRY_AFTER, &seconds) != CURLE_OK || seconds <= 0)
+    unsigned status = transfer->fields.status;
+    if (curl_easy_getinfo(transfer->easy, CURLINFO_RETRY_AFTER, &seconds) != CURLE_OK || seconds <= 0) {
+        if (status == 429 || status == 503)
+            slow_down(http, now_ns);
         return;
+    }
     if (seconds <= MOST_RETRY_AFTER_S) {
         http->not_before_ns = now_ns + (uint64_t)seconds * 1000000000u;
         return;
     }
     transfer->verdict = STRL__HTTP_REFUSED;
     strl__fail(&transfer->error, STRL_ERR_NETWORK, "the server asks to be left alone for %lld seconds (%u)",
-               (long long)seconds, transfer->fields.status);
+               (long long)seconds, status);
+}
+
+/* Mutex held. Nothing binds two attempts at opening to one file, so that what has come of one is not continued. */
+static void begin_anew(strl__http_read *read)
+{
+    read->filled = 0;
+    read->end = read->begin + STRL__HTTP_HEAD_BYTES;
+    read->size = STRL__HTTP_HEAD_BYTES;
 }
 
 /* Mutex held. */
@@ -320,6 +346,8 @@ static void send_back(strl__http_transfer *transfer, uint64_t now_ns)
         strl__http_read *read = http->reads[i];
         if (read->transfer != transfer)
             continue;
+        if (transfer->opening)
+            begin_anew(read);
         if (again)
             strl__http_read_again(http, read, &transfer->error, now_ns);
         else

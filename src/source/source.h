@@ -59,6 +59,10 @@ void strl_source_doubt(strl_source *source, uint64_t offset, size_t size);
 /* Puts the source's name before the sentence of a failure, unless there is none or it is there. Returns status. */
 strl_status strl_source_fail(const strl_source *source, strl_status status, strl_error *err);
 
+/* An address as sentences may show it, also one that is none: without a user and a password, without a query. Cut to size,
+ * which is at least 1. Returns shown. */
+const char *strl__address_shown(const char *address, char *shown, size_t size);
+
 /* Wraps another source (owned from then on; still the caller's on failure) and holds each answer back until delay_ns
  * after its submit. strl_source_read is not delayed. fail_every: every n-th answer is a failure (0 = none). For tests
  * and for looking at latency by hand. */

@@ -180,7 +180,6 @@ typedef struct strl__job {
 
 typedef struct strl__request {
     bool used, answered, cancelled;
-    bool prefetch; /* for nothing that was wanted at submission */
     uint64_t token;
     uint64_t touched_frame; /* last frame that wanted something of it */
     uint64_t offset;        /* of the page */

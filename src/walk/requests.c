@@ -364,8 +364,7 @@ static void submit_page(strl_walk *walk, strl__request *request, strl__node *nod
 }
 
 /* False where no room could be made: then nothing less urgent may take it either. */
-static bool ask_for_node(strl_walk *walk, const strl__candidate *candidate, uint32_t in_flight, uint64_t evict_before,
-                         bool prefetch)
+static bool ask_for_node(strl_walk *walk, const strl__candidate *candidate, uint32_t in_flight, uint64_t evict_before)
 {
     strl__node *node = candidate->node;
     if (node->residency != STRL__ABSENT)
@@ -381,7 +380,6 @@ static bool ask_for_node(strl_walk *walk, const strl__candidate *candidate, uint
     }
     if (!request) {
         request = take_slot(walk);
-        request->prefetch = prefetch;
         submit_page(walk, request, node, candidate->urgency);
         return true;
     }
@@ -414,7 +412,7 @@ static void ask_for_treelet(strl_walk *walk, const strl__candidate *candidate, u
 }
 
 /* As ask_for_node. */
-static bool ask_for_run(strl_walk *walk, const strl__candidate *candidate, uint32_t in_flight, uint64_t evict_before, bool prefetch)
+static bool ask_for_run(strl_walk *walk, const strl__candidate *candidate, uint32_t in_flight, uint64_t evict_before)
 {
     strl__run *run = candidate->run;
     const strl_treelet_ref *page = &run->facts.page;
@@ -425,15 +423,13 @@ static bool ask_for_run(strl_walk *walk, const strl__candidate *candidate, uint3
         return false;
     strl__request *request = take_slot(walk);
     request->run = run;
-    request->prefetch = prefetch;
     strl__run_reserve(walk, run, request);
     if (submit(walk, request, page->offset, page->bytes, candidate->urgency, &error) != STRL_OK)
         run_failed(walk, request, &error);
     return true;
 }
 
-static void ask_for_all(strl_walk *walk, strl__candidates *candidates, uint32_t in_flight, uint64_t evict_before,
-                        bool prefetch)
+static void ask_for_all(strl_walk *walk, strl__candidates *candidates, uint32_t in_flight, uint64_t evict_before)
 {
     bool room = true;
     if (candidates->count > 1)
@@ -443,9 +439,9 @@ static void ask_for_all(strl_walk *walk, strl__candidates *candidates, uint32_t 
         if (candidate->treelet != STRL_NONE)
             ask_for_treelet(walk, candidate, in_flight);
         else if (room && candidate->run)
-            room = ask_for_run(walk, candidate, in_flight, evict_before, prefetch);
+            room = ask_for_run(walk, candidate, in_flight, evict_before);
         else if (room)
-            room = ask_for_node(walk, candidate, in_flight, evict_before, prefetch);
+            room = ask_for_node(walk, candidate, in_flight, evict_before);
     }
 }
 
@@ -464,9 +460,9 @@ static void forget_stale(strl_walk *walk)
 void strl__requests_submit(strl_walk *walk)
 {
     walk->room = strl_source_room(walk->source);
-    ask_for_all(walk, &walk->missing, walk->requests_in_flight, walk->frame + 1, false);
+    ask_for_all(walk, &walk->missing, walk->requests_in_flight, walk->frame + 1);
     uint64_t idle_since = walk->frame > SPARE_FRAMES ? walk->frame - SPARE_FRAMES : 0;
     if (walk->missing.count == 0)
-        ask_for_all(walk, &walk->prefetch, (walk->requests_in_flight + 1) / 2, idle_since, true);
+        ask_for_all(walk, &walk->prefetch, (walk->requests_in_flight + 1) / 2, idle_since);
     forget_stale(walk);
 }

@@ -62,6 +62,22 @@ static void a_slow_rate_says_how_long_to_wait(void **state)
     strl__rates_deinit(&rates);
 }
 
+static void work_is_paid_back_before_the_next_request(void **state)
+{
+    (void)state;
+    static strl__rates rates;
+    strl__rates_init(&rates, 5);
+    strl_peer one = peer_of(1), two = peer_of(2);
+    assert_int_equal(strl__rates_take(&rates, &one, SECOND), 0);
+    strl__rates_charge(&rates, &one, 12, SECOND); /* 9 were left */
+    assert_int_equal(strl__rates_take(&rates, &one, SECOND), 1);
+    assert_int_equal(allowed(&rates, &one, 100, 2 * SECOND), 2);
+    strl__rates_charge(&rates, &one, 1e9, 2 * SECOND); /* a debt has an end */
+    assert_int_equal(strl__rates_take(&rates, &one, 2 * SECOND), 3);
+    assert_int_equal(allowed(&rates, &two, 100, 2 * SECOND), 10);
+    strl__rates_deinit(&rates);
+}
+
 static void many_addresses_take_no_more_room(void **state)
 {
     (void)state;
@@ -123,9 +139,13 @@ static void connections_beyond_a_limit_are_known(void **state)
     strl__connections_remove(&all, made[0]);
     made[0] = strl__connections_add(&all, &handles[0], -1, none);
     assert_int_equal(made[0]->surplus, STRL__SURPLUS_NONE);
-    assert_int_equal(strl__connections_end_idle(&all, UINT64_C(3600) * SECOND), 0);
-    assert_int_equal(strl__connections_end_idle(&all, 0), 5);
-    assert_int_equal(strl__connections_end_idle(&all, 0), 0); /* each once */
+    uint32_t idle;
+    atomic_store(&made[3]->is_between, true);
+    assert_int_equal(strl__connections_end_idle(&all, UINT64_C(3600) * SECOND, &idle), 0);
+    assert_int_equal(strl__connections_end_idle(&all, 0, &idle), 5);
+    assert_int_equal(idle, 1);
+    assert_int_equal(strl__connections_end_idle(&all, 0, &idle), 0); /* each once */
+    assert_int_equal(idle, 0);
     strl__connections_deinit(&all);
 }
 
@@ -145,7 +165,8 @@ static void what_is_paused_is_resumed_once(void **state)
     assert_true(strl__connections_init(&all, 3, 3, 3));
     strl__connection *made = strl__connections_add(&all, &handle, -1, NULL);
     assert_true(strl__connections_pause(&all, made));
-    assert_int_equal(strl__connections_end_idle(&all, 0), 0); /* it waits for us, not we for it */
+    uint32_t idle;
+    assert_int_equal(strl__connections_end_idle(&all, 0, &idle), 0); /* it waits for us, not we for it */
     strl__connections_resume(&all, false, count_resumed);
     strl__connections_resume(&all, false, count_resumed);
     assert_int_equal(resumed, 1);
@@ -184,6 +205,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(an_address_has_its_rate_and_no_other_pays_for_it),
         cmocka_unit_test(a_slow_rate_says_how_long_to_wait),
+        cmocka_unit_test(work_is_paid_back_before_the_next_request),
         cmocka_unit_test(many_addresses_take_no_more_room),
         cmocka_unit_test(addresses_of_one_network_of_ipv6_are_one),
         cmocka_unit_test(bytes_flow_at_their_rate),

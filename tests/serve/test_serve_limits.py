@@ -107,7 +107,9 @@ def a_request_that_dribbles_in_is_ended(folder):
         with server.connect() as kept:
             kept.sendall(head("GET", "/model.stroll", close=False, Range="bytes=0-5"))
             check(read_answer(kept).status == 206 and is_ended(kept))
-        server.wait_for('rejected_total{reason="timeout"}', 4)
+        server.wait_for('rejected_total{reason="timeout"}', 3)
+        server.wait_for('rejected_total{reason="idle"}', 1)
+        check(server.metrics()['rejected_total{reason="timeout"}'] == 3, server.metrics())
 
 
 def a_reader_that_does_not_read_is_ended(folder):
@@ -209,9 +211,32 @@ def each_request_is_a_line_of_the_log(folder):
     check(stat.S_ISREG(os.stat(folder + "/log").st_mode))
 
 
+def a_log_that_cannot_be_written_is_told_once(folder):
+    served = make_folder(folder)
+    with Server(served, "--access-log", "/dev/full") as server:
+        for _ in range(3):
+            check(server.get("/model.stroll").status == 200)
+        log = server.stop()
+        check(log.count("lines of the access log are lost") == 1, log)
+
+
+def a_log_that_nobody_reads_ends_nothing(folder):
+    served = make_folder(folder)
+    pipe = folder + "/pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    with Server(served, "--access-log", pipe) as server:
+        check(server.get("/model.stroll").status == 200)
+        os.close(reader)
+        for _ in range(3):
+            check(server.get("/model.stroll").status == 200)
+        check("lines of the access log are lost" in server.stop())
+
+
 TESTS = (connections_beyond_the_most_are_told_so, connections_of_one_address_leave_room_for_others,
          requests_of_one_address_have_a_rate, a_request_has_a_size, a_request_that_dribbles_in_is_ended,
          a_reader_that_does_not_read_is_ended, slow_clients_do_not_keep_others_out, an_answer_that_takes_long_is_not_ended,
-         a_bandwidth_is_kept_by_all_together, metrics_are_what_happened, each_request_is_a_line_of_the_log)
+         a_bandwidth_is_kept_by_all_together, metrics_are_what_happened, each_request_is_a_line_of_the_log,
+         a_log_that_cannot_be_written_is_told_once, a_log_that_nobody_reads_ends_nothing)
 
 sys.exit(run_all("stroll-serve-", TESTS))

@@ -219,6 +219,25 @@ static void no_memory_is_a_failure_and_no_more(void **state)
     drop_served(self);
 }
 
+static void a_container_at_work_keeps_nobody_waiting(void **state)
+{
+    (void)state;
+    served *self = make_served(3, 3);
+    strl__model *model, *other;
+    strl__selection selection;
+    strl_error err = {0};
+    assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &model, &err), STRL_OK);
+    assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &other, &err), STRL_ERR_CANCELLED);
+    assert_null(other);
+    assert_int_equal(model->users, 1);
+    strl__models_return(&self->models, model);
+    assert_int_equal(select_one(self, 0, 9, &selection, &err), STRL_OK);
+    assert_int_equal(selection.capacity, selection.count); /* what is kept until all is sent has no room to spare */
+    assert_true(selection.visited >= selection.node_count);
+    strl__selection_deinit(&selection);
+    drop_served(self);
+}
+
 static void what_is_idle_is_closed(void **state)
 {
     (void)state;
@@ -246,6 +265,7 @@ int main(void)
         cmocka_unit_test(a_query_that_may_read_no_more_goes_on_next_time),
         cmocka_unit_test(a_query_that_may_read_no_more_is_cut),
         cmocka_unit_test(no_memory_is_a_failure_and_no_more),
+        cmocka_unit_test(a_container_at_work_keeps_nobody_waiting),
         cmocka_unit_test(what_is_idle_is_closed),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

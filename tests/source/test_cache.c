@@ -75,18 +75,17 @@ typedef struct tally {
     unsigned files;
 } tally;
 
-static bool count_one(void *context, const strl_shelf_entry *entry)
-{
-    tally *all = context;
-    all->bytes += (entry->bytes + 4095) / 4096 * 4096;
-    all->files++;
-    return true;
-}
-
 static tally count(const char *folder)
 {
     tally all = {0};
-    assert_int_equal(strl_shelf_visit(strl_test_path(folder), count_one, &all, NULL), STRL_OK);
+    strl_shelf *shelf;
+    strl_shelf_entry entry;
+    assert_int_equal(strl_shelf_open(strl_test_path(folder), &shelf, NULL), STRL_OK);
+    while (strl_shelf_next(shelf, &entry, NULL) == STRL_OK && entry.name) {
+        all.bytes += (entry.bytes + 4095) / 4096 * 4096;
+        all.files += *entry.name != 0;
+    }
+    strl_shelf_close(shelf);
     return all;
 }
 
@@ -175,6 +174,67 @@ static void the_cap_holds_and_what_was_used_longest_ago_goes(void **state)
     assert_true(has(smaller, 1000));
     strl__cache_close(smaller);
     clear("three");
+}
+
+static void a_folder_is_looked_through_in_steps(void **state)
+{
+    (void)state;
+    strl__cache *cache = must_open("nine", UINT64_C(1) << 30);
+    for (uint64_t i = 0; i < 300; i++)
+        put(cache, i);
+    strl__cache_close(cache);
+    cache = must_open("nine", CAP);
+    unsigned steps = 0;
+    while (strl__cache_room_step(cache, ENTRY_BYTES)) {
+        assert_true(has(cache, 299) == true); /* look-ups go on between them; what was used last stays */
+        assert_true(++steps < 1000);
+    }
+    assert_true(steps >= 6);
+    assert_true(count("nine").bytes <= CAP);
+    unsigned files = count("nine").files;
+    put(cache, 1000);
+    assert_int_equal(count("nine").files, files + 1); /* there was room */
+    assert_true(strl__cache_trim_step(cache));
+    put(cache, 2000); /* that goes on with the count first */
+    assert_true(has(cache, 2000));
+    assert_true(count("nine").bytes <= CAP);
+    strl__cache_close(cache); /* also in the middle of it */
+    cache = must_open("nine", CAP / 2);
+    assert_true(strl__cache_trim_step(cache) && strl__cache_trim_step(cache));
+    strl__cache_close(cache);
+    clear("nine");
+}
+
+/* Files that have our names and are none of ours stay, so no room can be made. */
+static void a_folder_that_stays_above_the_cap_is_given_up(void **state)
+{
+    (void)state;
+    strl__cache *cache = must_open("ten", CAP);
+    static uint8_t filling[CAP + 1] = "not ours";
+    write_file(path_of("ten", 1), filling, sizeof filling);
+    put(cache, 2);
+    assert_int_equal(count("ten").files, 1);
+    assert_int_equal(strl_path_remove(path_of("ten", 1), NULL), STRL_OK);
+    put(cache, 3); /* or each put would look through the folder */
+    assert_int_equal(count("ten").files, 0);
+    strl__cache_close(cache);
+    clear("ten");
+}
+
+static void nobody_else_reads_what_is_kept(void **state)
+{
+    (void)state;
+    mode_t before = umask(0);
+    struct stat facts;
+    strl__cache *cache = must_open("private", CAP);
+    put(cache, 1);
+    umask(before);
+    assert_int_equal(stat(strl_test_path("private"), &facts), 0);
+    assert_int_equal(facts.st_mode & 0777, 0700);
+    assert_int_equal(stat(path_of("private", 1), &facts), 0);
+    assert_int_equal(facts.st_mode & 0777, 0600);
+    strl__cache_close(cache);
+    clear("private");
 }
 
 static void two_processes_together_pass_the_cap_by_little(void **state)
@@ -320,6 +380,9 @@ int main(void)
         cmocka_unit_test(what_was_put_comes_back_in_another_process_too),
         cmocka_unit_test(a_damaged_entry_is_a_miss_and_goes),
         cmocka_unit_test(the_cap_holds_and_what_was_used_longest_ago_goes),
+        cmocka_unit_test(a_folder_is_looked_through_in_steps),
+        cmocka_unit_test(a_folder_that_stays_above_the_cap_is_given_up),
+        cmocka_unit_test(nobody_else_reads_what_is_kept),
         cmocka_unit_test(two_processes_together_pass_the_cap_by_little),
         cmocka_unit_test(an_entry_too_large_for_the_cap_is_not_kept),
         cmocka_unit_test(only_files_of_ours_are_removed),

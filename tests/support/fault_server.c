@@ -92,6 +92,7 @@ static void parse_request(const char *text, fault_request *request)
     if (condition)
         sscanf(condition, "%255[^\r\n]", request->condition);
     request->asked.conditional = condition != NULL;
+    request->asked.named = find_field(text, "authorization") != NULL;
 }
 
 /* ---- answering */
@@ -239,6 +240,9 @@ static bool answer(fault_server *server, int socket, fault_request *request)
         return answer_model(server, socket, request);
     if (request->asked.redirected)
         return send_status(socket, 302, "Location: /model");
+    if (strcmp(request->path, "/moved") == 0)
+        return send_text(socket, "HTTP/1.1 302 Told So\r\nLocation: http://127.0.0.1:%u/model\r\nContent-Length: 0\r\n\r\n",
+                         (unsigned)server->port);
     if (strcmp(request->path, "/loop") == 0)
         return send_status(socket, 302, "Location: /loop");
     if (strcmp(request->path, "/elsewhere") == 0)

@@ -3,6 +3,7 @@
  *
  *     /model      the file                     /redirect   302 to /model
  *     /loop       302 to itself                /elsewhere  302 to an address that is not http
+ *     /moved      302 to /model, by its whole address
  *     all else    404 */
 #ifndef STRL_TESTS_SUPPORT_FAULT_SERVER_H
 #define STRL_TESTS_SUPPORT_FAULT_SERVER_H
@@ -35,6 +36,7 @@ typedef struct fault_asked {
     uint64_t first, last;
     bool conditional; /* If-Match or If-Unmodified-Since */
     bool redirected;  /* what was asked for is /redirect */
+    bool named;       /* a user and a password came along */
 } fault_asked;
 
 /* Called for each request of /model, by any thread, one at a time. number: 0, 1, 2, ... since the server was made. */

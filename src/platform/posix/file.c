@@ -47,11 +47,11 @@ static bool injected_failure(_Atomic uint64_t *countdown)
     return left == 1;
 }
 
-static int open_retrying(const char *path, int flags)
+static int open_retrying(const char *path, int flags, mode_t mode)
 {
     int descriptor;
     do
-        descriptor = open(path, flags | O_CLOEXEC, 0666);
+        descriptor = open(path, flags | O_CLOEXEC, mode);
     while (descriptor < 0 && errno == EINTR);
     return descriptor;
 }
@@ -77,7 +77,7 @@ strl_status strl__file_adopt(int descriptor, uint64_t bytes, const char *path, s
 static strl_status open_regular(const char *path, int flags, int *descriptor, struct stat *facts, strl_error *err)
 {
     /* Without O_NONBLOCK a named pipe would wait for its writer before it could be refused. */
-    *descriptor = open_retrying(path, flags | O_NONBLOCK | O_NOCTTY);
+    *descriptor = open_retrying(path, flags | O_NONBLOCK | O_NOCTTY, 0);
     if (*descriptor < 0)
         return strl__fail_system(err, errno, "open", path);
     if (fstat(*descriptor, facts) != 0) {
@@ -125,7 +125,7 @@ strl_status strl_file_reopen(const char *path, uint64_t bytes, strl_file **file,
 strl_status strl_file_create(const char *path, strl_file **file, strl_error *err)
 {
     *file = NULL;
-    int descriptor = open_retrying(path, O_RDWR | O_CREAT | O_TRUNC | O_NOCTTY);
+    int descriptor = open_retrying(path, O_RDWR | O_CREAT | O_TRUNC | O_NOCTTY, 0666);
     if (descriptor < 0)
         return strl__fail_system(err, errno, "create", path);
     return strl__file_adopt(descriptor, 0, path, file, err);
@@ -148,7 +148,7 @@ static void put_random(char *at)
         at[i] = letters[bits >> 5 * i & 31];
 }
 
-strl_status strl__file_create_unique(char *path, size_t random_at, const char *shown, strl_file **file,
+strl_status strl__file_create_unique(char *path, size_t random_at, mode_t mode, const char *shown, strl_file **file,
                                      strl_error *err)
 {
     *file = NULL;
@@ -156,7 +156,7 @@ strl_status strl__file_create_unique(char *path, size_t random_at, const char *s
     errno = EEXIST;
     for (int i = 0; i < MOST_NAMES_TRIED && descriptor < 0 && errno == EEXIST; i++) {
         put_random(path + random_at);
-        descriptor = open_retrying(path, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_NOCTTY);
+        descriptor = open_retrying(path, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_NOCTTY, mode);
     }
     if (descriptor < 0)
         return strl__fail_system(err, errno, "create", shown);
@@ -173,7 +173,7 @@ strl_status strl__file_create_nameless(const char *folder, const char *shown, st
     char *path = strl_path_join(folder, name);
     if (!path)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a scratch file of %s", strl__path_shown(shown));
-    strl_status status = strl__file_create_unique(path, strlen(path) - strlen("XXXXXXXX.spill"), shown, file, err);
+    strl_status status = strl__file_create_unique(path, strlen(path) - strlen("XXXXXXXX.spill"), 0600, shown, file, err);
     if (status == STRL_OK)
         status = strl_path_remove(path, err);
     if (status != STRL_OK) {

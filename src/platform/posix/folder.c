@@ -214,6 +214,20 @@ static bool is_folder(strl_folder *folder, const char *parent, const struct dire
     return length > 0 && (size_t)length < sizeof name && strl_folder_has_folder(folder, name);
 }
 
+/* What readdir failed with; 0 at the end of the folder, or where the visitor has ended it. */
+static int visit_all(strl_folder *folder, const char *name, DIR *listing, strl_folder_visit visit, void *context)
+{
+    for (bool go_on = true; go_on;) {
+        errno = 0;
+        const struct dirent *entry = readdir(listing);
+        if (!entry)
+            return errno;
+        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0)
+            go_on = visit(context, entry->d_name, is_folder(folder, name, entry));
+    }
+    return 0;
+}
+
 strl_found strl_folder_list(strl_folder *folder, const char *name, strl_folder_visit visit, void *context,
                             strl_error *err)
 {
@@ -228,10 +242,7 @@ strl_found strl_folder_list(strl_folder *folder, const char *name, strl_folder_v
         close(descriptor);
         return fail(code, "list", *name ? name : folder->path, err);
     }
-    bool go_on = true;
-    for (const struct dirent *entry; go_on && (entry = readdir(listing));)
-        if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0)
-            go_on = visit(context, entry->d_name, is_folder(folder, name, entry));
+    int code = visit_all(folder, name, listing, visit, context);
     closedir(listing);
-    return STRL_FOUND;
+    return code ? fail(code, "list", *name ? name : folder->path, err) : STRL_FOUND;
 }

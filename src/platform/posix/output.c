@@ -189,7 +189,7 @@ strl_status strl_output_open(const char *path, const char *scratch, strl_output 
     if (status == STRL_OK) {
         made->path = strl__strdup(path);
         char *pattern = temporary_pattern(made->target, scratch, &random_at);
-        status = made->path && pattern ? strl__file_create_unique(pattern, random_at, path, &made->file, err)
+        status = made->path && pattern ? strl__file_create_unique(pattern, random_at, 0666, path, &made->file, err)
                                        : fail_memory(path, err);
         made->temporary = pattern;
         if (status != STRL_OK) {

@@ -79,15 +79,25 @@ strl_status strl_path_remove(const char *path, strl_error *err)
     return STRL_OK;
 }
 
-strl_status strl_path_make_directory(const char *path, strl_error *err)
+static strl_status make_directory(const char *path, mode_t mode, strl_error *err)
 {
-    if (mkdir(path, 0777) == 0)
+    if (mkdir(path, mode) == 0)
         return STRL_OK;
     int code = errno;
     struct stat facts;
     if (code == EEXIST && stat(path, &facts) == 0 && S_ISDIR(facts.st_mode))
         return STRL_OK;
     return strl__fail_system(err, code, "create folder", path);
+}
+
+strl_status strl_path_make_directory(const char *path, strl_error *err)
+{
+    return make_directory(path, 0777, err);
+}
+
+strl_status strl_path_make_private_directory(const char *path, strl_error *err)
+{
+    return make_directory(path, 0700, err);
 }
 
 strl_status strl_path_make_temporary(char *pattern, strl_error *err)

@@ -26,22 +26,53 @@ uint64_t strl_shelf_now_ns(void)
     return nanoseconds(&now);
 }
 
-strl_status strl_shelf_visit(const char *path, bool (*visit)(void *context, const strl_shelf_entry *entry),
-                              void *context, strl_error *err)
+struct strl_shelf {
+    DIR *folder;
+    char *path; /* owned */
+};
+
+strl_status strl_shelf_open(const char *path, strl_shelf **shelf, strl_error *err)
 {
-    DIR *folder = opendir(path);
-    if (!folder)
-        return strl__fail_system(err, errno, "open folder", path);
-    const struct dirent *found;
-    bool more = true;
-    while (more && (found = readdir(folder))) {
-        struct stat facts;
-        if (fstatat(dirfd(folder), found->d_name, &facts, AT_SYMLINK_NOFOLLOW) != 0 || !S_ISREG(facts.st_mode))
-            continue; /* gone meanwhile, or no file */
-        const strl_shelf_entry entry = {found->d_name, (uint64_t)facts.st_size, nanoseconds(&facts.st_mtim)};
-        more = visit(context, &entry);
+    *shelf = NULL;
+    strl_shelf *made = strl__alloc(1, sizeof *made);
+    char *copy = strl__strdup(path);
+    DIR *folder = made && copy ? opendir(path) : NULL;
+    if (folder) {
+        *made = (strl_shelf){folder, copy};
+        *shelf = made;
+        return STRL_OK;
     }
-    closedir(folder);
+    strl_status status = made && copy ? strl__fail_system(err, errno, "open folder", path)
+                                      : strl__fail(err, STRL_ERR_MEMORY, "no memory to list %s", strl__path_shown(path));
+    strl__free(copy);
+    strl__free(made);
+    return status;
+}
+
+void strl_shelf_close(strl_shelf *shelf)
+{
+    if (!shelf)
+        return;
+    closedir(shelf->folder);
+    strl__free(shelf->path);
+    strl__free(shelf);
+}
+
+strl_status strl_shelf_next(strl_shelf *shelf, strl_shelf_entry *entry, strl_error *err)
+{
+    struct stat facts;
+    *entry = (strl_shelf_entry){0};
+    errno = 0;
+    const struct dirent *found = readdir(shelf->folder);
+    if (!found)
+        return errno ? strl__fail_system(err, errno, "list folder", shelf->path) : STRL_OK;
+    bool is_file = fstatat(dirfd(shelf->folder), found->d_name, &facts, AT_SYMLINK_NOFOLLOW) == 0 &&
+                   S_ISREG(facts.st_mode);
+    entry->name = is_file ? found->d_name : ""; /* gone meanwhile, or no file */
+    if (is_file) {
+        entry->bytes = (uint64_t)facts.st_size;
+        entry->used_ns = nanoseconds(&facts.st_mtim);
+    }
     return STRL_OK;
 }
 
@@ -61,7 +92,7 @@ static strl_status put(char *temporary, const char *target, const strl_shelf_pie
                        strl_error *err)
 {
     strl_file *file = NULL;
-    strl_status status = strl__file_create_unique(temporary, strlen(temporary) - 13, target, &file, err);
+    strl_status status = strl__file_create_unique(temporary, strlen(temporary) - 13, 0600, target, &file, err);
     if (status != STRL_OK)
         return status;
     status = write_pieces(file, pieces, count, err);

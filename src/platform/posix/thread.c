@@ -1,6 +1,7 @@
 #include "platform/thread.h"
 
 #include <assert.h>
+#include <errno.h>
 #include <signal.h>
 #include <string.h>
 
@@ -82,6 +83,14 @@ void strl_mutex_deinit(strl_mutex *mutex)
 void strl_mutex_lock(strl_mutex *mutex)
 {
     must(pthread_mutex_lock(mutex));
+}
+
+bool strl_mutex_try_lock(strl_mutex *mutex)
+{
+    int code = pthread_mutex_trylock(mutex);
+    if (code != EBUSY)
+        must(code);
+    return code == 0;
 }
 
 void strl_mutex_unlock(strl_mutex *mutex)
