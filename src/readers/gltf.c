@@ -171,7 +171,7 @@ static void init(strl_reader *reader)
     gltf->scene = STRL__NO_ITEM;
     gltf->table_limit = reader->memory_bytes / 16 * 7;
     strl_arena_init(&gltf->arena, (size_t)gltf->table_limit);
-    strl__textures_init(&reader->textures, reader->memory_bytes / 4);
+    strl__textures_init(&reader->textures, reader->memory_bytes / 4, strl__reader_advise_more(reader));
     reader->textures.open = strl__gltf_open_picture;
     reader->textures.context = gltf;
     gltf->paint.measured = STRL__NO_ITEM;
@@ -328,6 +328,14 @@ static strl_status gltf_check_unchanged(const strl_reader *reader, strl_error *e
     return strl__gltf_check_unchanged(strl__gltf_of(reader), err);
 }
 
+static void gltf_rest(strl_reader *reader)
+{
+    strl__gltf *gltf = strl__gltf_of(reader);
+    strl__gltf_end_paint(gltf);
+    strl__gltf_close_decoded(gltf);
+    strl__gltf_rest_buffers(gltf);
+}
+
 static void gltf_close(strl_reader *reader)
 {
     strl__gltf *gltf = strl__gltf_of(reader);
@@ -365,6 +373,7 @@ const strl__format strl__format_glb = {
     .fill = gltf_fill,
     .bytes_done = gltf_bytes_done,
     .check_unchanged = gltf_check_unchanged,
+    .rest = gltf_rest,
     .close = gltf_close,
     .piece_get = strl__gltf_piece_get,
     .start_placements = strl__gltf_start_placements,
@@ -383,6 +392,7 @@ const strl__format strl__format_gltf = {
     .fill = gltf_fill,
     .bytes_done = gltf_bytes_done,
     .check_unchanged = gltf_check_unchanged,
+    .rest = gltf_rest,
     .close = gltf_close,
     .piece_get = strl__gltf_piece_get,
     .start_placements = strl__gltf_start_placements,

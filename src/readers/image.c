@@ -80,8 +80,9 @@ strl_status strl__image_begin(strl__image_making *making, uint64_t width, uint64
     if (needed > limit)
         return strl__fail(err, STRL_ERR_LIMIT,
                           "takes %" PRIu64 " bytes while it is decoded, of which the memory budget "
-                          "allows %" PRIu64 ": more --memory may help",
-                          needed, limit);
+                          "allows %" PRIu64 "%s%s",
+                          needed, limit, making->room->advice ? ": " : "",
+                          making->room->advice ? making->room->advice : "");
     if (making->room->make)
         making->room->make(making->room->context, needed);
     image->bytes = 4 * texels;

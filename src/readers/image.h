@@ -39,6 +39,7 @@ typedef struct strl__image {
 /* Memory for a decoder and its image together. */
 typedef struct strl__image_room {
     uint64_t limit_bytes;
+    const char *advice; /* static: how to get more; NULL: none */
     void *context;
     /* Called once, before they are taken; bytes <= limit. May be NULL. */
     void (*make)(void *context, uint64_t bytes);
