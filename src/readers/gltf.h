@@ -258,6 +258,8 @@ typedef struct strl__gltf {
     uint64_t triangles, vertices; /* of all placements, but of a piece once; of all meshes */
     uint64_t rest_triangles;      /* of them those of piece 0 */
     bool rest_is_empty;           /* nothing is in piece 0 */
+    uint64_t image_changes;       /* how often a pass over all comes from one image to another */
+    uint32_t last_picture;        /* while they are counted */
     uint32_t *pieces;             /* owned; the mesh of piece i + 1 */
     strl__gltf_window instances;
     strl__gltf_matrix *world;     /* owned; of node's ancestors and itself, by depth */

@@ -237,6 +237,19 @@ static void add_product(uint64_t *sum, uint64_t a, uint64_t b)
         *sum = UINT64_MAX;
 }
 
+static void count_image_changes(strl__gltf *gltf, const strl__gltf_mesh *mesh)
+{
+    for (uint32_t i = 0; i < mesh->primitive_count; i++) {
+        const strl__gltf_primitive *primitive = &gltf->primitives[mesh->first_primitive + i];
+        if (primitive->mode < 4 || primitive->position == STRL__NO_ITEM || strl__gltf_texcoord(gltf, primitive) == STRL__NO_ITEM)
+            continue;
+        const uint32_t texture = gltf->materials[primitive->material].texture;
+        const uint32_t picture = gltf->reader->textures.items[texture].picture;
+        gltf->image_changes += picture != gltf->last_picture;
+        gltf->last_picture = picture;
+    }
+}
+
 strl_status strl__gltf_check_scene(strl__gltf *gltf, strl_error *err)
 {
     strl_status status = STRL_OK;
@@ -247,6 +260,8 @@ strl_status strl__gltf_check_scene(strl__gltf *gltf, strl_error *err)
         status = check_mesh(gltf, node->mesh, err);
         if (!status && node->instances)
             status = check_instances(gltf, node->instances, err);
+        if (!status)
+            count_image_changes(gltf, &gltf->meshes[node->mesh]);
         add_product(&gltf->triangles, gltf->meshes[node->mesh].triangles,
                     strl__gltf_instance_count(node));
         add_product(&gltf->meshes[node->mesh].uses, 1, strl__gltf_instance_count(node));

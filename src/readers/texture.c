@@ -125,7 +125,7 @@ static strl_status decode_as(strl__textures *textures, strl__picture *picture, c
 {
     strl__picture_place place = {.close = NULL};
     const strl__image_room room = {
-        .limit_bytes = textures->limit_bytes, .advice = textures->advice, .context = textures, .make = make_room};
+        .limit_bytes = textures->limit_bytes, .image_bytes = textures->image_bytes, .advice = textures->advice, .context = textures, .make = make_room};
     strl_status status = textures->open(textures->context, picture, ending, &place, err);
     if (!status)
         status = strl__image_decode(&place.source, &room, &textures->srgb, &picture->image, err);

@@ -42,6 +42,7 @@ typedef struct strl__textures {
     strl__picture *pictures; /* owned */
     size_t picture_capacity;
     uint64_t limit_bytes, held_bytes, clock;
+    uint64_t image_bytes; /* of one image at most; 0 = limit_bytes */
     const char *advice;
     strl__srgb srgb;
     bool is_ready;
