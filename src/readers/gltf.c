@@ -345,7 +345,7 @@ static void gltf_rest(strl_reader *reader)
 {
     strl__gltf *gltf = strl__gltf_of(reader);
     strl__gltf_end_paint(gltf);
-    strl__gltf_close_decoded(gltf);
+    strl__gltf_rest_decoded(gltf);
     strl__gltf_rest_buffers(gltf);
 }
 

@@ -250,7 +250,7 @@ typedef struct strl__gltf {
     uint64_t text_bytes; /* of buffers that are in memory */
     strl__gltf_decoded decoded[STRL__GLTF_DECODED_MAX];
     uint64_t decoded_bytes, clock;
-    strl_file *stored; /* scratch; decompressed views that had to make room; owned, may be NULL */
+    strl_file *stored; /* scratch; what was decoded and had to make room; owned, may be NULL */
     uint64_t stored_bytes;
     strl__draco *draco; /* the primitive decompressed last; owned */
     uint32_t draco_primitive;
@@ -343,7 +343,7 @@ strl_status strl__gltf_fail_index(const strl__gltf *gltf, const char *where, con
 strl_status strl__gltf_open_buffer(strl__gltf *gltf, uint32_t index, strl_error *err);
 /* Whether the files beside the model are as they were. */
 strl_status strl__gltf_check_unchanged(const strl__gltf *gltf, strl_error *err);
-void strl__gltf_rest_buffers(strl__gltf *gltf); /* gives back their memory; reading decodes them again */
+void strl__gltf_rest_buffers(strl__gltf *gltf); /* gives back memory, by scratch or by decoding again later */
 void strl__gltf_close_buffers(strl__gltf *gltf);
 /* Size bytes of a view; inside it, which the caller has checked. */
 strl_status strl__gltf_read_view(strl__gltf *gltf, uint32_t view, uint64_t offset, void *data,
@@ -366,7 +366,10 @@ strl_status strl__gltf_make_room(strl__gltf *gltf, uint64_t bytes, const char *w
                                  strl_error *err);
 /* Gives up all decompressed views, and tells how many bytes a Draco mesh may take. */
 uint64_t strl__gltf_room(strl__gltf *gltf);
-void strl__gltf_close_decoded(strl__gltf *gltf); /* reading decodes them again */
+/* Into scratch, which holds it until the reader is closed; false where that has no place. */
+bool strl__gltf_store(strl__gltf *gltf, const void *bytes, size_t size, uint64_t *at);
+void strl__gltf_rest_decoded(strl__gltf *gltf); /* gives back memory, by scratch or by decoding again later */
+void strl__gltf_close_decoded(strl__gltf *gltf);
 
 /* ---- gltf_accessor.c: elements */
 /* Against the bytes that are there; opens buffers. */

@@ -387,9 +387,19 @@ strl_status strl__gltf_check_unchanged(const strl__gltf *gltf, strl_error *err)
 
 void strl__gltf_rest_buffers(strl__gltf *gltf)
 {
-    for (size_t i = 0; i < gltf->buffer_count; i++)
-        if (gltf->buffers[i].memory)
-            strl__gltf_close_buffer(gltf, &gltf->buffers[i]);
+    for (size_t i = 0; i < gltf->buffer_count; i++) {
+        strl__gltf_buffer *buffer = &gltf->buffers[i];
+        uint64_t at;
+        if (!buffer->memory)
+            continue;
+        const bool is_stored = strl__gltf_store(gltf, buffer->memory, (size_t)buffer->memory_bytes, &at);
+        strl__gltf_close_buffer(gltf, buffer);
+        if (is_stored) {
+            buffer->file = gltf->stored;
+            buffer->file_offset = at;
+            buffer->is_open = true;
+        }
+    }
 }
 
 void strl__gltf_close_buffers(strl__gltf *gltf)

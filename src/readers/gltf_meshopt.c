@@ -67,9 +67,6 @@ void strl__gltf_close_decoded(strl__gltf *gltf)
     gltf->draco_bytes = 0;
     strl_file_close(gltf->stored, NULL); /* scratch */
     gltf->stored = NULL;
-    gltf->stored_bytes = 0;
-    for (size_t i = 0; i < gltf->view_count; i++)
-        gltf->views[i].is_stored = false;
 }
 
 /* The view that was used longest ago; NULL where there is none. */
@@ -186,20 +183,34 @@ static strl_status decompress(strl__gltf *gltf, uint32_t index, uint8_t *bytes, 
     return status;
 }
 
+bool strl__gltf_store(strl__gltf *gltf, const void *bytes, size_t size, uint64_t *at)
+{
+    const char *folder = gltf->reader->scratch_dir;
+    *at = gltf->stored_bytes;
+    if (!folder || (!gltf->stored && strl_file_create_nameless(folder, &gltf->stored, NULL)) ||
+        strl_file_write(gltf->stored, *at, bytes, size, NULL))
+        return false;
+    gltf->stored_bytes += size;
+    return true;
+}
+
 /* Makes room for another view. Without scratch, or a place in it, this one is decompressed again. */
 static void store_away(strl__gltf *gltf, strl__gltf_decoded *decoded)
 {
     strl__gltf_view *view = &gltf->views[decoded->view];
-    const char *folder = gltf->reader->scratch_dir;
-    if (folder && !view->is_stored) {
-        strl_status status = gltf->stored ? STRL_OK : strl_file_create_nameless(folder, &gltf->stored, NULL);
-        if (!status)
-            status = strl_file_write(gltf->stored, gltf->stored_bytes, decoded->bytes, (size_t)decoded->size, NULL);
-        view->is_stored = !status;
-        view->stored_at = gltf->stored_bytes;
-        gltf->stored_bytes += status ? 0 : decoded->size;
-    }
+    if (!view->is_stored)
+        view->is_stored = strl__gltf_store(gltf, decoded->bytes, (size_t)decoded->size, &view->stored_at);
     drop(gltf, decoded);
+}
+
+void strl__gltf_rest_decoded(strl__gltf *gltf)
+{
+    for (unsigned i = 0; i < STRL__GLTF_DECODED_MAX; i++)
+        if (gltf->decoded[i].bytes)
+            store_away(gltf, &gltf->decoded[i]);
+    strl__draco_close(gltf->draco);
+    gltf->draco = NULL;
+    gltf->draco_bytes = 0;
 }
 
 static strl_status add_decoded(strl__gltf *gltf, uint32_t index, strl__gltf_decoded **added,
