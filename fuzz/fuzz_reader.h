@@ -35,7 +35,12 @@ static inline void fuzz_check_triangle(const strl_triangle *triangle, fuzz_pass 
         FUZZ_CHECK(__builtin_isfinite(triangle->position[i / 3][i % 3]));
         FUZZ_CHECK(__builtin_isfinite(triangle->normal[i / 3][i % 3]));
     }
-    FUZZ_CHECK((triangle->flags & ~(STRL_TRIANGLE_HAS_NORMAL | STRL_TRIANGLE_HAS_COLOUR)) == 0);
+    for (unsigned i = 0; i < 6; i++) {
+        const float coordinate = triangle->texcoord[i / 2][i % 2];
+        FUZZ_CHECK(__builtin_isfinite(coordinate));
+        FUZZ_CHECK((triangle->flags & STRL_TRIANGLE_HAS_TEXCOORD) || coordinate == 0);
+    }
+    FUZZ_CHECK((triangle->flags & ~(STRL_TRIANGLE_HAS_NORMAL | STRL_TRIANGLE_HAS_COLOUR | STRL_TRIANGLE_HAS_TEXCOORD)) == 0);
     if (!(triangle->flags & STRL_TRIANGLE_HAS_COLOUR))
         FUZZ_CHECK(triangle->colour[0] == 0xffffffffu && triangle->colour[2] == 0xffffffffu);
     pass->highest_part = triangle->part > pass->highest_part ? triangle->part : pass->highest_part;
@@ -132,6 +137,12 @@ static inline void fuzz_reader(const strl__format *format, const uint8_t *data, 
     FUZZ_CHECK(first.status == second.status && first.count == second.count &&
                first.checksum == second.checksum);
     FUZZ_CHECK(memcmp(&first.drops, &second.drops, sizeof first.drops) == 0);
+    strl_reader_rest(reader);
+    fuzz_pass none = fuzz_read_pass(reader);
+    FUZZ_CHECK(none.count == 0 && !reader->prepared && (none.status == STRL_OK || none.status == second.status));
+    FUZZ_CHECK(strl_reader_rewind(reader, &err) == STRL_OK);
+    fuzz_pass third = fuzz_read_pass(reader);
+    FUZZ_CHECK(first.status == third.status && first.checksum == third.checksum);
     strl_reader_close(reader);
     fuzz_pieces(&desc, format);
 }

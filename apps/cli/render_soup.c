@@ -19,6 +19,9 @@
 #include "render_normals.h"
 #include "shared/importer.h"
 
+/* What is read is held whole, however large, so that reading it may take more than a reader's default as well. */
+#define READER_BYTES ((uint64_t)1 << 30)
+#define IMPORTER_BYTES ((uint64_t)4 << 30)
 #define READ_TRIANGLES 4096u
 #define BATCH_VERTICES 65535u
 #define BATCH_INDICES (3u * 65536u)
@@ -245,7 +248,8 @@ static strl_status load_soup(soup_model *model, const strl_render_model_desc *de
     const char *scratch = getenv("TMPDIR");
     const strl_reader_desc reading = {.path = desc->location.name,
                                       .scratch_dir = scratch ? scratch : "/tmp",
-                                      .child = {.importer = strl_importer(), .go_on = go_on, .context = desc->progress}};
+                                      .memory_bytes = READER_BYTES,
+                                      .child = {.importer = strl_importer(), .memory_bytes = IMPORTER_BYTES, .go_on = go_on, .context = desc->progress}};
     strl_status status = strl_reader_open(&reading, &load.reader, err);
     if (status != STRL_OK)
         return status;

@@ -5,6 +5,7 @@
 #include <assimp/config.h>
 #include <assimp/version.h>
 #include <ctype.h>
+#include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
@@ -14,6 +15,8 @@
 #include "output.h"
 #include "scene.h"
 #include "stroll/version.h"
+
+#define NO_OUTPUT 65 /* as 64, no reason of the protocol's */
 
 static int usage(void)
 {
@@ -27,9 +30,12 @@ static int usage(void)
 static int take_output(void)
 {
     int stream = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
-    if (stream >= 0 && dup2(STDERR_FILENO, STDOUT_FILENO) < 0)
-        return -1;
-    return stream;
+    if (stream >= 0 && dup2(STDERR_FILENO, STDOUT_FILENO) >= 0)
+        return stream;
+    fprintf(stderr, "stroll-import: no descriptor for its output: %s\n", strerror(errno));
+    if (stream >= 0)
+        close(stream);
+    return -1;
 }
 
 static void find_extension(const char *path, char *extension, size_t size)
@@ -107,5 +113,5 @@ int main(int argc, char **argv)
     int descriptor = take_output();
     /* Without a clean end: destructors of a scene that a broken file has made are one more place to die, and what is
      * told is told. */
-    _exit(descriptor < 0 ? usage() : run(argv[1], descriptor));
+    _exit(descriptor < 0 ? NO_OUTPUT : run(argv[1], descriptor));
 }

@@ -23,6 +23,14 @@ void import_end_without_memory(int descriptor)
 }
 
 #if defined(__SANITIZE_ADDRESS__)
+#define IS_SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer)
+#define IS_SANITIZED 1
+#endif
+#endif
+
+#ifdef IS_SANITIZED
 
 /* The sanitizer has its own operators, and address space cannot be limited under it; resident memory can. A scene is not
  * released, see main. */

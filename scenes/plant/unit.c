@@ -117,9 +117,9 @@ static void fill_bay(strl__plant *plant, int x, int y, int level)
     static const strl__plant_item items[] = {strl__plant_item_exchanger, strl__plant_item_column_vessel,
                                              strl__plant_item_skid, strl__plant_item_drum, strl__plant_item_cabinets};
     double drawn = strl__plant_random(plant);
-    if (drawn > 0.8 || unit->hollow[x][y])
+    if (drawn >= 0.8 || unit->hollow[x][y])
         return;
-    strl__plant_item item = items[(int)(drawn * 6.25)];
+    strl__plant_item item = items[(int)fmin(drawn * 6.25, 4)];
     if (roof && drawn < 0.35) {
         spot.deep = STRL__PLANT_BAY - 1;
         item = strl__plant_item_air_cooler;

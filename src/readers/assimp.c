@@ -8,6 +8,7 @@
  * the importer leaves it so, the child says z. */
 #include <ctype.h>
 #include <inttypes.h>
+#include <signal.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -164,7 +165,7 @@ static strl_status fail_time(const import_run *run, bool cpu, strl_error *err)
     uint64_t seconds = cpu ? run->cpu_seconds : run->cpu_seconds * SECONDS_A_CPU_SECOND;
     return strl__fail(err, STRL_ERR_LIMIT,
                       "%s: importing it by assimp takes more than %" PRIu64
-                      " s%s and was stopped: convert it to PLY, OBJ or glTF",
+                      " s%s, its limit, and was stopped: convert it to PLY, OBJ or glTF",
                       run->reader->path, seconds, cpu ? " of processor time" : "");
 }
 
@@ -177,9 +178,9 @@ static strl_status fail_memory(const import_run *run, const char *why, strl_erro
         snprintf(doubt, sizeof doubt, "; a file of %" PRIu64 " bytes that asks for so much may be broken", bytes);
     return strl__fail(err, STRL_ERR_MEMORY,
                       "%s: importing it by assimp takes more than %" PRIu64
-                      "M of memory, which is what is left for it%s%s%s: give more by --memory, or "
-                      "convert it to PLY, OBJ or glTF",
-                      run->reader->path, run->memory_bytes >> 20, *why ? "; " : "", why, doubt);
+                      "M of memory, which is what is left for it%s%s%s: %sconvert it to PLY, OBJ or glTF",
+                      run->reader->path, run->memory_bytes >> 20, *why ? "; " : "", why, doubt,
+                      run->reader->whole_bytes ? "give more by --memory, or " : "");
 }
 
 static strl_status check_cancel(const import_run *run, strl_error *err)
@@ -265,6 +266,11 @@ static strl_status fail_end(import_run *run, const strl_process_end *end, strl_e
     if (strstr(said, "bad_alloc") || strstr(said, "annot allocate memory") ||
         strstr(said, "failed to map segment"))
         return fail_memory(run, said, err);
+    if (end->signal == SIGKILL)
+        return strl__fail(err, STRL_ERR_MEMORY,
+                          "%s: assimp, which imports it, was ended by signal 9 (%s): the machine's "
+                          "memory may have run out; convert it to PLY, OBJ or glTF",
+                          path, strl_signal_name(end->signal));
     if (end->signal)
         return strl__fail(err, STRL_ERR_FORMAT,
                           "%s: assimp, which imports it, was ended by signal %d (%s): the file is "
@@ -281,7 +287,10 @@ static strl_status judge(import_run *run, strl_error *err)
     const strl__import *state = run->reader->state;
     strl_process_end end;
     if (!strl_process_wait(run->process, END_SECONDS * (uint64_t)NS_PER_S, &end))
-        return fail_time(run, false, err);
+        return strl__fail(err, STRL_ERR_LIMIT,
+                          "%s: the program that imports it has closed its output but did not end "
+                          "within %u s, and was stopped: convert it to PLY, OBJ or glTF",
+                          run->reader->path, END_SECONDS);
     run->reader->costs =
         (strl_reader_costs){run->spool_bytes, end.peak_rss_bytes + run->own_rss_bytes};
     if (end.signal)
@@ -289,7 +298,7 @@ static strl_status judge(import_run *run, strl_error *err)
     strl_error told = {0};
     strl_status status = strl__import_scan(run->reader, &told);
     if (status == STRL_ERR_MEMORY && state->error_told)
-        return fail_memory(run, told.message + strlen(run->reader->path) + 2, err);
+        return fail_memory(run, state->told, err);
     if (err)
         *err = told;
     /* An error that the stream tells says more than a status; a broken stream less. */

@@ -14,6 +14,8 @@
 #define CHUNK_BINARY 0x004e4942u
 #define HEADER_BYTES 12u
 #define CHUNK_HEADER_BYTES 8u
+#define CHANGES_OF_AN_IMAGE 16u /* so often each may be decoded anew, on average */
+#define LEAST_IMAGES 4u         /* that fit together */
 
 static bool glb_recognises(const strl__input *input, uint64_t file_bytes)
 {
@@ -145,6 +147,15 @@ static void share_out(strl__gltf *gltf)
         textures->limit_bytes = left;
 }
 
+/* Images that take turns again and again must fit together, at the cost of detail: else each turn decodes one anew. */
+static void share_out_images(strl__gltf *gltf)
+{
+    strl__textures *textures = &gltf->reader->textures;
+    const uint64_t count = textures->keys.count;
+    if (gltf->image_changes > CHANGES_OF_AN_IMAGE * count)
+        textures->image_bytes = textures->limit_bytes / (count < LEAST_IMAGES ? count : LEAST_IMAGES);
+}
+
 static strl_status open_json(strl_reader *reader, strl_error *err)
 {
     strl__gltf *gltf = strl__gltf_of(reader);
@@ -159,6 +170,7 @@ static strl_status open_json(strl_reader *reader, strl_error *err)
     share_out(gltf);
     if (!status)
         status = strl__gltf_check_scene(gltf, err);
+    share_out_images(gltf);
     if (!status)
         add_up(gltf);
     return status;
@@ -171,10 +183,11 @@ static void init(strl_reader *reader)
     gltf->scene = STRL__NO_ITEM;
     gltf->table_limit = reader->memory_bytes / 16 * 7;
     strl_arena_init(&gltf->arena, (size_t)gltf->table_limit);
-    strl__textures_init(&reader->textures, reader->memory_bytes / 4);
+    strl__textures_init(&reader->textures, reader->memory_bytes / 4, strl__reader_advise_more(reader));
     reader->textures.open = strl__gltf_open_picture;
     reader->textures.context = gltf;
     gltf->paint.measured = STRL__NO_ITEM;
+    gltf->last_picture = STRL__NO_ITEM;
 }
 
 static strl_status gltf_open(strl_reader *reader, strl_error *err)
@@ -328,6 +341,14 @@ static strl_status gltf_check_unchanged(const strl_reader *reader, strl_error *e
     return strl__gltf_check_unchanged(strl__gltf_of(reader), err);
 }
 
+static void gltf_rest(strl_reader *reader)
+{
+    strl__gltf *gltf = strl__gltf_of(reader);
+    strl__gltf_end_paint(gltf);
+    strl__gltf_rest_decoded(gltf);
+    strl__gltf_rest_buffers(gltf);
+}
+
 static void gltf_close(strl_reader *reader)
 {
     strl__gltf *gltf = strl__gltf_of(reader);
@@ -365,6 +386,7 @@ const strl__format strl__format_glb = {
     .fill = gltf_fill,
     .bytes_done = gltf_bytes_done,
     .check_unchanged = gltf_check_unchanged,
+    .rest = gltf_rest,
     .close = gltf_close,
     .piece_get = strl__gltf_piece_get,
     .start_placements = strl__gltf_start_placements,
@@ -383,6 +405,7 @@ const strl__format strl__format_gltf = {
     .fill = gltf_fill,
     .bytes_done = gltf_bytes_done,
     .check_unchanged = gltf_check_unchanged,
+    .rest = gltf_rest,
     .close = gltf_close,
     .piece_get = strl__gltf_piece_get,
     .start_placements = strl__gltf_start_placements,

@@ -250,7 +250,7 @@ typedef struct strl__gltf {
     uint64_t text_bytes; /* of buffers that are in memory */
     strl__gltf_decoded decoded[STRL__GLTF_DECODED_MAX];
     uint64_t decoded_bytes, clock;
-    strl_file *stored; /* scratch; decompressed views that had to make room; owned, may be NULL */
+    strl_file *stored; /* scratch; what was decoded and had to make room; owned, may be NULL */
     uint64_t stored_bytes;
     strl__draco *draco; /* the primitive decompressed last; owned */
     uint32_t draco_primitive;
@@ -258,6 +258,8 @@ typedef struct strl__gltf {
     uint64_t triangles, vertices; /* of all placements, but of a piece once; of all meshes */
     uint64_t rest_triangles;      /* of them those of piece 0 */
     bool rest_is_empty;           /* nothing is in piece 0 */
+    uint64_t image_changes;       /* how often a pass over all comes from one image to another */
+    uint32_t last_picture;        /* while they are counted */
     uint32_t *pieces;             /* owned; the mesh of piece i + 1 */
     strl__gltf_window instances;
     strl__gltf_matrix *world;     /* owned; of node's ancestors and itself, by depth */
@@ -332,10 +334,16 @@ uint64_t strl__gltf_instance_count(const strl__gltf_node *node);
 /* Of pass.node, an instance of it where it has any. */
 strl_status strl__gltf_place_node(strl__gltf *gltf, strl__gltf_matrix *placement, strl_error *err);
 
+/* ---- gltf_check.c */
+/* where: what names it, with a comma before it, may be empty; list: the JSON's member. */
+strl_status strl__gltf_fail_index(const strl__gltf *gltf, const char *where, const char *list, size_t count,
+                                  uint32_t found, strl_error *err);
+
 /* ---- gltf_buffer.c: where bytes are */
 strl_status strl__gltf_open_buffer(strl__gltf *gltf, uint32_t index, strl_error *err);
 /* Whether the files beside the model are as they were. */
 strl_status strl__gltf_check_unchanged(const strl__gltf *gltf, strl_error *err);
+void strl__gltf_rest_buffers(strl__gltf *gltf); /* gives back memory, by scratch or by decoding again later */
 void strl__gltf_close_buffers(strl__gltf *gltf);
 /* Size bytes of a view; inside it, which the caller has checked. */
 strl_status strl__gltf_read_view(strl__gltf *gltf, uint32_t view, uint64_t offset, void *data,
@@ -358,6 +366,9 @@ strl_status strl__gltf_make_room(strl__gltf *gltf, uint64_t bytes, const char *w
                                  strl_error *err);
 /* Gives up all decompressed views, and tells how many bytes a Draco mesh may take. */
 uint64_t strl__gltf_room(strl__gltf *gltf);
+/* Into scratch, which holds it until the reader is closed; false where that has no place. */
+bool strl__gltf_store(strl__gltf *gltf, const void *bytes, size_t size, uint64_t *at);
+void strl__gltf_rest_decoded(strl__gltf *gltf); /* gives back memory, by scratch or by decoding again later */
 void strl__gltf_close_decoded(strl__gltf *gltf);
 
 /* ---- gltf_accessor.c: elements */
@@ -366,8 +377,9 @@ strl_status strl__gltf_check_view(strl__gltf *gltf, uint32_t view, strl_error *e
 strl_status strl__gltf_check_accessor(strl__gltf *gltf, uint32_t accessor, strl_error *err);
 /* An integer as the part of 0..1 or -1..1 that it stands for. */
 double strl__gltf_denormalize(strl__scalar type, double value);
-/* Elements of a checked accessor, components after components; first + count <= its count. */
-strl_status strl__gltf_read_numbers(strl__gltf *gltf, uint32_t accessor, uint64_t first,
+/* Elements of a checked accessor, components after components; first + count <= its count. normalized: its integers are parts
+ * of 0..1 or -1..1; some uses have them so whatever the accessor says. */
+strl_status strl__gltf_read_numbers(strl__gltf *gltf, uint32_t accessor, bool normalized, uint64_t first,
                                     size_t count, double *numbers, strl_error *err);
 strl_status strl__gltf_read_indices(strl__gltf *gltf, uint32_t accessor, uint64_t first,
                                     size_t count, uint32_t *indices, strl_error *err);
@@ -401,11 +413,8 @@ strl_status strl__gltf_add_triangles(strl__gltf *gltf, const strl__gltf_primitiv
 
 unsigned strl__gltf_mode_of(const strl__gltf_primitive *primitive); /* as its elements stand */
 /* Of a vertex attribute into gltf->values, count <= STRL__GLTF_CHUNK. */
-strl_status strl__gltf_read_attribute(strl__gltf *gltf, uint32_t accessor, uint32_t draco_id,
+strl_status strl__gltf_read_attribute(strl__gltf *gltf, uint32_t accessor, bool normalized, uint32_t draco_id,
                                       uint64_t first, size_t count, strl_error *err);
-strl_status strl__gltf_read_elements(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                     uint64_t first, size_t count, uint32_t *elements,
-                                     strl_error *err);
 /* Where the corners of a triangle stand, from the one where it begins; a fan's first is apart. */
 #define STRL__GLTF_FAN_CENTRE UINT32_MAX
 void strl__gltf_corners_of(unsigned mode, uint64_t triangle, size_t at, uint32_t slots[3]);

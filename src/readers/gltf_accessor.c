@@ -1,5 +1,6 @@
 /* Elements of accessors, read through a window. */
 #include <inttypes.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/fail.h"
@@ -21,9 +22,10 @@ static uint32_t stride_of(const strl__gltf *gltf, const strl__gltf_column *colum
 strl_status strl__gltf_check_view(strl__gltf *gltf, uint32_t index, strl_error *err)
 {
     const char *path = gltf->reader->path;
+    char where[40];
+    snprintf(where, sizeof where, ", bufferViews[%u].buffer", index);
     if (index >= gltf->view_count)
-        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected one of %zu bufferViews, found %u",
-                          path, gltf->view_count, index);
+        return strl__gltf_fail_index(gltf, "", "bufferViews", gltf->view_count, index, err);
     strl__gltf_view *view = &gltf->views[index];
     strl_status status = STRL_OK;
     uint64_t end;
@@ -32,9 +34,7 @@ strl_status strl__gltf_check_view(strl__gltf *gltf, uint32_t index, strl_error *
     if (view->meshopt) {
         status = strl__gltf_check_meshopt(gltf, index, err);
     } else if (view->buffer >= gltf->buffer_count) {
-        status = strl__fail(err, STRL_ERR_FORMAT,
-                            "%s, bufferViews[%u]: expected one of %zu buffers, found %u", path,
-                            index, gltf->buffer_count, view->buffer);
+        status = strl__gltf_fail_index(gltf, where, "buffers", gltf->buffer_count, view->buffer, err);
     } else if (__builtin_add_overflow(view->offset, view->bytes, &end) ||
                end > gltf->buffers[view->buffer].bytes) {
         status = strl__fail(err, STRL_ERR_FORMAT,
@@ -148,8 +148,7 @@ static strl_status check_sparse(strl__gltf *gltf, uint32_t index, strl_error *er
 strl_status strl__gltf_check_accessor(strl__gltf *gltf, uint32_t index, strl_error *err)
 {
     if (index >= gltf->accessor_count)
-        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected one of %zu accessors, found %u",
-                          gltf->reader->path, gltf->accessor_count, index);
+        return strl__gltf_fail_index(gltf, "", "accessors", gltf->accessor_count, index, err);
     strl__gltf_accessor *accessor = &gltf->accessors[index];
     if (accessor->is_checked)
         return STRL_OK;
@@ -183,18 +182,18 @@ double strl__gltf_denormalize(strl__scalar type, double value)
     }
 }
 
-static void convert(const strl__gltf_column *column, const uint8_t *bytes, double *numbers)
+static void convert(const strl__gltf_column *column, bool normalized, const uint8_t *bytes, double *numbers)
 {
     const unsigned size = strl__scalar_bytes(column->type);
     for (unsigned i = 0; i < column->components; i++) {
         double value = column->type == STRL__F32
                            ? (double)strl__load_f32(bytes + 4 * i, false)
                            : strl__scalar_load(column->type, bytes + size * i, false);
-        numbers[i] = column->normalized ? strl__gltf_denormalize(column->type, value) : value;
+        numbers[i] = normalized ? strl__gltf_denormalize(column->type, value) : value;
     }
 }
 
-static strl_status read_column(strl__gltf *gltf, const strl__gltf_column *column, uint64_t first,
+static strl_status read_column(strl__gltf *gltf, const strl__gltf_column *column, bool normalized, uint64_t first,
                                size_t count, double *numbers, strl_error *err)
 {
     if (column->view == STRL__NO_ITEM) {
@@ -207,7 +206,7 @@ static strl_status read_column(strl__gltf *gltf, const strl__gltf_column *column
         size_t some = window_elements(gltf, column, count - done);
         status = load(gltf, column, first + done, some, err);
         for (size_t i = 0; i < some && !status; i++)
-            convert(column, gltf->window + i * stride, numbers + (done + i) * column->components);
+            convert(column, normalized, gltf->window + i * stride, numbers + (done + i) * column->components);
         done += some;
     }
     return status;
@@ -235,7 +234,7 @@ static strl_status find_sparse(strl__gltf *gltf, const strl__gltf_sparse *sparse
 
 #define SPARSE_CHUNK 64u
 
-static strl_status overlay(strl__gltf *gltf, const strl__gltf_sparse *sparse, uint64_t first,
+static strl_status overlay(strl__gltf *gltf, const strl__gltf_sparse *sparse, bool normalized, uint64_t first,
                            size_t count, double *numbers, strl_error *err)
 {
     const unsigned components = sparse->values.components;
@@ -248,7 +247,7 @@ static strl_status overlay(strl__gltf *gltf, const strl__gltf_sparse *sparse, ui
         size_t some = left < SPARSE_CHUNK ? (size_t)left : SPARSE_CHUNK;
         status = read_indices(gltf, &sparse->indices, entry, some, indices, err);
         if (!status)
-            status = read_column(gltf, &sparse->values, entry, some, values, err);
+            status = read_column(gltf, &sparse->values, normalized, entry, some, values, err);
         for (size_t i = 0; i < some && !status; i++) {
             if (indices[i] < first || indices[i] - first >= count)
                 return STRL_OK; /* beyond; or the file changed under us */
@@ -260,13 +259,13 @@ static strl_status overlay(strl__gltf *gltf, const strl__gltf_sparse *sparse, ui
     return status;
 }
 
-strl_status strl__gltf_read_numbers(strl__gltf *gltf, uint32_t index, uint64_t first, size_t count,
+strl_status strl__gltf_read_numbers(strl__gltf *gltf, uint32_t index, bool normalized, uint64_t first, size_t count,
                                     double *numbers, strl_error *err)
 {
     const strl__gltf_accessor *accessor = &gltf->accessors[index];
-    strl_status status = read_column(gltf, &accessor->values, first, count, numbers, err);
+    strl_status status = read_column(gltf, &accessor->values, normalized, first, count, numbers, err);
     if (!status && accessor->sparse)
-        status = overlay(gltf, accessor->sparse, first, count, numbers, err);
+        status = overlay(gltf, accessor->sparse, normalized, first, count, numbers, err);
     return status;
 }
 
@@ -280,7 +279,7 @@ strl_status strl__gltf_read_indices(strl__gltf *gltf, uint32_t index, uint64_t f
     strl_status status = STRL_OK;
     for (size_t done = 0; done < count && !status;) {
         size_t some = count - done < STRL__GLTF_CHUNK ? count - done : STRL__GLTF_CHUNK;
-        status = strl__gltf_read_numbers(gltf, index, first + done, some, numbers, err);
+        status = strl__gltf_read_numbers(gltf, index, false, first + done, some, numbers, err);
         for (size_t i = 0; i < some && !status; i++)
             indices[done + i] = (uint32_t)numbers[i];
         done += some;

@@ -7,6 +7,7 @@
 
 #include "base/fail.h"
 #include "readers/gltf.h"
+#include "readers/stranger.h"
 
 #define TEXT_BYTES ((size_t)16 << 10) /* of base64 read at once */
 #define HEADER_BYTES_MAX 256u         /* of a data URI, up to its comma */
@@ -70,6 +71,17 @@ static const char *list_of(const strl__gltf_buffer *buffer)
     return buffer->is_loose ? "images" : "buffers";
 }
 
+static strl_status fail_short(const strl__gltf *gltf, const strl__gltf_buffer *buffer, uint32_t index, strl_error *err)
+{
+    char start[STRL__POINTER_BYTES];
+    const bool is_pointer = buffer->opened.bytes >= sizeof start &&
+                            strl_file_read(buffer->file, 0, start, sizeof start, NULL) == STRL_OK &&
+                            strl__stranger_is_pointer(start, sizeof start);
+    return strl__fail(err, STRL_ERR_FORMAT, "%s, buffers[%u]: expected %" PRIu64 " bytes, found %" PRIu64 " in %s%s",
+                      gltf->reader->path, index, buffer->bytes, buffer->opened.bytes, strl_file_path(buffer->file),
+                      is_pointer ? ", which is a Git LFS pointer: " STRL__POINTER_ADVICE : "");
+}
+
 static strl_status open_file(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32_t index,
                              strl_error *err)
 {
@@ -97,10 +109,7 @@ static strl_status open_file(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32
     if (!status)
         status = strl_file_stat(buffer->file, &buffer->opened, err);
     if (!status && buffer->opened.bytes < buffer->bytes)
-        status = strl__fail(err, STRL_ERR_FORMAT,
-                            "%s, buffers[%u]: expected %" PRIu64 " bytes, found %" PRIu64 " in %s",
-                            gltf->reader->path, index, buffer->bytes, buffer->opened.bytes,
-                            strl_file_path(buffer->file));
+        status = fail_short(gltf, buffer, index, err);
     if (!status)
         status = strl__reader_note_beside(gltf->reader, strl_file_path(buffer->file), &buffer->opened, err);
     if (!status && buffer->is_loose)
@@ -137,6 +146,8 @@ typedef struct data_text {
     uint64_t at, end; /* in the file */
     uint64_t decoded; /* bytes so far */
     uint32_t bits, bit_count;
+    uint32_t escape, code; /* characters of JSON's escape that were read, and what it stands for so far */
+    bool has_ended;        /* at '=' */
     uint8_t out[TEXT_BYTES]; /* that wait to be written */
     size_t waiting;
 } data_text;
@@ -174,13 +185,41 @@ static int base64_digit(unsigned char c)
     return c == '+' || c == '-' ? 62 : c == '/' || c == '_' ? 63 : -1;
 }
 
-/* Backslashes are JSON's before a slash; '=' ends the data. */
+#define NOT_YET (-1)
+#define NO_LETTER 0
+
+/* The letter that the next character of JSON's text makes, NOT_YET within an escape. Of escapes those of a letter can be
+ * base64: \/ and \uXXXX, as some programs write '+'. */
+static int unescape(data_text *text, char c)
+{
+    if (text->escape == 0 && c != '\\')
+        return (unsigned char)c;
+    if (text->escape++ == 0) {
+        text->code = 0;
+        return NOT_YET;
+    }
+    if (text->escape == 2 && c == 'u')
+        return NOT_YET;
+    const int digit = text->escape > 2 ? hex_digit(c) : -1;
+    text->code = text->code << 4 | (uint32_t)(digit < 0 ? 0 : digit);
+    if (digit >= 0 && text->escape < 6)
+        return NOT_YET;
+    const bool is_slash = text->escape == 2 && c == '/';
+    text->escape = 0;
+    return is_slash ? '/' : digit >= 0 && text->code < 0x80 ? (int)text->code : NO_LETTER;
+}
+
+/* '=' ends the data. */
 static strl_status decode_base64(data_text *text, const char *chars, size_t count, strl_error *err)
 {
-    for (size_t i = 0; i < count && chars[i] != '='; i++, text->at++) {
-        int digit = base64_digit((unsigned char)chars[i]);
-        if (chars[i] == '\\')
+    for (size_t i = 0; i < count; i++, text->at++) {
+        const int letter = unescape(text, chars[i]);
+        if (letter == NOT_YET)
             continue;
+        text->has_ended = letter == '=';
+        if (text->has_ended)
+            break;
+        const int digit = base64_digit((unsigned char)letter);
         if (digit < 0)
             return text_fail(text, "base64", err);
         text->bits = text->bits << 6 | (unsigned)digit;
@@ -208,6 +247,9 @@ static strl_status pass_header(data_text *text, strl_error *err)
     if (status)
         return status;
     header[size] = 0;
+    /* The splitter's notation may be forged by an escape in its first letters. */
+    if (strncmp(header, "data:", 5) != 0)
+        return text_fail(text, "a data URI that begins with 'data:'", err);
     char *comma = strchr(header, ',');
     if (!comma)
         return text_fail(text, "a data URI with a comma", err);
@@ -223,14 +265,12 @@ static strl_status decode_text(data_text *text, strl_error *err)
     char chars[TEXT_BYTES];
     strl__gltf_buffer *buffer = text->buffer;
     strl_status status = pass_header(text, err);
-    while (!status && text->at < text->end) {
+    while (!status && text->at < text->end && !text->has_ended) {
         const uint64_t begin = text->at, left = text->end - begin;
         size_t size = left < sizeof chars ? (size_t)left : sizeof chars;
         status = strl_file_read(text->file, begin, chars, size, err);
         if (!status)
             status = decode_base64(text, chars, size, err);
-        if (text->at != begin + size)
-            break; /* at '=' */
     }
     if (!status)
         status = flush_decoded(text, err);
@@ -275,8 +315,10 @@ static strl_status open_text(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32
 {
     data_text text = {.gltf = gltf, .buffer = buffer, .index = index, .file = gltf->reader->input.file};
     uint64_t bytes;
-    if (sscanf(buffer->uri, "data:@%" SCNu64 "+%" SCNu64, &text.at, &bytes) != 2)
-        return strl__fail(err, STRL_ERR_INTERNAL, "%s, %s[%u]: '%.80s' is no place in it",
+    if (sscanf(buffer->uri, "data:@%" SCNu64 "+%" SCNu64, &text.at, &bytes) != 2 ||
+        text.at > gltf->reader->input.file_bytes || bytes > gltf->reader->input.file_bytes - text.at)
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "%s, %s[%u]: expected a data URI without escapes in its first letters, found '%.80s'",
                           gltf->reader->path, list_of(buffer), index, buffer->uri);
     text.end = text.at + bytes;
     if (buffer->is_loose)
@@ -305,6 +347,8 @@ strl_status strl__gltf_open_buffer(strl__gltf *gltf, uint32_t index, strl_error 
     else
         status = open_file(gltf, buffer, index, err);
     buffer->is_open = !status;
+    if (status) /* it may be tried again, for each image that is in it */
+        strl__gltf_close_buffer(gltf, buffer);
     return status;
 }
 
@@ -312,8 +356,11 @@ strl_status strl__gltf_open_loose(strl__gltf *gltf, strl__gltf_buffer *buffer, u
                                   strl_error *err)
 {
     buffer->is_loose = true;
-    return strncmp(buffer->uri, "data:", 5) == 0 ? open_text(gltf, buffer, image, err)
-                                                 : open_file(gltf, buffer, image, err);
+    strl_status status = strncmp(buffer->uri, "data:", 5) == 0 ? open_text(gltf, buffer, image, err)
+                                                               : open_file(gltf, buffer, image, err);
+    if (status)
+        strl__gltf_close_buffer(gltf, buffer);
+    return status;
 }
 
 void strl__gltf_close_buffer(strl__gltf *gltf, strl__gltf_buffer *buffer)
@@ -322,6 +369,10 @@ void strl__gltf_close_buffer(strl__gltf *gltf, strl__gltf_buffer *buffer)
         strl_file_close(buffer->file, NULL); /* read from, or scratch */
     strl__free(buffer->memory);
     gltf->text_bytes -= buffer->memory_bytes;
+    buffer->file = NULL;
+    buffer->memory = NULL;
+    buffer->memory_bytes = 0;
+    buffer->owns_file = buffer->is_beside = buffer->is_open = false;
 }
 
 strl_status strl__gltf_check_unchanged(const strl__gltf *gltf, strl_error *err)
@@ -334,6 +385,23 @@ strl_status strl__gltf_check_unchanged(const strl__gltf *gltf, strl_error *err)
     return status;
 }
 
+void strl__gltf_rest_buffers(strl__gltf *gltf)
+{
+    for (size_t i = 0; i < gltf->buffer_count; i++) {
+        strl__gltf_buffer *buffer = &gltf->buffers[i];
+        uint64_t at;
+        if (!buffer->memory)
+            continue;
+        const bool is_stored = strl__gltf_store(gltf, buffer->memory, (size_t)buffer->memory_bytes, &at);
+        strl__gltf_close_buffer(gltf, buffer);
+        if (is_stored) {
+            buffer->file = gltf->stored;
+            buffer->file_offset = at;
+            buffer->is_open = true;
+        }
+    }
+}
+
 void strl__gltf_close_buffers(strl__gltf *gltf)
 {
     for (size_t i = 0; i < gltf->buffer_count; i++)
@@ -344,6 +412,9 @@ strl_status strl__gltf_read_buffer(strl__gltf *gltf, uint32_t index, uint64_t of
                                    size_t size, strl_error *err)
 {
     const strl__gltf_buffer *buffer = &gltf->buffers[index];
+    strl_status status = strl__gltf_open_buffer(gltf, index, err); /* it may have been given back */
+    if (status)
+        return status;
     if (!buffer->memory)
         return strl_file_read(buffer->file, buffer->file_offset + offset, data, size, err);
     memcpy(data, buffer->memory + offset, size);

@@ -1,6 +1,7 @@
 /* What the drawn nodes use, checked once before anything is read: so that the number of triangles
  * is known and a broken file is refused at once. */
 #include <inttypes.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "base/fail.h"
@@ -39,14 +40,26 @@ static const expectation expected_rotation = {"ROTATION", 4, 4,
                                               "four floats, signed bytes or shorts"};
 static const expectation expected_scale = {"SCALE", 3, 3, TYPE(STRL__F32), "three floats"};
 
+strl_status strl__gltf_fail_index(const strl__gltf *gltf, const char *where, const char *list, size_t count,
+                                  uint32_t found, strl_error *err)
+{
+    const char *path = gltf->reader->path;
+    if (count == 0)
+        return strl__fail(err, STRL_ERR_FORMAT, "%s%s: expected no index of %s, of which there are none, found %u", path,
+                          where, list, found);
+    return strl__fail(err, STRL_ERR_FORMAT, "%s%s: expected an index of %s from 0 to %zu, found %u", path, where, list,
+                      count - 1, found);
+}
+
 /* The kind of an accessor, not its bytes. */
 static strl_status check_kind(const strl__gltf *gltf, uint32_t index, const expectation *expected,
                               strl_error *err)
 {
     const char *path = gltf->reader->path;
+    char where[32];
+    snprintf(where, sizeof where, ", %s", expected->name);
     if (index >= gltf->accessor_count)
-        return strl__fail(err, STRL_ERR_FORMAT, "%s, %s: expected one of %zu accessors, found %u",
-                          path, expected->name, gltf->accessor_count, index);
+        return strl__gltf_fail_index(gltf, where, "accessors", gltf->accessor_count, index, err);
     const strl__gltf_column *column = &gltf->accessors[index].values;
     if ((column->components == expected->components ||
          column->components == expected->more_components) &&
@@ -75,7 +88,7 @@ static strl_status count_fail(const strl__gltf *gltf, const strl__gltf_primitive
                       expected->name, gltf->accessors[index].count);
 }
 
-/* NORMAL and COLOR_0 follow POSITION. Their integers are always normalized, said or not. */
+/* NORMAL and COLOR_0 follow POSITION. */
 static strl_status check_companion(strl__gltf *gltf, const strl__gltf_primitive *primitive,
                                    uint32_t index, const expectation *expected, bool is_compressed,
                                    strl_error *err)
@@ -85,11 +98,7 @@ static strl_status check_companion(strl__gltf *gltf, const strl__gltf_primitive 
     strl_status status = check_use(gltf, index, expected, is_compressed, err);
     if (status)
         return status;
-    strl__gltf_accessor *accessor = &gltf->accessors[index];
-    accessor->values.normalized = accessor->values.type != STRL__F32;
-    if (accessor->sparse)
-        accessor->sparse->values.normalized = accessor->values.normalized;
-    if (accessor->count >= gltf->accessors[primitive->position].count)
+    if (gltf->accessors[index].count >= gltf->accessors[primitive->position].count)
         return STRL_OK;
     return count_fail(gltf, primitive, index, expected, err);
 }
@@ -153,8 +162,7 @@ static strl_status check_primitive(strl__gltf *gltf, strl__gltf_mesh *mesh,
 {
     strl_status status = STRL_OK;
     if (primitive->material != STRL__NO_ITEM && primitive->material >= gltf->material_count)
-        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected one of %zu materials, found %u",
-                          gltf->reader->path, gltf->material_count, primitive->material);
+        return strl__gltf_fail_index(gltf, ", material", "materials", gltf->material_count, primitive->material, err);
     if (primitive->position == STRL__NO_ITEM) /* nothing to draw, says the specification */
         return STRL_OK;
     if (primitive->mode >= 4)
@@ -171,16 +179,16 @@ static strl_status check_primitive(strl__gltf *gltf, strl__gltf_mesh *mesh,
     return STRL_OK;
 }
 
-/* "PATH, accessors[3]: .." becomes "PATH, meshes[0], accessors[3]: ..". */
-static strl_status name_mesh(const strl__gltf *gltf, uint32_t index, strl_status status,
-                             strl_error *err)
+/* "PATH, accessors[3]: .." becomes "PATH, meshes[0].primitives[1], accessors[3]: ..". */
+static strl_status name_primitive(const strl__gltf *gltf, uint32_t mesh, uint32_t primitive, strl_status status,
+                                  strl_error *err)
 {
     const char *path = gltf->reader->path;
     const size_t length = strlen(path);
     if (!err || strncmp(err->message, path, length) != 0)
-        return strl__fail_context(err, status, "%s, meshes[%u]", path, index);
+        return strl__fail_context(err, status, "%s, meshes[%u].primitives[%u]", path, mesh, primitive);
     strl_error inner = *err;
-    return strl__fail(err, status, "%s, meshes[%u]%s", path, index, inner.message + length);
+    return strl__fail(err, status, "%s, meshes[%u].primitives[%u]%s", path, mesh, primitive, inner.message + length);
 }
 
 static strl_status check_mesh(strl__gltf *gltf, uint32_t index, strl_error *err)
@@ -189,11 +197,12 @@ static strl_status check_mesh(strl__gltf *gltf, uint32_t index, strl_error *err)
     strl_status status = STRL_OK;
     if (mesh->is_checked)
         return STRL_OK;
-    for (uint32_t i = 0; i < mesh->primitive_count && !status; i++)
-        status = check_primitive(gltf, mesh, &gltf->primitives[mesh->first_primitive + i], err);
+    uint32_t checked = 0;
+    for (; checked < mesh->primitive_count && !status; checked++)
+        status = check_primitive(gltf, mesh, &gltf->primitives[mesh->first_primitive + checked], err);
     mesh->is_checked = true;
     gltf->vertices += mesh->vertices;
-    return status ? name_mesh(gltf, index, status, err) : STRL_OK;
+    return status ? name_primitive(gltf, index, checked - 1, status, err) : STRL_OK;
 }
 
 static strl_status check_instances(strl__gltf *gltf, strl__gltf_instances *instances,
@@ -209,13 +218,12 @@ static strl_status check_instances(strl__gltf *gltf, strl__gltf_instances *insta
         strl_status status = check_use(gltf, accessors[i], expected[i], false, err);
         if (status)
             return status;
-        strl__gltf_accessor *accessor = &gltf->accessors[accessors[i]];
+        const strl__gltf_accessor *accessor = &gltf->accessors[accessors[i]];
         if (has_count && accessor->count != instances->count)
             return strl__fail(err, STRL_ERR_FORMAT,
                               "%s, accessors[%u]: expected %" PRIu64 " instances, found %" PRIu64,
                               gltf->reader->path, accessors[i], instances->count, accessor->count);
         instances->count = accessor->count;
-        accessor->values.normalized = accessor->values.type != STRL__F32;
         has_count = true;
     }
     return STRL_OK;
@@ -229,6 +237,19 @@ static void add_product(uint64_t *sum, uint64_t a, uint64_t b)
         *sum = UINT64_MAX;
 }
 
+static void count_image_changes(strl__gltf *gltf, const strl__gltf_mesh *mesh)
+{
+    for (uint32_t i = 0; i < mesh->primitive_count; i++) {
+        const strl__gltf_primitive *primitive = &gltf->primitives[mesh->first_primitive + i];
+        if (primitive->mode < 4 || primitive->position == STRL__NO_ITEM || strl__gltf_texcoord(gltf, primitive) == STRL__NO_ITEM)
+            continue;
+        const uint32_t texture = gltf->materials[primitive->material].texture;
+        const uint32_t picture = gltf->reader->textures.items[texture].picture;
+        gltf->image_changes += picture != gltf->last_picture;
+        gltf->last_picture = picture;
+    }
+}
+
 strl_status strl__gltf_check_scene(strl__gltf *gltf, strl_error *err)
 {
     strl_status status = STRL_OK;
@@ -239,6 +260,8 @@ strl_status strl__gltf_check_scene(strl__gltf *gltf, strl_error *err)
         status = check_mesh(gltf, node->mesh, err);
         if (!status && node->instances)
             status = check_instances(gltf, node->instances, err);
+        if (!status)
+            count_image_changes(gltf, &gltf->meshes[node->mesh]);
         add_product(&gltf->triangles, gltf->meshes[node->mesh].triangles,
                     strl__gltf_instance_count(node));
         add_product(&gltf->meshes[node->mesh].uses, 1, strl__gltf_instance_count(node));

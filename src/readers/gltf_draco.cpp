@@ -97,14 +97,46 @@ uint64_t add_product(uint64_t sum, uint64_t a, uint64_t b)
     return sum;
 }
 
-/* Stops where the attributes, which are known before their values are decoded, take too much. */
+/* libdraco makes an object of each descriptor, of five bytes, before anything of them can be counted. Real meshes have four or
+ * five. */
+constexpr uint64_t most_attributes = 256;
+
+/* How many attributes the bytes announce behind the faces, up to more than are read (its specification, "ParseAttributeDecodersData"). */
+uint64_t count_attributes(start in, bool is_edgebreaker)
+{
+    const uint64_t decoders = in.bytes(1);
+    uint64_t count = 0;
+    if (is_edgebreaker)
+        in.skip(3 * decoders);
+    for (uint64_t i = 0; i < decoders && !in.failed && count <= most_attributes; i++) {
+        const uint64_t attributes = in.varint();
+        count = in.failed ? count : add_product(count, attributes, 1);
+        for (uint64_t k = 0; k < attributes && !in.failed && count <= most_attributes; k++) {
+            in.skip(4); /* kind, type, components, whether normalized */
+            in.varint();
+        }
+        in.skip(attributes); /* how each is coded */
+    }
+    return count;
+}
+
+/* Stops where the attributes, which are known before their values are decoded, are too many or take too much. */
 template <class Decoder> class bounded : public Decoder
 {
   public:
-    explicit bounded(uint64_t most) : most_(most) {}
+    bounded(uint64_t most, bool is_edgebreaker) : most_(most), is_edgebreaker_(is_edgebreaker) {}
     uint64_t wanted = 0; /* bytes of attributes */
+    bool has_too_many = false;
 
   protected:
+    bool DecodePointAttributes() override
+    {
+        const uint8_t *at = reinterpret_cast<const uint8_t *>(this->buffer()->data_head());
+        const start in{at, at + this->buffer()->remaining_size()};
+        has_too_many = count_attributes(in, is_edgebreaker_) > most_attributes;
+        return !has_too_many && Decoder::DecodePointAttributes();
+    }
+
     bool DecodeAllAttributes() override
     {
         const draco::PointCloud *cloud = this->point_cloud();
@@ -119,21 +151,27 @@ template <class Decoder> class bounded : public Decoder
 
   private:
     uint64_t most_;
+    bool is_edgebreaker_;
 };
 
 template <class Decoder>
-std::unique_ptr<draco::Mesh> decode_bounded(const uint8_t *data, size_t size, strl__draco_room *room, char why[120])
+std::unique_ptr<draco::Mesh> decode_bounded(const uint8_t *data, size_t size, const strl__draco_facts *facts,
+                                            strl__draco_room *room, char why[120])
 {
     draco::DecoderBuffer buffer;
     draco::DecoderOptions options;
-    bounded<Decoder> decoder(room->bytes);
+    bounded<Decoder> decoder(room->bytes, facts->is_edgebreaker);
     std::unique_ptr<draco::Mesh> mesh(new draco::Mesh);
     buffer.Init(reinterpret_cast<const char *>(data), size);
     const draco::Status status = decoder.Decode(options, &buffer, mesh.get());
     room->wanted = decoder.wanted;
     if (status.ok())
         return mesh;
-    std::snprintf(why, 120, "%s", status.error_msg());
+    if (decoder.has_too_many)
+        std::snprintf(why, 120, "it has more than the %u attributes that are read",
+                      static_cast<unsigned>(most_attributes));
+    else
+        std::snprintf(why, 120, "%s", status.error_msg());
     return nullptr;
 }
 
@@ -177,8 +215,8 @@ strl__draco *strl__draco_decode(const uint8_t *data, size_t size, const strl__dr
     std::snprintf(why, 120, "no memory");
     try {
         std::unique_ptr<strl__draco> mesh(new strl__draco);
-        mesh->mesh = facts->is_edgebreaker ? decode_bounded<draco::MeshEdgebreakerDecoder>(data, size, room, why)
-                                           : decode_bounded<draco::MeshSequentialDecoder>(data, size, room, why);
+        mesh->mesh = facts->is_edgebreaker ? decode_bounded<draco::MeshEdgebreakerDecoder>(data, size, facts, room, why)
+                                           : decode_bounded<draco::MeshSequentialDecoder>(data, size, facts, room, why);
         return mesh->mesh ? mesh.release() : nullptr;
     } catch (const std::exception &) {
         return nullptr;

@@ -9,6 +9,7 @@
 
 #define DEPTH_UNKNOWN UINT32_MAX
 #define OWN_NAME_BYTES_MAX 500u
+#define NUMBER_BYTES_MAX 48u /* " (material 4294967295, 4294967295)" */
 
 /* ---- linking */
 
@@ -17,10 +18,11 @@ static strl_status link_children(strl__gltf *gltf, uint32_t parent, strl_error *
     const strl__gltf_node *node = &gltf->nodes[parent];
     for (uint32_t i = 0; i < node->child_count; i++) {
         uint32_t child = gltf->children[node->first_child + i];
-        if (child >= gltf->node_count)
-            return strl__fail(err, STRL_ERR_FORMAT,
-                              "%s, nodes[%u].children: expected one of %zu nodes, found %u",
-                              gltf->reader->path, parent, gltf->node_count, child);
+        if (child >= gltf->node_count) {
+            char where[40];
+            snprintf(where, sizeof where, ", nodes[%u].children", parent);
+            return strl__gltf_fail_index(gltf, where, "nodes", gltf->node_count, child, err);
+        }
         if (gltf->nodes[child].parent != STRL__NO_ITEM)
             return strl__fail(err, STRL_ERR_FORMAT,
                               "%s: nodes %u and %u both have node %u as a child: expected one "
@@ -85,15 +87,15 @@ static strl_status check_roots(strl__gltf *gltf, strl_error *err)
     if (gltf->scene == STRL__NO_ITEM)
         gltf->scene = 0;
     if (gltf->scene >= gltf->scene_count)
-        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected one of %zu scenes, found %u",
-                          gltf->reader->path, gltf->scene_count, gltf->scene);
+        return strl__gltf_fail_index(gltf, ", scene", "scenes", gltf->scene_count, gltf->scene, err);
     const strl__gltf_scene *scene = &gltf->scenes[gltf->scene];
     for (uint32_t i = 0; i < scene->root_count; i++) {
         uint32_t root = gltf->roots[scene->first_root + i];
-        if (root >= gltf->node_count)
-            return strl__fail(err, STRL_ERR_FORMAT,
-                              "%s, scenes[%u].nodes: expected one of %zu nodes, found %u",
-                              gltf->reader->path, gltf->scene, gltf->node_count, root);
+        if (root >= gltf->node_count) {
+            char where[40];
+            snprintf(where, sizeof where, ", scenes[%u].nodes", gltf->scene);
+            return strl__gltf_fail_index(gltf, where, "nodes", gltf->node_count, root, err);
+        }
         if (gltf->nodes[root].parent != STRL__NO_ITEM || gltf->nodes[root].is_drawn_root)
             return strl__fail(err, STRL_ERR_FORMAT,
                               "%s, scenes[%u].nodes: expected roots, each once, found node %u, "
@@ -112,12 +114,12 @@ strl_status strl__gltf_link(strl__gltf *gltf, strl_error *err)
     uint32_t deepest = 0;
     for (uint32_t i = 0; i < gltf->node_count && !status; i++) {
         gltf->nodes[i].depth = DEPTH_UNKNOWN;
-        if (gltf->nodes[i].mesh != STRL__NO_ITEM && gltf->nodes[i].mesh >= gltf->mesh_count)
-            status = strl__fail(err, STRL_ERR_FORMAT,
-                                "%s, nodes[%u].mesh: expected one of %zu meshes, found %u",
-                                gltf->reader->path, i, gltf->mesh_count, gltf->nodes[i].mesh);
-        else
-            status = link_children(gltf, i, err);
+        if (gltf->nodes[i].mesh != STRL__NO_ITEM && gltf->nodes[i].mesh >= gltf->mesh_count) {
+            char where[40];
+            snprintf(where, sizeof where, ", nodes[%u].mesh", i);
+            return strl__gltf_fail_index(gltf, where, "meshes", gltf->mesh_count, gltf->nodes[i].mesh, err);
+        }
+        status = link_children(gltf, i, err);
     }
     for (uint32_t i = 0; i < gltf->node_count && !status; i++)
         status = find_depth(gltf, i, &deepest, err);
@@ -256,6 +258,17 @@ static const char *own_name(const strl__gltf *gltf, uint32_t index, char number[
     return number;
 }
 
+/* Its length up to `most` bytes, without half a character of UTF-8 at its end. */
+static size_t cut_length(const char *name, size_t most)
+{
+    size_t length = strnlen(name, most + 1);
+    if (length <= most)
+        return length;
+    for (length = most; length > most - 3 && ((unsigned char)name[length] & 0xc0) == 0x80;)
+        length--;
+    return length;
+}
+
 /* From the root, joined with slashes; what is too long loses its beginning. Returns where in text
  * it starts. */
 static char *path_of(const strl__gltf *gltf, uint32_t node, char *text, size_t size)
@@ -266,7 +279,7 @@ static char *path_of(const strl__gltf *gltf, uint32_t node, char *text, size_t s
         char number[24];
         const char *name = own_name(gltf, at, number);
         size_t room = (size_t)(start - text), slash = at != node;
-        size_t length = strnlen(name, OWN_NAME_BYTES_MAX);
+        size_t length = cut_length(name, OWN_NAME_BYTES_MAX);
         if (length + slash + 4 > room) {
             start -= 4;
             memcpy(start, ".../", 4);
@@ -286,10 +299,13 @@ static strl_status add_name(strl__gltf *gltf, strl__names *names, const char *na
                             const char *what, uint32_t number, uint32_t *index, strl_error *err)
 {
     char text[STRL__NAME_BYTES_MAX + 1];
-    int length = snprintf(text, sizeof text, "%.*s", (int)sizeof text - 32, name);
-    if (strl__names_find(names, text, (size_t)length) != UINT32_MAX)
-        length += snprintf(text + length, 32, " (%s %u)", what, number);
-    strl_status status = strl__names_add(names, text, (size_t)length, index, err);
+    const size_t own = cut_length(name, sizeof text - 1 - NUMBER_BYTES_MAX);
+    size_t length = own;
+    memcpy(text, name, own);
+    for (size_t again = 1; again <= names->count && strl__names_find(names, text, length) != UINT32_MAX; again++)
+        length = own + (size_t)(again == 1 ? snprintf(text + own, NUMBER_BYTES_MAX, " (%s %u)", what, number)
+                                           : snprintf(text + own, NUMBER_BYTES_MAX, " (%s %u, %zu)", what, number, again));
+    strl_status status = strl__names_add(names, text, length, index, err);
     return status ? strl__fail_context(err, status, "%s, %s %u", gltf->reader->path, what, number)
                   : STRL_OK;
 }

@@ -57,7 +57,7 @@ strl_status strl__gltf_parse_material(strl__gltf *gltf, strl__fields *fields, co
     if (fields->status)
         return fields->status;
     if (name && !(material.name = strl__gltf_keep(gltf, strlen(name) + 1, fields->err)))
-        return STRL_ERR_MEMORY;
+        return gltf->is_counting ? STRL_ERR_LIMIT : STRL_ERR_MEMORY;
     if (name)
         strcpy(material.name, name);
     strl_status status = strl__gltf_add(gltf, &gltf->materials, &gltf->material_count,

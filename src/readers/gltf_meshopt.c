@@ -12,6 +12,18 @@
 #include "base/fail.h"
 #include "readers/gltf.h"
 
+static uint64_t add(uint64_t a, uint64_t b)
+{
+    uint64_t sum;
+    return __builtin_add_overflow(a, b, &sum) ? UINT64_MAX : sum;
+}
+
+/* With so many bytes more. */
+static uint64_t held_with(const strl__gltf *gltf, uint64_t bytes)
+{
+    return add(bytes, gltf->decoded_bytes + gltf->draco_bytes);
+}
+
 static uint64_t limit_of(const strl__gltf *gltf)
 {
     const uint64_t half = gltf->reader->memory_bytes / 2;
@@ -23,7 +35,7 @@ static uint64_t limit_of(const strl__gltf *gltf)
 /* Once images have made room for so many bytes. One that a placement shows stays. */
 static uint64_t limit_for(strl__gltf *gltf, uint64_t bytes)
 {
-    if (bytes + gltf->decoded_bytes + gltf->draco_bytes > limit_of(gltf)) {
+    if (held_with(gltf, bytes) > limit_of(gltf)) {
         if (gltf->paint.image)
             strl__textures_shed(&gltf->reader->textures);
         else
@@ -72,17 +84,16 @@ strl_status strl__gltf_make_room(strl__gltf *gltf, uint64_t bytes, const char *w
 {
     strl__gltf_decoded *oldest;
     const uint64_t limit = limit_for(gltf, bytes);
-    while (bytes + gltf->decoded_bytes + gltf->draco_bytes > limit &&
-           (oldest = find_oldest(gltf)) != NULL)
+    while (held_with(gltf, bytes) > limit && (oldest = find_oldest(gltf)) != NULL)
         drop(gltf, oldest);
-    if (bytes <= limit && bytes + gltf->draco_bytes <= limit)
+    if (add(bytes, gltf->draco_bytes) <= limit)
         return STRL_OK;
     char advice[STRL__ADVICE_BYTES];
     const uint64_t half = gltf->reader->memory_bytes / 2;
     const strl__image *image = gltf->paint.image;
-    const uint64_t others = gltf->table_bytes + gltf->arena.total_bytes + bytes;
+    const uint64_t others = add(bytes, gltf->table_bytes + gltf->arena.total_bytes);
     /* A halved image is larger where there is more memory: half of the half, which is its most. */
-    const uint64_t needed = others + (image && image->halvings ? others : gltf->reader->textures.held_bytes);
+    const uint64_t needed = add(others, image && image->halvings ? others : gltf->reader->textures.held_bytes);
     strl__reader_advise(gltf->reader, needed, half, advice);
     return strl__fail(err, STRL_ERR_LIMIT,
                       "%s: %s takes %" PRIu64 " bytes decompressed, the memory budget allows %" PRIu64 ": %s",
@@ -115,9 +126,8 @@ strl_status strl__gltf_check_meshopt(strl__gltf *gltf, uint32_t index, strl_erro
                           "do not fit its mode, filter and length",
                           path, index, meshopt->count, meshopt->stride);
     if (meshopt->buffer >= gltf->buffer_count)
-        return strl__fail(err, STRL_ERR_FORMAT,
-                          "%s, bufferViews[%u]: expected one of %zu buffers, found %u", path, index,
-                          gltf->buffer_count, meshopt->buffer);
+        return strl__gltf_fail_index(gltf, ", a compressed bufferView", "buffers", gltf->buffer_count, meshopt->buffer,
+                                     err);
     if (__builtin_add_overflow(meshopt->offset, meshopt->bytes, &end) ||
         end > gltf->buffers[meshopt->buffer].bytes)
         return strl__fail(err, STRL_ERR_FORMAT,
@@ -173,23 +183,34 @@ static strl_status decompress(strl__gltf *gltf, uint32_t index, uint8_t *bytes, 
     return status;
 }
 
+bool strl__gltf_store(strl__gltf *gltf, const void *bytes, size_t size, uint64_t *at)
+{
+    const char *folder = gltf->reader->scratch_dir;
+    *at = gltf->stored_bytes;
+    if (!folder || (!gltf->stored && strl_file_create_nameless(folder, &gltf->stored, NULL)) ||
+        strl_file_write(gltf->stored, *at, bytes, size, NULL))
+        return false;
+    gltf->stored_bytes += size;
+    return true;
+}
+
 /* Makes room for another view. Without scratch, or a place in it, this one is decompressed again. */
-static strl_status store_away(strl__gltf *gltf, strl__gltf_decoded *decoded, strl_error *err)
+static void store_away(strl__gltf *gltf, strl__gltf_decoded *decoded)
 {
     strl__gltf_view *view = &gltf->views[decoded->view];
-    const char *folder = gltf->reader->scratch_dir;
-    strl_status status = STRL_OK;
-    if (folder && !view->is_stored) {
-        if (!gltf->stored)
-            status = strl_file_create_nameless(folder, &gltf->stored, err);
-        if (!status)
-            status = strl_file_write(gltf->stored, gltf->stored_bytes, decoded->bytes, (size_t)decoded->size, err);
-        view->is_stored = !status;
-        view->stored_at = gltf->stored_bytes;
-        gltf->stored_bytes += status ? 0 : decoded->size;
-    }
+    if (!view->is_stored)
+        view->is_stored = strl__gltf_store(gltf, decoded->bytes, (size_t)decoded->size, &view->stored_at);
     drop(gltf, decoded);
-    return status;
+}
+
+void strl__gltf_rest_decoded(strl__gltf *gltf)
+{
+    for (unsigned i = 0; i < STRL__GLTF_DECODED_MAX; i++)
+        if (gltf->decoded[i].bytes)
+            store_away(gltf, &gltf->decoded[i]);
+    strl__draco_close(gltf->draco);
+    gltf->draco = NULL;
+    gltf->draco_bytes = 0;
 }
 
 static strl_status add_decoded(strl__gltf *gltf, uint32_t index, strl__gltf_decoded **added,
@@ -197,22 +218,17 @@ static strl_status add_decoded(strl__gltf *gltf, uint32_t index, strl__gltf_deco
 {
     const strl__gltf_meshopt *meshopt = gltf->views[index].meshopt;
     const uint64_t size = meshopt->count * meshopt->stride, limit = limit_for(gltf, size + meshopt->bytes);
-    strl_status status = STRL_OK;
     strl__gltf_decoded *place = NULL, *oldest;
-    while (!status && size + meshopt->bytes + gltf->decoded_bytes + gltf->draco_bytes > limit &&
-           (oldest = find_oldest(gltf)) != NULL)
-        status = store_away(gltf, oldest, err);
-    if (!status)
-        status = strl__gltf_make_room(gltf, size + meshopt->bytes, "a compressed buffer view", err);
+    while (held_with(gltf, size + meshopt->bytes) > limit && (oldest = find_oldest(gltf)) != NULL)
+        store_away(gltf, oldest);
+    strl_status status = strl__gltf_make_room(gltf, size + meshopt->bytes, "a compressed buffer view", err);
     for (unsigned i = 0; i < STRL__GLTF_DECODED_MAX && !place; i++)
         place = gltf->decoded[i].bytes ? NULL : &gltf->decoded[i];
     if (status)
         return status;
     if (!place) {
         place = find_oldest(gltf);
-        status = store_away(gltf, place, err);
-        if (status)
-            return status;
+        store_away(gltf, place);
     }
     uint8_t *bytes = strl__alloc((size_t)size, 1);
     status =

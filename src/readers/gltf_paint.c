@@ -25,7 +25,8 @@ static strl_status read_places(strl__gltf *gltf, uint64_t first, size_t count, d
     const strl__gltf_paint *paint = &gltf->paint;
     const strl__texture *texture = &gltf->reader->textures.items[paint->texture];
     strl_status status =
-        strl__gltf_read_attribute(gltf, paint->texcoord, paint->draco_id, first, count, err);
+        strl__gltf_read_attribute(gltf, paint->texcoord, gltf->accessors[paint->texcoord].values.normalized,
+                                  paint->draco_id, first, count, err);
     for (size_t i = 0; i < count && !status; i++)
         strl__texture_place(texture, gltf->values + 2 * i, places[i]);
     return status;

@@ -18,7 +18,7 @@ static void *keep(strl__gltf *gltf, strl__fields *fields, size_t bytes)
 {
     void *block = fields->status ? NULL : strl__gltf_keep(gltf, bytes, fields->err);
     if (!block && !fields->status)
-        fields->status = STRL_ERR_MEMORY;
+        fields->status = gltf->is_counting ? STRL_ERR_LIMIT : STRL_ERR_MEMORY;
     return block;
 }
 
@@ -178,7 +178,6 @@ static strl__gltf_sparse *parse_sparse(strl__gltf *gltf, strl__fields *fields, c
     sparse->values = parse_column(fields, values);
     sparse->values.components = elements->components;
     sparse->values.type = elements->type;
-    sparse->values.normalized = elements->normalized;
     return sparse;
 }
 
@@ -412,8 +411,9 @@ static strl_status parse_required(strl__gltf *gltf, strl__fields *fields, const 
         strl__fields_fail(fields, "", "the name of an extension");
     else if (!is_known_extension(name))
         return strl__fail(fields->err, STRL_ERR_UNSUPPORTED,
-                          "%s requires the extension %.80s, which is not one that is read",
-                          fields->path, name);
+                          "%s requires the extension %.80s, which is not one that is read: %s", fields->path, name,
+                          strstr(name, "meshopt") ? "pack it by gltfpack with -c or -cc, not -cz"
+                                                  : "export the model without it");
     return fields->status;
 }
 

@@ -49,26 +49,39 @@ static int by_mesh(const void *left, const void *right)
     return a->mesh < b->mesh ? -1 : a->mesh > b->mesh;
 }
 
+/* Into a list of at most `most`, the largest savings first. */
+static void insert(candidate *list, size_t *count, size_t most, candidate added)
+{
+    if (*count == most && by_savings(&list[most - 1], &added) < 0)
+        return;
+    size_t at = *count < most ? (*count)++ : most - 1;
+    for (; at > 0 && by_savings(&added, &list[at - 1]) < 0; at--)
+        list[at] = list[at - 1];
+    list[at] = added;
+}
+
 /* The largest savings, in the order of the file. */
 static strl_status choose(strl__gltf *gltf, size_t count, strl_error *err)
 {
     strl_reader *reader = gltf->reader;
-    candidate *candidates = strl__alloc(count, sizeof *candidates);
-    size_t found = 0, kept = count < reader->most_pieces ? count : reader->most_pieces;
+    const size_t kept = count < reader->most_pieces ? count : reader->most_pieces;
+    size_t found = 0;
+    candidate *candidates = strl__alloc(kept, sizeof *candidates);
     gltf->pieces = strl__alloc(kept, sizeof *gltf->pieces);
     if (!candidates || !gltf->pieces) {
         strl__free(candidates);
-        return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for %zu pieces", reader->path, count);
+        return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for %zu pieces", reader->path, kept);
     }
     for (size_t i = 0; i < gltf->mesh_count; i++)
         if (is_candidate(&gltf->meshes[i]))
-            candidates[found++] = (candidate){product(gltf->meshes[i].triangles, gltf->meshes[i].uses - 1), (uint32_t)i};
-    qsort(candidates, count, sizeof *candidates, by_savings);
+            insert(candidates, &found, kept,
+                   (candidate){product(gltf->meshes[i].triangles, gltf->meshes[i].uses - 1), (uint32_t)i});
     qsort(candidates, kept, sizeof *candidates, by_mesh);
     for (size_t i = 0; i < kept; i++) {
         gltf->pieces[i] = candidates[i].mesh;
         gltf->meshes[candidates[i].mesh].piece = (uint32_t)i + 1;
     }
+    gltf->table_bytes += kept * sizeof *gltf->pieces;
     reader->piece_count = (uint32_t)kept;
     strl__free(candidates);
     return STRL_OK;
@@ -163,11 +176,11 @@ static strl_status read_window(strl__gltf *gltf, const strl__gltf_instances *of,
         memcpy(window->scale[i], (double[3]){1, 1, 1}, sizeof *window->scale);
     }
     if (of->translation != STRL__NO_ITEM)
-        status = strl__gltf_read_numbers(gltf, of->translation, first, count, window->translation[0], err);
+        status = strl__gltf_read_numbers(gltf, of->translation, false, first, count, window->translation[0], err);
     if (!status && of->rotation != STRL__NO_ITEM)
-        status = strl__gltf_read_numbers(gltf, of->rotation, first, count, window->rotation[0], err);
+        status = strl__gltf_read_numbers(gltf, of->rotation, true, first, count, window->rotation[0], err);
     if (!status && of->scale != STRL__NO_ITEM)
-        status = strl__gltf_read_numbers(gltf, of->scale, first, count, window->scale[0], err);
+        status = strl__gltf_read_numbers(gltf, of->scale, false, first, count, window->scale[0], err);
     if (status)
         return status;
     window->of = of;

@@ -64,12 +64,18 @@ static strl_status decode_announced(strl__gltf *gltf, const strl__gltf_primitive
         room.bytes = strl__gltf_room(gltf) - facts->connectivity_bytes;
         gltf->draco = strl__draco_decode(packed, size, facts, &room, why);
     }
-    if (room.wanted > room.bytes)
-        return strl__gltf_make_room(gltf, facts->connectivity_bytes + room.wanted, "a Draco mesh", err);
+    uint64_t wanted;
+    if (__builtin_add_overflow(facts->connectivity_bytes, room.wanted, &wanted))
+        wanted = UINT64_MAX;
+    if (room.wanted > room.bytes) {
+        strl_status status = strl__gltf_make_room(gltf, wanted, "a Draco mesh", err);
+        if (status)
+            return status;
+    }
     if (!gltf->draco)
         return strl__fail(err, STRL_ERR_FORMAT, "%s, bufferViews[%u]: its Draco mesh is damaged: %s",
                           gltf->reader->path, primitive->draco->view, why);
-    gltf->draco_bytes = facts->connectivity_bytes + room.wanted;
+    gltf->draco_bytes = wanted;
     return STRL_OK;
 }
 
@@ -120,17 +126,17 @@ static strl_status open_draco(strl__gltf *gltf, const strl__gltf_primitive *prim
 
 /* ---- vertices */
 
-strl_status strl__gltf_read_attribute(strl__gltf *gltf, uint32_t index, uint32_t draco_id,
+strl_status strl__gltf_read_attribute(strl__gltf *gltf, uint32_t index, bool normalized, uint32_t draco_id,
                                       uint64_t first, size_t count, strl_error *err)
 {
     const strl__gltf_column *column = &gltf->accessors[index].values;
     if (!gltf->draco || draco_id == STRL__NO_ITEM)
-        return strl__gltf_read_numbers(gltf, index, first, count, gltf->values, err);
+        return strl__gltf_read_numbers(gltf, index, normalized, first, count, gltf->values, err);
     if (strl__draco_numbers(gltf->draco, draco_id, first, count, column->components, gltf->values))
         return strl__fail(err, STRL_ERR_FORMAT,
                           "%s: the Draco attribute %u has no numbers for accessors[%u]",
                           gltf->reader->path, draco_id, index);
-    for (size_t i = 0; column->normalized && i < count * column->components; i++)
+    for (size_t i = 0; normalized && i < count * column->components; i++)
         gltf->values[i] = strl__gltf_denormalize(column->type, gltf->values[i]);
     return STRL_OK;
 }
@@ -187,7 +193,7 @@ static strl_status read_tints(strl__gltf *gltf, const strl__gltf_primitive *prim
         return STRL_OK;
     const unsigned components = gltf->accessors[primitive->colour].values.components;
     strl_status status =
-        strl__gltf_read_attribute(gltf, primitive->colour, draco_id, first, count, err);
+        strl__gltf_read_attribute(gltf, primitive->colour, true, draco_id, first, count, err);
     for (size_t i = 0; i < count * components && !status; i++)
         gltf->tints[4 * (i / components) + i % components] = gltf->values[i];
     return status;
@@ -203,7 +209,8 @@ static strl_status read_corners(strl__gltf *gltf, const strl__gltf_primitive *pr
         {STRL__NO_ITEM, STRL__NO_ITEM, STRL__NO_ITEM, STRL__NO_ITEM}};
     const strl__gltf_draco_use *draco = primitive->draco ? primitive->draco : &none;
     strl_status status =
-        strl__gltf_read_attribute(gltf, primitive->position, draco->position, first, count, err);
+        strl__gltf_read_attribute(gltf, primitive->position, gltf->accessors[primitive->position].values.normalized,
+                                  draco->position, first, count, err);
     if (status)
         return status;
     for (size_t i = 0; i < count; i++) {
@@ -214,7 +221,7 @@ static strl_status read_corners(strl__gltf *gltf, const strl__gltf_primitive *pr
     place_positions(gltf, corners, count);
     if (primitive->normal != STRL__NO_ITEM) {
         status =
-            strl__gltf_read_attribute(gltf, primitive->normal, draco->normal, first, count, err);
+            strl__gltf_read_attribute(gltf, primitive->normal, true, draco->normal, first, count, err);
         if (!status)
             place_normals(gltf, corners, count);
     }
@@ -226,7 +233,7 @@ static strl_status read_corners(strl__gltf *gltf, const strl__gltf_primitive *pr
         return status;
     if (!status && primitive->colour != STRL__NO_ITEM) {
         status =
-            strl__gltf_read_attribute(gltf, primitive->colour, draco->colour, first, count, err);
+            strl__gltf_read_attribute(gltf, primitive->colour, true, draco->colour, first, count, err);
         if (!status)
             place_colours(gltf, primitive->material,
                           gltf->accessors[primitive->colour].values.components, corners, count);

@@ -60,7 +60,7 @@ strl_status strl__image_begin(strl__image_making *making, uint64_t width, uint64
                               uint64_t working_bytes, strl_error *err)
 {
     strl__image *image = making->image;
-    const uint64_t limit = making->room->limit_bytes;
+    const uint64_t limit = making->room->limit_bytes, share = making->room->image_bytes;
     uint64_t texels, sums_bytes = 0;
     unsigned halvings = 0;
     if (width == 0 || height == 0 || width > STRL__IMAGE_SIDE_MAX ||
@@ -70,7 +70,8 @@ strl_status strl__image_begin(strl__image_making *making, uint64_t width, uint64
                           "most %" PRIu64 " in all",
                           width, height, STRL__IMAGE_SIDE_MAX, STRL__IMAGE_TEXELS_MAX);
     *image = (strl__image){.width = (uint32_t)width, .height = (uint32_t)height};
-    for (texels = plan_levels(image, 0); 4 * texels + sums_bytes + working_bytes > limit;) {
+    for (texels = plan_levels(image, 0);
+         4 * texels + sums_bytes + working_bytes > limit || (share && 4 * texels > share);) {
         texels = plan_levels(image, ++halvings);
         sums_bytes = 4 * sizeof *making->sums * (uint64_t)image->level[0].width;
         if (image->level_count == 1)
@@ -80,8 +81,9 @@ strl_status strl__image_begin(strl__image_making *making, uint64_t width, uint64
     if (needed > limit)
         return strl__fail(err, STRL_ERR_LIMIT,
                           "takes %" PRIu64 " bytes while it is decoded, of which the memory budget "
-                          "allows %" PRIu64 ": more --memory may help",
-                          needed, limit);
+                          "allows %" PRIu64 "%s%s",
+                          needed, limit, making->room->advice ? ": " : "",
+                          making->room->advice ? making->room->advice : "");
     if (making->room->make)
         making->room->make(making->room->context, needed);
     image->bytes = 4 * texels;

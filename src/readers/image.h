@@ -39,6 +39,8 @@ typedef struct strl__image {
 /* Memory for a decoder and its image together. */
 typedef struct strl__image_room {
     uint64_t limit_bytes;
+    uint64_t image_bytes; /* of them for the image alone, which is halved until it fits; 0 = all */
+    const char *advice; /* static: how to get more; NULL: none */
     void *context;
     /* Called once, before they are taken; bytes <= limit. May be NULL. */
     void (*make)(void *context, uint64_t bytes);

@@ -39,7 +39,7 @@ static strl_status expected(strl_reader *reader, const char *what, strl_error *e
 static strl_status tell_error(strl_reader *reader, strl_cursor payload, strl_error *err)
 {
     strl__import *state = reader->state;
-    char text[STRL_IMPORT_TEXT_MOST + 1];
+    char *text = state->told;
     state->error_told = true;
     uint32_t reason = strl_cursor_u32(&payload);
     size_t length = strl_cursor_left(&payload);

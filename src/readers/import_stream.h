@@ -32,6 +32,7 @@ typedef struct strl__import {
         plain; /* indices of the current part, and of the material of blocks without one */
     bool part_known, plain_known;
     bool error_told;    /* the stream ends in the importer's own words */
+    char told[STRL_IMPORT_TEXT_MOST + 1]; /* which are these */
     uint64_t record_at; /* where the record being read begins */
     uint64_t triangles; /* of this pass so far */
     uint64_t checksum;  /* of this pass so far */

@@ -32,6 +32,7 @@ typedef struct strl__format {
     uint64_t (*bytes_done)(const strl_reader *reader); /* NULL: where the input stands */
     strl_status (*check_unchanged)(const strl_reader *reader,
                                    strl_error *err); /* files beside this one; may be NULL */
+    void (*rest)(strl_reader *reader);    /* gives back what reading takes; may be NULL */
     void (*close)(strl_reader *reader);   /* what the state owns; may be NULL */
     /* Of formats with pieces; may be NULL. start goes to the first face of reader->piece. */
     void (*piece_get)(const strl_reader *reader, uint32_t piece, strl_reader_piece *facts);
@@ -97,6 +98,7 @@ struct strl_reader {
     bool prepared; /* tables and batch are there */
     bool started;  /* the input stands at a face */
     bool ended;    /* the format has no more faces */
+    bool rests;    /* until rewind: nothing is held, and nothing is read */
     bool failed;   /* this pass ended with `failure` */
     strl_error failure;
 };
@@ -111,6 +113,9 @@ strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__forma
  * `limit` bytes now: by --memory, where the reader knows of what it is a share. */
 void strl__reader_advise(const strl_reader *reader, uint64_t needed, uint64_t limit,
                          char advice[STRL__ADVICE_BYTES]);
+
+/* Where nobody knows how much would do; static. */
+const char *strl__reader_advise_more(const strl_reader *reader);
 
 /* Fails where an open file is not as it was. */
 strl_status strl__reader_check_unchanged(strl_file *file, const strl_file_info *opened,

@@ -10,9 +10,9 @@
 
 #define NAME_OVERHEAD_BYTES 32u /* about what the heap adds to a block */
 
-void strl__names_init(strl__names *names, size_t limit_bytes)
+void strl__names_init(strl__names *names, size_t limit_bytes, const char *advice)
 {
-    *names = (strl__names){.limit_bytes = limit_bytes};
+    *names = (strl__names){.limit_bytes = limit_bytes, .advice = advice};
 }
 
 void strl__names_deinit(strl__names *names)
@@ -122,9 +122,8 @@ strl_status strl__names_add(strl__names *names, const char *text, size_t length,
                   3 * names->slot_count * sizeof *names->slots;
     if (held > names->limit_bytes || names->count >= UINT32_MAX - 1)
         return strl__fail(err, STRL_ERR_LIMIT,
-                          "expected at most %zu bytes of names, found more than %zu names: more --memory "
-                          "may help",
-                          names->limit_bytes, names->count);
+                          "expected at most %zu bytes of names, found more than %zu names: %s", names->limit_bytes,
+                          names->count, names->advice);
     if (!strl__grow(&names->items, &names->capacity, names->count + 1, sizeof *names->items) ||
         !grow_slots(names))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu names", names->count + 1);

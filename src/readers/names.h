@@ -25,9 +25,11 @@ typedef struct strl__names {
     size_t slot_count;
     size_t text_bytes;
     size_t limit_bytes;
+    const char *advice;
 } strl__names;
 
-void strl__names_init(strl__names *names, size_t limit_bytes);
+/* advice: where they are too many, "more memory may help"; static. */
+void strl__names_init(strl__names *names, size_t limit_bytes, const char *advice);
 void strl__names_deinit(strl__names *names);
 /* The index of a name, which is added (white) where it is new. Bytes that are not UTF-8 are taken
  * as Latin-1. */

@@ -88,7 +88,7 @@ static bool obj_recognises(const strl__input *input, uint64_t file_bytes)
 static strl_status obj_open(strl_reader *reader, strl_error *err)
 {
     (void)err;
-    strl__textures_init(&reader->textures, reader->memory_bytes / 8);
+    strl__textures_init(&reader->textures, reader->memory_bytes / 8, strl__reader_advise_more(reader));
     reader->textures.open = strl__obj_open_picture;
     reader->textures.context = reader;
     reader->triangles_hint = reader->opened.bytes / 60 + 1;
@@ -339,10 +339,10 @@ static strl_status obj_prepare(strl_reader *reader, strl_error *err)
 {
     strl__obj *obj = reader->state;
     strl__names_deinit(&reader->missing);
-    strl__names_init(&reader->missing, (size_t)(reader->memory_bytes / 64));
+    strl__names_init(&reader->missing, (size_t)(reader->memory_bytes / 64), strl__reader_advise_more(reader));
     if (obj->has_library)
         strl__names_deinit(&obj->library);
-    strl__names_init(&obj->library, (size_t)(reader->memory_bytes / 32));
+    strl__names_init(&obj->library, (size_t)(reader->memory_bytes / 32), strl__reader_advise_more(reader));
     obj->has_library = true;
     obj->has_colour = false;
     obj->others = 0;

@@ -54,6 +54,9 @@ static strl_status recognise(strl_reader *reader, strl_error *err)
     strl_status status = strl__input_status(&reader->input, err);
     if (status)
         return status;
+    if (strl__stranger_is_pointer(reader->input.at, (size_t)(reader->input.end - reader->input.at)))
+        return strl__fail(err, STRL_ERR_UNSUPPORTED, "%s: expected a mesh, found a Git LFS pointer: " STRL__POINTER_ADVICE,
+                          reader->path);
     const bool foreign = strl__assimp_extension(reader->path) != NULL;
     for (size_t i = 0; i < sizeof formats / sizeof *formats && !reader->format; i++)
         if (!(foreign && formats[i]->weak) &&
@@ -145,8 +148,8 @@ strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__forma
     reader->memory_bytes = memory_bytes;
     reader->whole_bytes = desc->whole_bytes;
     uint64_t names_bytes = desc->names_bytes ? desc->names_bytes : memory_bytes / 8;
-    strl__names_init(&reader->parts, (size_t)names_bytes);
-    strl__names_init(&reader->materials, (size_t)(names_bytes / 2));
+    strl__names_init(&reader->parts, (size_t)names_bytes, strl__reader_advise_more(reader));
+    strl__names_init(&reader->materials, (size_t)(names_bytes / 2), strl__reader_advise_more(reader));
     reader->child = desc->child;
     reader->most_pieces = desc->most_pieces;
     strl_status status = open_file(reader, desc, err);
@@ -276,8 +279,8 @@ static void note_texcoords(strl_reader *reader, const strl_triangle *triangles, 
 static strl_status next_triangles(strl_reader *reader, strl_triangle *triangles, size_t capacity,
                                   size_t *count, strl_error *err)
 {
-    strl_status status = make_ready(reader, err);
-    while (!status && *count < capacity) {
+    strl_status status = reader->rests ? STRL_OK : make_ready(reader, err);
+    while (!status && !reader->rests && *count < capacity) {
         size_t added = 0;
         status = strl__batch_emit(&reader->batch, triangles + *count, capacity - *count, &added,
                                   &reader->drops, err);
@@ -318,6 +321,11 @@ void strl__reader_advise(const strl_reader *reader, uint64_t needed, uint64_t li
              ceil(megabytes));
 }
 
+const char *strl__reader_advise_more(const strl_reader *reader)
+{
+    return reader->whole_bytes ? "more --memory may help" : "more memory may help";
+}
+
 strl_status strl__reader_check_unchanged(strl_file *file, const strl_file_info *opened,
                                          strl_error *err)
 {
@@ -341,7 +349,7 @@ strl_status strl_reader_rewind(strl_reader *reader, strl_error *err)
         status = reader->format->check_unchanged(reader, err);
     if (status)
         return status;
-    reader->started = reader->ended = reader->failed = false;
+    reader->started = reader->ended = reader->failed = reader->rests = false;
     reader->drops = (strl_reader_drops){0};
     strl__batch_reset(&reader->batch);
     return STRL_OK;
@@ -391,8 +399,10 @@ void strl_reader_rest(strl_reader *reader)
     release_tables(reader);
     strl__textures_rest(&reader->textures);
     strl__input_rest(&reader->input);
+    if (reader->format->rest)
+        reader->format->rest(reader);
     reader->prepared = reader->started = false;
-    reader->ended = true;
+    reader->ended = reader->rests = true;
 }
 
 void strl_reader_drops_get(const strl_reader *reader, strl_reader_drops *drops)
@@ -431,8 +441,8 @@ strl_status strl__reader_note_beside(strl_reader *reader, const char *path, cons
     if (reader->beside_bytes > reader->memory_bytes / 64)
         return strl__fail(err, STRL_ERR_LIMIT,
                           "%s: the names of the files that it names take more than the %" PRIu64
-                          " bytes that the memory budget allows: more --memory may help",
-                          reader->path, reader->memory_bytes / 64);
+                          " bytes that the memory budget allows: %s",
+                          reader->path, reader->memory_bytes / 64, strl__reader_advise_more(reader));
     strl_status status = info ? STRL_OK : strl_path_stat(path, &made.info, err);
     if (status)
         return status;

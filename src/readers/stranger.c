@@ -52,6 +52,12 @@ static const stranger signs[] = {
     {SIGN("%PDF"), "a PDF document: name a model"},
 };
 
+bool strl__stranger_is_pointer(const void *start, size_t bytes)
+{
+    static const char sign[] = "version https://git-lfs.github.com/spec/";
+    return bytes >= sizeof sign - 1 && memcmp(start, sign, sizeof sign - 1) == 0;
+}
+
 const char *strl__stranger_describe(const strl__input *input, const char *path)
 {
     for (size_t i = 0; i < sizeof endings / sizeof *endings; i++)

@@ -9,10 +9,10 @@
 
 #define REFERENCE_BYTES_MAX 1000u /* longer ones are cut */
 
-void strl__textures_init(strl__textures *textures, uint64_t limit_bytes)
+void strl__textures_init(strl__textures *textures, uint64_t limit_bytes, const char *advice)
 {
-    *textures = (strl__textures){.limit_bytes = limit_bytes, .is_ready = true};
-    strl__names_init(&textures->keys, (size_t)(limit_bytes / 16));
+    *textures = (strl__textures){.limit_bytes = limit_bytes, .advice = advice, .is_ready = true};
+    strl__names_init(&textures->keys, (size_t)(limit_bytes / 16), advice);
     strl__srgb_init(&textures->srgb);
 }
 
@@ -59,9 +59,8 @@ strl_status strl__textures_add(strl__textures *textures, const strl__texture *te
     if (textures->count >= STRL__NO_TEXTURE ||
         textures->count * sizeof *texture > textures->limit_bytes / 16)
         return strl__fail(err, STRL_ERR_LIMIT,
-                          "%zu textures are more than the memory budget allows: more --memory may "
-                          "help",
-                          textures->count);
+                          "%zu textures are more than the memory budget allows: %s", textures->count,
+                          textures->advice);
     if (!strl__grow(&textures->items, &textures->capacity, textures->count + 1, sizeof *texture))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu textures", textures->count + 1);
     textures->items[textures->count] = *texture;
@@ -126,7 +125,7 @@ static strl_status decode_as(strl__textures *textures, strl__picture *picture, c
 {
     strl__picture_place place = {.close = NULL};
     const strl__image_room room = {
-        .limit_bytes = textures->limit_bytes, .context = textures, .make = make_room};
+        .limit_bytes = textures->limit_bytes, .image_bytes = textures->image_bytes, .advice = textures->advice, .context = textures, .make = make_room};
     strl_status status = textures->open(textures->context, picture, ending, &place, err);
     if (!status)
         status = strl__image_decode(&place.source, &room, &textures->srgb, &picture->image, err);
@@ -152,12 +151,15 @@ static strl_status decode(strl__textures *textures, strl__picture *picture, strl
     return status;
 }
 
+/* Named once, where the reason does not name it. */
 static void note_unusable(strl__textures *textures, strl__picture *picture, const strl_error *why)
 {
+    const char *name = !*picture->reference                       ? "a texture"
+                       : strstr(why->message, picture->reference) ? "an image"
+                                                                  : picture->reference;
     picture->is_unusable = true;
     if (textures->unusable_count++ == 0)
-        strl__fail(&textures->first_unusable, why->status, "%.400s %s",
-                   *picture->reference ? picture->reference : "a texture", why->message);
+        strl__fail(&textures->first_unusable, why->status, "%.400s %s", name, why->message);
 }
 
 strl_status strl__textures_get(strl__textures *textures, uint32_t texture,

@@ -42,6 +42,8 @@ typedef struct strl__textures {
     strl__picture *pictures; /* owned */
     size_t picture_capacity;
     uint64_t limit_bytes, held_bytes, clock;
+    uint64_t image_bytes; /* of one image at most; 0 = limit_bytes */
+    const char *advice;
     strl__srgb srgb;
     bool is_ready;
     /* ending: NULL, or what the file's name is to end in instead of its own. `err` says why not in
@@ -53,8 +55,8 @@ typedef struct strl__textures {
     strl_error first_unusable; /* its message */
 } strl__textures;
 
-/* open and context may be set later. */
-void strl__textures_init(strl__textures *textures, uint64_t limit_bytes);
+/* open and context may be set later. advice: as of names. */
+void strl__textures_init(strl__textures *textures, uint64_t limit_bytes, const char *advice);
 void strl__textures_deinit(strl__textures *textures); /* zeroed is legal */
 /* The picture of a key, which is added where it is new. */
 strl_status strl__textures_add_picture(strl__textures *textures, const char *key,

@@ -147,8 +147,10 @@ int main(int argc, char **argv)
     strl_status status = strl_reader_open(&desc, &reader, &err);
     if (!status)
         status = read_pass(reader, &first, &err);
-    if (!status)
+    if (!status) {
+        strl_reader_rest(reader);
         status = strl_reader_rewind(reader, &err);
+    }
     if (!status)
         status = read_pass(reader, &second, &err);
     json_t *result = status ? json_pack("{s:s}", "error", err.message) : describe(reader, &first);

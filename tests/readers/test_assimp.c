@@ -19,6 +19,7 @@
 
 static char importer[PATH_MAX]; /* the script, or "" for the real one */
 static strl_reader_child child; /* what the tests ask for */
+static uint64_t whole_bytes;    /* as if by --memory */
 
 static void write_script(const char *lines)
 {
@@ -41,7 +42,7 @@ static strl_status open_foreign(const char *name, strl_reader **reader, strl_err
     make_scratch(scratch, sizeof scratch);
     child.importer = importer[0] ? importer : NULL;
     strl_reader_desc desc = {
-        .path = test_path(name), .scratch_dir = scratch, .memory_bytes = MEMORY_LEAST, .child = child};
+        .path = test_path(name), .scratch_dir = scratch, .memory_bytes = MEMORY_LEAST, .whole_bytes = whole_bytes, .child = child};
     return strl_reader_open(&desc, reader, err);
 }
 
@@ -121,8 +122,13 @@ static void death_is_one_sentence(void **state)
     assert_import_fails("cat stream; kill -SEGV $$", STRL_ERR_FORMAT, "was ended by signal 11");
     assert_import_fails("exit 3", STRL_ERR_FORMAT, "the program that imports it ended with status 3");
     assert_import_fails("cat stream; echo 'it has died' >&2; exit 9", STRL_ERR_FORMAT, "with status 9: it has died");
+    assert_import_fails("kill -KILL $$", STRL_ERR_MEMORY, "was ended by signal 9 (Killed): the machine's memory may have run out");
+    assert_import_fails("echo terminate after throwing std::bad_alloc >&2; kill -ABRT $$", STRL_ERR_MEMORY,
+                        "may be broken: convert it to PLY");
+    whole_bytes = 1u << 30;
     assert_import_fails("echo terminate after throwing std::bad_alloc >&2; kill -ABRT $$", STRL_ERR_MEMORY,
                         "give more by --memory");
+    whole_bytes = 0;
 }
 
 static void hanging_is_one_sentence(void **state)
@@ -130,8 +136,9 @@ static void hanging_is_one_sentence(void **state)
     (void)state;
     uint64_t start = strl_clock_ns();
     child.cpu_seconds = 1;
-    assert_import_fails("exec sleep 1000", STRL_ERR_LIMIT, "takes more than 4 s and was stopped");
-    assert_import_fails("head -c 30 stream; exec >&-; exec sleep 1000", STRL_ERR_LIMIT, "takes more than");
+    assert_import_fails("exec sleep 1000", STRL_ERR_LIMIT, "takes more than 4 s, its limit, and was stopped");
+    assert_import_fails("head -c 30 stream; exec >&-; exec sleep 1000", STRL_ERR_LIMIT,
+                        "has closed its output but did not end within 10 s, and was stopped");
     assert_import_fails("sleep 1000 & kill -9 $$", STRL_ERR_LIMIT, "takes more than"); /* the pipe stays open */
     /* Of processor time, unless others have so much of it that the clock comes first; test_process has that limit alone. */
     assert_import_fails("while :; do :; done", STRL_ERR_LIMIT, "and was stopped");
@@ -171,6 +178,41 @@ static void an_error_is_told(void **state)
     child.memory_bytes = 333u << 20;
     assert_import_fails("cat stream; exit 2", STRL_ERR_MEMORY, "more than 333M of memory");
     child = (strl_reader_child){0};
+}
+
+/* A path so long that a sentence has no room for what comes behind it. */
+static void an_error_of_a_file_far_below_is_told(void **state)
+{
+    (void)state;
+    char path[PATH_MAX], scratch[128];
+    strl_reader *reader;
+    strl_error err = {0};
+    import_writer stream = {0};
+    strl_writer_bytes(&stream.bytes, STRL_IMPORT_MAGIC, 8);
+    import_write_error(&stream, STRL_IMPORT_MEMORY, "no memory");
+    write_test_file("stream", stream.bytes.data, stream.bytes.size);
+    import_writer_deinit(&stream);
+    write_script("cat stream; exit 2");
+    make_scratch(scratch, sizeof scratch);
+    size_t used = (size_t)snprintf(path, sizeof path, "%s", test_folder), top = used;
+    for (unsigned i = 0; i < 4; i++) {
+        used += (size_t)snprintf(path + used, sizeof path - used, "/%0150u", i);
+        assert_int_equal(strl_path_make_directory(path, NULL), STRL_OK);
+    }
+    snprintf(path + used, sizeof path - used, "/model.fbx");
+    FILE *file = fopen(path, "w");
+    fputs("nothing that matters", file);
+    fclose(file);
+    const strl_reader_desc desc = {
+        .path = path, .scratch_dir = scratch, .memory_bytes = MEMORY_LEAST, .child = {.importer = importer}};
+    assert_int_equal(strl_reader_open(&desc, &reader, &err), STRL_ERR_MEMORY);
+    assert_int_equal(strncmp(err.message, path, sizeof err.message - 1), 0);
+    assert_int_equal(remove(path), 0);
+    for (; used > top; used -= 151) {
+        path[used] = 0;
+        assert_int_equal(rmdir(path), 0);
+    }
+    assert_nothing_left();
 }
 
 static bool stop_at_once(void *context)
@@ -549,7 +591,9 @@ static void too_little_memory_is_told(void **state)
     }
     assert_int_equal(fclose(file), 0);
     child.memory_bytes = 28u << 20;
+    whole_bytes = 64u << 20;
     assert_int_equal(open_foreign("grid.off", &reader, &err), STRL_ERR_MEMORY);
+    whole_bytes = 0;
     assert_non_null(strstr(err.message, "grid.off: importing it by assimp takes more than 28M of memory"));
     assert_non_null(strstr(err.message, "give more by --memory"));
     /* Less than the importer itself takes. */
@@ -576,6 +620,7 @@ int main(void)
         cmocka_unit_test(hanging_is_one_sentence),
         cmocka_unit_test(a_lying_stream_is_one_sentence),
         cmocka_unit_test(an_error_is_told),
+        cmocka_unit_test(an_error_of_a_file_far_below_is_told),
         cmocka_unit_test(cancelling_stops_it),
         cmocka_unit_test(a_missing_program_is_told),
         cmocka_unit_test(nobody_else_reads_our_formats),

@@ -219,6 +219,12 @@ def buffers_lie_beside_the_model_or_in_its_text(folder):
     text = open(f"{folder}/text.gltf", "rb").read().replace(b"/", b"\\/")
     w.save(f"{folder}/escaped.gltf", text)
     expect(f"{folder}/escaped.gltf", wanted)
+    text = open(f"{folder}/text.gltf", "rb").read()
+    head, data = text[:text.index(b"base64,")], text[text.index(b"base64,"):]
+    assert b"+" in data and b"/" in data and b"=" in data
+    for plus, slash, end in ((rb"\u002B", rb"\/", rb"\u003D"), (rb"\u002b", rb"\u002F", rb"\u003d")):
+        w.save(f"{folder}/escaped.gltf", head + data.replace(b"+", plus).replace(b"/", slash).replace(b"=", end))
+        expect(f"{folder}/escaped.gltf", wanted)
 
 
 def a_large_buffer_in_the_text_goes_to_scratch(folder):
@@ -313,6 +319,32 @@ def parts_are_nodes_by_their_path(folder):
     model.glb(f"{folder}/parts.glb")
     expect(f"{folder}/parts.glb", w.triangles(QUAD[:3]) * 4,
            parts=["car/node 4/wheel", "car/node 4/bolt", "car/node 4/node 2", "car/node 4/wheel (node 3)"])
+
+
+def parts_whose_names_are_taken_with_a_number_too_are_their_own(folder):
+    model = w.Model()
+    mesh = model.mesh({"attributes": {"POSITION": model.accessor(QUAD[:3], w.FLOAT)}})
+    names = ["Box", "Box (node 3)", "Box (node 3, 2)", "Box", "é" * 800, "é" * 800]
+    model.scene(*[model.node(mesh=mesh, name=name) for name in names])
+    model.glb(f"{folder}/taken.glb")
+    result = expect(f"{folder}/taken.glb", w.triangles(QUAD[:3]) * 6)
+    assert result["parts"][:4] == names[:3] + ["Box (node 3, 3)"], result["parts"]
+    long, longer = result["parts"][4:]
+    assert set(long) == {"é"} and longer == long + " (node 5)", result["parts"][4:]
+
+
+def an_accessor_may_have_two_uses(folder):
+    """Integers of normals are always normalized, those of positions where the accessor says so: whatever comes first."""
+    rows = [(0, 0, 0), (100, 3, 0), (120, 90, 7), (1, 2, 3)]
+    for order in (1, -1):
+        model = w.Model()
+        shared, other = model.accessor(rows, w.I16, stride=8), model.accessor(QUAD, w.FLOAT)
+        index = model.accessor(QUAD_INDICES, w.U8)
+        primitives = [{"attributes": {"POSITION": shared}, "indices": index},
+                      {"attributes": {"POSITION": other, "NORMAL": shared}, "indices": index}]
+        model.scene(model.node(mesh=model.mesh(*primitives[::order])))
+        model.glb(f"{folder}/uses.glb")
+        expect(f"{folder}/uses.glb", [t for points in (rows, QUAD)[::order] for t in w.triangles(points, QUAD_INDICES)])
 
 
 def twenty_thousand_parts_fit(folder):
@@ -567,7 +599,8 @@ run_tests([indices_of_all_types_and_none_give_the_same_quad, strips_and_fans_tur
            a_large_buffer_in_the_text_goes_to_scratch, vertices_that_do_not_fit_are_spilled,
            vertex_colours_are_linear_and_become_srgb, materials_become_srgb_and_keep_alpha_by_their_mode,
            alpha_of_vertices_follows_the_material, the_default_scene_is_drawn_or_else_the_first_or_all_roots,
-           parts_are_nodes_by_their_path, twenty_thousand_parts_fit, instances_are_expanded,
+           parts_are_nodes_by_their_path, parts_whose_names_are_taken_with_a_number_too_are_their_own,
+           an_accessor_may_have_two_uses, twenty_thousand_parts_fit, instances_are_expanded,
            unknown_chunks_extras_and_padding_are_passed_over, names_that_are_not_utf8_are_read,
            meshopt_views_are_decompressed,
            meshopt_views_that_do_not_fit_together_take_turns, meshopt_filters_are_undone, draco_meshes_are_decompressed,

@@ -2,6 +2,7 @@
 #include "reader_test.h"
 
 #include "base/cursor.h"
+#include "readers/gltf.h"
 
 #define GRID 24u
 
@@ -156,12 +157,43 @@ static void a_failed_allocation_under_an_image_is_an_error(void **state)
     }
 }
 
+/* Its buffer stands in its text and is decoded to memory. */
+static void a_reader_that_rests_holds_nothing(void **state)
+{
+    (void)state;
+    strl_reader *reader;
+    strl_error err;
+    read_result first, none, again;
+    write_test_text("text.gltf",
+                    "{\"asset\":{\"version\":\"2.0\"},\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],"
+                    "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],"
+                    "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}],"
+                    "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36}],\"buffers\":[{\"byteLength\":36,"
+                    "\"uri\":\"data:;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA\"}]}");
+    assert_int_equal(open_test_file("text.gltf", MEMORY_LEAST, &reader, &err), STRL_OK);
+    const strl__gltf *gltf = strl__gltf_of(reader);
+    read_pass(reader, &first);
+    assert_true(gltf->text_bytes == 36 && reader->prepared);
+    strl_reader_rest(reader);
+    read_pass(reader, &none);
+    assert_true(none.status == STRL_OK && none.count == 0);
+    assert_true(gltf->text_bytes == 0 && !reader->prepared);
+    assert_int_equal(strl_reader_rewind(reader, &err), STRL_OK);
+    read_pass(reader, &again);
+    assert_true(first.count == 1 && again.count == 1 && again.checksum == first.checksum);
+    strl_reader_close(reader);
+    free_result(&first);
+    free_result(&none);
+    free_result(&again);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_second_pass_gives_the_same_triangles),
         cmocka_unit_test(a_buffer_that_changes_is_refused_by_name),
         cmocka_unit_test(a_buffer_that_shrinks_while_it_is_read_is_refused),
+        cmocka_unit_test(a_reader_that_rests_holds_nothing),
         cmocka_unit_test(a_failed_allocation_or_read_is_an_error),
         cmocka_unit_test(a_failed_allocation_under_an_image_is_an_error),
     };

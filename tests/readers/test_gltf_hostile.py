@@ -1,14 +1,17 @@
 #!/usr/bin/env python3
 """Broken and hostile glTF files: each is refused with one sentence that names the place, what was expected and what was
 found."""
+import base64
 import copy
 import json
 import os
 import random
 import re
+import resource
 import struct
 
 import gltf_writer as w
+import image_writer as image
 from gltf_reading import LEAST, pack, read, refuse, run_tests
 
 QUAD = [(0, 0, 0), (1, 0, 0), (1, 1, 0.5), (0, 1, 0.25)]
@@ -77,22 +80,22 @@ def what_does_not_fit_its_buffer_is_refused(folder):
              (("accessors", 0, "count"), 4294967295, "accessors[0]"), (("accessors", 0, "count"), 1 << 40, "count"),
              (("accessors", 0, "byteOffset"), most, "accessors[0]"), (("accessors", 0, "count"), -1, "not negative"),
              (("accessors", 0, "count"), 1.5, "whole number"),
-             (("accessors", 0, "bufferView"), 9, "bufferViews, found 9"),
+             (("accessors", 0, "bufferView"), 9, "bufferViews from 0 to 1, found 9"),
              (("bufferViews", 0, "byteLength"), 1 << 40, "bufferViews[0]"),
              (("bufferViews", 0, "byteOffset"), most, "bufferViews[0]"),
-             (("bufferViews", 0, "buffer"), 3, "buffers, found 3"),
+             (("bufferViews", 0, "buffer"), 3, "buffers from 0 to 0, found 3"),
              (("bufferViews", 0, "byteStride"), 4096, "byteStride"),
              (("bufferViews", 0, "byteStride"), 2048, "2048 apart"),
              (("accessors", 0, "componentType"), 5124, "componentType"), (("accessors", 0, "type"), "VEC5", "type"),
              (("accessors", 0, "type"), "VEC2", "POSITION"), (("accessors", 1, "componentType"), 5126, "indices"),
-             (("meshes", 0, "primitives", 0, "attributes", "POSITION"), 7, "accessors, found 7"),
-             (("meshes", 0, "primitives", 0, "indices"), 7, "accessors, found 7"),
+             (("meshes", 0, "primitives", 0, "attributes", "POSITION"), 7, "primitives[0]", "accessors from 0 to 1, found 7"),
+             (("meshes", 0, "primitives", 0, "indices"), 7, "primitives[0]", "accessors from 0 to 1, found 7"),
              (("meshes", 0, "primitives", 0, "attributes", "NORMAL"), 1, "NORMAL"),
-             (("meshes", 0, "primitives", 0, "material"), 0, "materials, found 0"),
+             (("meshes", 0, "primitives", 0, "material"), 0, "materials, of which there are none, found 0"),
              (("meshes", 0, "primitives", 0, "mode"), 7, "mode")]
-    for path, value, sentence in cases:
+    for path, value, *sentence in cases:
         changed(path, value).glb(f"{folder}/wrong.glb")
-        refuse(f"{folder}/wrong.glb", sentence)
+        refuse(f"{folder}/wrong.glb", *sentence)
 
 
 def indices_beyond_the_vertices_are_refused(folder):
@@ -107,10 +110,10 @@ def bad_graphs_are_refused(folder):
     cases = [([{"children": [1]}, {"children": [0]}], [0], "cycle"), ([{"children": [0]}], [0], "cycle"),
              ([{"children": [2]}, {"children": [2]}, {}], [0, 1], "both have node 2"),
              ([{"children": [1, 1]}, {}], [0], "both have node 1"),
-             ([{"children": [5]}], [0], "one of 1 nodes, found 5"),
+             ([{"children": [5]}], [0], "nodes[0].children: expected an index of nodes from 0 to 0, found 5"),
              ([{}, {}], [0, 0], "there twice"), ([{"children": [1]}, {}], [1], "the child of another"),
              ([{}], [3], "found 3"),
-             ([{"mesh": 4}], [0], "meshes, found 4"), ([{"children": "all"}], [0], "a list"),
+             ([{"mesh": 4}], [0], "nodes[0].mesh: expected an index of meshes from 0 to 0, found 4"), ([{"children": "all"}], [0], "a list"),
              ([{"matrix": [1, 2, 3]}], [0], "16 numbers"), ([{"translation": [1, "x", 3]}], [0], "3 numbers")]
     for nodes, roots, sentence in cases:
         model = quad()
@@ -171,6 +174,15 @@ def buffers_that_are_not_there_are_refused(folder):
     refuse(f"{folder}/beside.gltf", "buffers[0]", "a.bin", "No such file")
     w.save(f"{folder}/a.bin", b"\0" * 20)
     refuse(f"{folder}/beside.gltf", "expected 60 bytes, found 20")
+    pointer = b"version https://git-lfs.github.com/spec/v1\noid sha256:" + b"0" * 64 + b"\nsize 60000\n"
+    w.save(f"{folder}/a.bin", pointer)
+    model.gltf(f"{folder}/longer.gltf", [("b.bin", "b.bin")])
+    text = open(f"{folder}/longer.gltf").read().replace("b.bin", "a.bin").replace('{"byteLength": 60,', '{"byteLength": 6000,')
+    w.save(f"{folder}/longer.gltf", text.encode())
+    refuse(f"{folder}/longer.gltf", "a.bin, which is a Git LFS pointer", "git lfs pull")
+    for ending in ("gltf", "glb", "ply", "stl", "obj", "fbx", "anything"):
+        w.save(f"{folder}/pointer.{ending}", pointer)
+        refuse(f"{folder}/pointer.{ending}", "found a Git LFS pointer", "git lfs pull")
     for uri, sentence in (("http://example.org/a.bin", "a file beside the model"), ("/etc/passwd", "a file beside"),
                           ("file:///etc/passwd", "a file beside"), ("\\\\host\\a.bin", "a file beside"),
                           ("a%00.bin", "a zero"),
@@ -178,15 +190,57 @@ def buffers_that_are_not_there_are_refused(folder):
                           ("data:;base64," + "!" * 100, "expected base64"),
                           ("data:text/plain," + "x" * 100, "in base64"),
                           ("data:;base64" + "x" * 100, "with a comma"),
-                          ("data:;base64,AAAA=" + "A" * 100, "found a data URI of 3")):
+                          ("data:;base64,AAAA=" + "A" * 100, "found a data URI of 3"),
+                          ("data:;base64," + "\\n" * 100, "expected base64"),
+                          ("data:;base64," + "\n" * 100, "expected base64"),
+                          ("data:;base64," + "é" * 100, "expected base64")):
         model.json["buffers"] = [{"byteLength": 60, "uri": uri}]
         w.save(f"{folder}/uri.gltf", json.dumps(model.json).encode())
         refuse(f"{folder}/uri.gltf", sentence)
 
 
+def the_notation_for_data_in_the_text_cannot_be_forged(folder):
+    model = quad()
+    data = base64.b64encode(bytes(model.buffers[0]))
+    for uri in (b"@0+18446744073709551615", b"@18446744073709551000+800", b"@0+100", b"@70+100", b"@5", b"@-1+5",
+                b";base64," + data):
+        model.json["buffers"] = [{"byteLength": 60, "uri": "HERE"}]
+        w.save(f"{folder}/forged.gltf", json.dumps(model.json).encode().replace(b"HERE", b"\\u0064ata:" + uri))
+        refuse(f"{folder}/forged.gltf", "buffers[0]: expected")
+
+
+def images_in_a_buffer_that_is_too_short_leave_nothing_open(folder):
+    count = 300
+    model = w.Model()
+    position = model.accessor(QUAD[:3], w.FLOAT)
+    texcoord = model.accessor([(0, 0), (1, 0), (0, 1)], w.FLOAT)
+    for i in range(count + 1):
+        model.add("images", {"bufferView": len(model.json["bufferViews"]) + i} if i < count else {"uri": "good.png"})
+        model.add("textures", {"source": i})
+        model.add("materials", {"pbrMetallicRoughness": {"baseColorTexture": {"index": i}}})
+    model.scene(model.node(mesh=model.mesh(*[{"attributes": {"POSITION": position, "TEXCOORD_0": texcoord}, "material": i}
+                                             for i in range(count + 1)])))
+    for _ in range(count):
+        model.add("bufferViews", {"buffer": 1, "byteLength": 100})
+    w.save(f"{folder}/good.png", image.png([[(1, 2, 3)]]))
+    w.save(f"{folder}/short.bin", b"\0" * 50)
+    model.json["buffers"] = [{"byteLength": len(model.buffers[0])}, {"byteLength": 1000, "uri": "short.bin"}]
+    w.save(f"{folder}/images.glb", w.glb_bytes(json.dumps(model.json), bytes(model.buffers[0])))
+    before = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (64, before[1]))
+    try:
+        result = read(f"{folder}/images.glb")
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, before)
+    assert (result["count"], result["missing_images"]) == (count + 1, count), result
+    assert "short.bin" in result["missing_image"], result["missing_image"]
+
+
 def extensions_that_must_be_understood_are_refused_by_name(folder):
     changed(("extensionsRequired",), ["KHR_materials_unlit", "VENDOR_shapes"]).glb(f"{folder}/required.glb")
-    refuse(f"{folder}/required.glb", "requires the extension VENDOR_shapes")
+    refuse(f"{folder}/required.glb", "requires the extension VENDOR_shapes", "export the model without it")
+    changed(("extensionsRequired",), ["KHR_meshopt_compression"]).glb(f"{folder}/required.glb")
+    refuse(f"{folder}/required.glb", "requires the extension KHR_meshopt_compression", "by gltfpack with -c or -cc")
     for asset, sentence in (({"version": "1.0"}, "found version 1.0"),
                             ({"version": "2.0", "minVersion": "2.1"}, "version 2.1"),
                             ({}, "version unknown")):
@@ -278,7 +332,9 @@ def draco_attributes_beyond_the_budget_are_refused(folder):
         faces += [at, at + 1, at + 40, at + 1, at + 41, at + 40]
     corner = b"".join(struct.pack("<6f", *points[i], 0, 0, 1) for i in faces)
     for method in ("sequential", "edgebreaker"):
-        for extra, refused in ((0, False), (100, True)):
+        for extra, refused in ((0, False), (100, True), (300, True)):
+            if extra == 300 and method == "edgebreaker":
+                continue  # which the encoder does not survive
             packed, told = pack("draco", method, len(faces) // 3, 0, extra, data=corner)
             model = w.Model()
             model.json["accessors"] = [{"componentType": w.FLOAT, "type": "VEC3", "count": int(told)},
@@ -291,6 +347,9 @@ def draco_attributes_beyond_the_budget_are_refused(folder):
             model.glb(path)
             if not refused:
                 assert read(path)["count"] == len(faces) // 3
+                continue
+            if extra == 300:
+                refuse(path, "more than the 256 attributes that are read", memory=1 << 30)
                 continue
             memory = LEAST
             for _ in range(2):  # the faces may be too much before the attributes are known
@@ -353,7 +412,9 @@ def any_byte_of_a_model_may_be_another(folder):
 run_tests([every_beginning_of_a_glb_is_refused, every_beginning_of_a_text_is_refused, chunks_that_lie_are_refused,
            what_does_not_fit_its_buffer_is_refused, indices_beyond_the_vertices_are_refused, bad_graphs_are_refused,
            transforms_that_overflow_drop_their_triangles, sparse_elements_that_are_not_in_order_are_refused,
-           buffers_that_are_not_there_are_refused, extensions_that_must_be_understood_are_refused_by_name,
+           buffers_that_are_not_there_are_refused,
+           the_notation_for_data_in_the_text_cannot_be_forged, images_in_a_buffer_that_is_too_short_leave_nothing_open,
+           extensions_that_must_be_understood_are_refused_by_name,
            bad_json_is_refused_with_its_place, json_beyond_the_budget_is_refused, compressed_views_that_lie_are_refused,
            draco_meshes_that_lie_are_refused,
            draco_attributes_beyond_the_budget_are_refused, any_byte_of_a_model_may_be_another])
