@@ -3,20 +3,7 @@
 #include <math.h>
 #include <string.h>
 
-void strl_render_world_box(const strl_tree *tree, const double transform[12], const int64_t box_min[3],
-                           const int64_t box_max[3], strl_box *box)
-{
-    for (int row = 0; row < 3; row++) {
-        const double *m = transform + 4 * row;
-        box->min[row] = box->max[row] = m[3];
-        for (int i = 0; i < 3; i++) {
-            double a = m[i] * (tree->origin[i] + tree->step * (double)box_min[i]);
-            double b = m[i] * (tree->origin[i] + tree->step * (double)box_max[i]);
-            box->min[row] += fmin(a, b);
-            box->max[row] += fmax(a, b);
-        }
-    }
-}
+#include "shared/placed.h"
 
 strl_status strl_render_container_facts(strl_container *container, strl_render_model *model, strl_error *err)
 {
@@ -30,8 +17,8 @@ strl_status strl_render_container_facts(strl_container *container, strl_render_m
         if (status != STRL_OK)
             return status;
         const strl_tree *tree = strl_container_tree(container, placement.tree);
-        strl_box box;
-        strl_render_world_box(tree, placement.transform, tree->box_min, tree->box_max, &box);
+        strl_box box =
+            strl_placed_box(tree->origin, tree->step, placement.transform, tree->box_min, tree->box_max);
         for (int i = 0; i < 3; i++) {
             all.min[i] = fmin(all.min[i], box.min[i]);
             all.max[i] = fmax(all.max[i], box.max[i]);

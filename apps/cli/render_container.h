@@ -8,8 +8,5 @@
 
 /* Bounds over all placements, up axis and unit. */
 strl_status strl_render_container_facts(strl_container *container, strl_render_model *model, strl_error *err);
-/* The world box round a lattice box. */
-void strl_render_world_box(const strl_tree *tree, const double transform[12], const int64_t box_min[3],
-                           const int64_t box_max[3], strl_box *box);
 
 #endif

@@ -12,6 +12,7 @@
 #include "platform/thread.h"
 #include "render_container.h"
 #include "render_model.h"
+#include "shared/placed.h"
 
 #define BATCH_NODES 64u
 #define BATCH_BYTES ((size_t)64 << 20) /* of decoded meshes and vertices, beyond which a batch is drawn */
@@ -122,8 +123,8 @@ static strl_status draw_placement(full_draw *draw, uint64_t index, strl_error *e
         status = strl_cli_check_interrupt(err);
         if (status != STRL_OK)
             return status;
-        strl_box box;
-        strl_render_world_box(tree, placement.transform, record.box_min, record.box_max, &box);
+        const strl_box box =
+            strl_placed_box(tree->origin, tree->step, placement.transform, record.box_min, record.box_max);
         if (!strl_view_sees(&draw->view, &box)) {
             draw->stats->nodes_culled++;
             continue;
