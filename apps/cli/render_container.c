@@ -17,8 +17,7 @@ strl_status strl_render_container_facts(strl_container *container, strl_render_m
         if (status != STRL_OK)
             return status;
         const strl_tree *tree = strl_container_tree(container, placement.tree);
-        strl_box box =
-            strl_placed_box(tree->origin, tree->step, placement.transform, tree->box_min, tree->box_max);
+        strl_box box = strl_placed_box(tree->origin, tree->step, placement.transform, tree->box_min, tree->box_max);
         for (int i = 0; i < 3; i++) {
             all.min[i] = fmin(all.min[i], box.min[i]);
             all.max[i] = fmax(all.max[i], box.max[i]);

@@ -25,11 +25,11 @@ struct strl_part_index {
     char *path, *cache;
     uint32_t part_count;
     double (*bounds)[6]; /* [part_count], world; the thread's until done, as all below */
-    uint32_t *slots;     /* [part_count]: of the tree at work: its newest place in parts, if that is of the part and tree */
-    tree_part *parts;    /* of all trees, one tree after the other */
+    uint32_t *slots; /* [part_count]: of the tree at work: its newest place in parts, if that is of the part and tree */
+    tree_part *parts; /* of all trees, one tree after the other */
     size_t capacity, count;
-    size_t *ends; /* [tree_count]: where each tree's parts end */
-    size_t first; /* of the tree at work */
+    size_t *ends;               /* [tree_count]: where each tree's parts end */
+    size_t first;               /* of the tree at work */
     uint64_t steps_done, steps; /* nodes and placements */
     atomic_bool cancelled, done;
     atomic_uint permille;
@@ -206,7 +206,8 @@ static void run(void *context)
 
 /* ---- life */
 
-strl_status strl_part_index_create(const strl_location *location, uint32_t part_count, strl_part_index **out, strl_error *err)
+strl_status strl_part_index_create(const strl_location *location, uint32_t part_count, strl_part_index **out,
+                                   strl_error *err)
 {
     strl_part_index *index = strl__alloc_zero(1, sizeof *index);
     *out = NULL;
