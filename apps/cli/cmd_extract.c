@@ -4,7 +4,6 @@
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/cursor.h"
@@ -36,16 +35,41 @@ typedef struct extraction {
     strl_cli_progress line;
 } extraction;
 
-/* Floats do where they tell neighbouring lattice cells apart, everywhere in the placed model. */
-static bool needs_doubles(strl_container *container)
+/* How far apart two points a unit or more apart along some axis are at least once they are placed, along some axis of the
+ * world: 1 / the greatest sum over a row of the inverse. */
+static double least_gap(const double m[12])
 {
-    const double *bounds = strl_container_get_info(container)->bounds;
+    double sums = 0, determinant = 0;
+    for (int i = 0; i < 3; i++) {
+        double row = 0;
+        for (int j = 0; j < 3; j++) {
+            int a = (j + 1) % 3, b = (j + 2) % 3, c = (i + 1) % 3, d = (i + 2) % 3;
+            double cofactor = m[4 * a + c] * m[4 * b + d] - m[4 * a + d] * m[4 * b + c]; /* of row j, column i */
+            row += fabs(cofactor);
+            determinant += i == 0 ? m[4 * j] * cofactor : 0;
+        }
+        sums = fmax(sums, row);
+    }
+    return sums > 0 ? fabs(determinant) / sums : 0;
+}
+
+/* Floats do where they tell neighbouring lattice cells apart, everywhere in the placed model. */
+static strl_status choose_width(extraction *self, strl_error *err)
+{
+    const strl_container_info *info = strl_container_get_info(self->container);
     double reach = 0, step = INFINITY;
     for (int i = 0; i < 6; i++)
-        reach = fmax(reach, fabs(bounds[i]));
-    for (uint32_t tree = 0; tree < strl_container_get_info(container)->tree_count; tree++)
-        step = fmin(step, strl_container_tree(container, tree)->step);
-    return reach > step * 0x1p23;
+        reach = fmax(reach, fabs(info->bounds[i]));
+    for (uint64_t p = 0; p < info->placement_count; p++) {
+        strl_placement placement;
+        strl_status status = strl_container_placement(self->container, p, &placement, err);
+        if (status != STRL_OK)
+            return status;
+        double gap = least_gap(placement.transform);
+        step = fmin(step, gap * strl_container_tree(self->container, placement.tree)->step);
+    }
+    self->wide = reach > step * 0x1p23;
+    return STRL_OK;
 }
 
 /* Written twice: with placeholders to reserve the room, then with the counts; a comment pads it to the same length. */
@@ -240,11 +264,12 @@ static strl_status finish(extraction *self, strl_error *err)
 static strl_status extract(extraction *self, strl_error *err)
 {
     const strl_container_info *info = strl_container_get_info(self->container);
-    self->wide = needs_doubles(self->container);
     self->colour = info->has_colour;
-    self->map = malloc(STRL_PM_MAX_VERTICES * sizeof *self->map);
-    strl_status status = self->map ? open_output(self, err)
+    self->map = strl__alloc(STRL_PM_MAX_VERTICES, sizeof *self->map);
+    strl_status status = self->map ? choose_width(self, err)
                                    : strl__fail(err, STRL_ERR_MEMORY, "no memory to extract into %s", self->path);
+    if (status == STRL_OK)
+        status = open_output(self, err);
     for (uint64_t i = 0; status == STRL_OK && i < info->placement_count; i++) {
         strl_placement placement;
         status = strl_container_placement(self->container, i, &placement, err);
@@ -263,7 +288,7 @@ static void release(extraction *self)
     strl__free(self->triangles.data);
     strl_arena_deinit(&self->arena);
     strl_container_close(self->container);
-    free(self->map);
+    strl__free(self->map);
 }
 
 static strl_status refuse_own_input(const char *model, const char *path, strl_error *err)

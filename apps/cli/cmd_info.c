@@ -2,13 +2,14 @@
 #include <inttypes.h>
 #include <jansson.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/memory.h"
 #include "container/container.h"
 #include "options.h"
 #include "remote.h"
+#include "shared/placed.h"
 
 #define MOST_GROUP_SIZE 32u /* larger groups are counted together */
 
@@ -72,7 +73,7 @@ static uint64_t boundary_steps_of(const level_facts *level)
 static strl_status survey(strl_container *container, uint32_t index, tree_facts *facts, strl_error *err)
 {
     const strl_tree *tree = strl_container_tree(container, index);
-    facts->levels = calloc(tree->level_count, sizeof *facts->levels);
+    facts->levels = strl__alloc_zero(tree->level_count, sizeof *facts->levels);
     if (!facts->levels)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for the facts of %" PRIu32 " levels", tree->level_count);
     uint64_t last_page = 0;
@@ -193,22 +194,6 @@ static void format_unit(const strl_container_info *info, char text[sizeof info->
             *at = '?';
 }
 
-/* Each tree's as often as it is placed. */
-static strl_status count_placed(strl_container *container, uint64_t *triangles, strl_error *err)
-{
-    const strl_container_info *info = strl_container_get_info(container);
-    strl_status status = STRL_OK;
-    *triangles = 0;
-    for (uint64_t i = 0; i < info->placement_count && status == STRL_OK; i++) {
-        strl_placement placement;
-        status = strl_container_placement(container, i, &placement, err);
-        const strl_tree *tree = status == STRL_OK ? strl_container_tree(container, placement.tree) : NULL;
-        if (tree && __builtin_add_overflow(*triangles, tree->triangle_count, triangles))
-            *triangles = UINT64_MAX;
-    }
-    return status;
-}
-
 static void header_to_json(json_t *object, const strl_container *container, uint64_t placed)
 {
     static const char *const axes[] = {"x", "y", "z"};
@@ -309,7 +294,7 @@ static void print_tree(uint32_t index, const strl_tree *tree, const tree_facts *
 static strl_status describe(strl_container *container, const char *path, bool as_json, strl_error *err)
 {
     uint64_t placed;
-    strl_status status = count_placed(container, &placed, err);
+    strl_status status = strl_placed_triangles(container, &placed, err);
     if (status != STRL_OK)
         return status;
     json_t *object = json_object(), *trees = json_array();
@@ -325,7 +310,7 @@ static strl_status describe(strl_container *container, const char *path, bool as
             json_array_append_new(trees, tree_to_json(strl_container_tree(container, i), &facts));
         else if (status == STRL_OK)
             print_tree(i, strl_container_tree(container, i), &facts);
-        free(facts.levels);
+        strl__free(facts.levels);
     }
     if (status == STRL_OK && as_json) {
         if (json_dumpf(object, stdout, JSON_INDENT(2)) != 0)

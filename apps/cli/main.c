@@ -1,9 +1,9 @@
 /* The program: finds the command and hands it its words. */
 #include <errno.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 
+#include "base/memory.h"
 #include "commands.h"
 #include "options.h"
 #include "stroll/version.h"
@@ -37,13 +37,13 @@ static int flush_output(int status)
 static int run_command(const strl_cli_command *command, int argc, char **argv)
 {
     strl_cli_args args = {.command = command->name, .summary = command->summary, .argc = argc, .argv = argv};
-    args.words = calloc((size_t)argc + 1, sizeof *args.words);
+    args.words = strl__alloc_zero((size_t)argc + 1, sizeof *args.words);
     if (!args.words) {
         fprintf(stderr, "stroll: no memory for %d words of the command line\n", argc);
         return 1;
     }
     int status = command->run(&args);
-    free(args.words);
+    strl__free(args.words);
     return status;
 }
 

@@ -13,6 +13,7 @@
 #include "platform/thread.h"
 #include "render_container.h"
 #include "render_model.h"
+#include "shared/placed.h"
 
 #define BATCH_NODES 64u
 #define BATCH_BYTES ((size_t)64 << 20) /* of decoded meshes and vertices, beyond which a batch is drawn */

@@ -25,7 +25,7 @@ typedef enum strl_action {
     STRL_ACTION_SCREENSHOT,
     STRL_ACTION_FORGET_PICKS,
     STRL_ACTION_PARTS,  /* shows and hides the list */
-    STRL_ACTION_SELECT, /* index: a node of the part tree */
+    STRL_ACTION_SELECT, /* index: a node of the part tree, or STRL_ACTION_FOUND */
     STRL_ACTION_OPEN_NODE,
     STRL_ACTION_HIDE, /* index: a node, STRL_ACTION_SELECTION = what is selected */
     STRL_ACTION_SHOW,
@@ -45,11 +45,13 @@ typedef enum strl_action {
     STRL_ACTION_RECORD, /* begins and ends */
     STRL_ACTION_REPLAY,
     STRL_ACTION_CANCEL_BUILD,
+    STRL_ACTION_BUILD_AGAIN,
     STRL_ACTION_HELP,
     STRL_ACTION_QUIT
 } strl_action;
 
 #define STRL_ACTION_SELECTION UINT32_MAX
+#define STRL_ACTION_FOUND (UINT32_MAX - 1) /* all that the search has found */
 #define STRL_MOST_REQUESTS 32u
 
 typedef struct strl_request {

@@ -4,6 +4,19 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "viewer/journal.h"
+
+/* Cut between two letters of UTF-8, not within one. */
+static void copy_name(char out[STRL_BOOKMARK_NAME], const char *name)
+{
+    size_t bytes = strnlen(name, STRL_BOOKMARK_NAME);
+    if (bytes == STRL_BOOKMARK_NAME)
+        for (bytes--; bytes > 0 && ((unsigned char)name[bytes] & 0xc0) == 0x80;)
+            bytes--;
+    memcpy(out, name, bytes);
+    out[bytes] = 0;
+}
+
 bool strl_bookmarks_add(strl_bookmarks *bookmarks, const char *name, const strl_navigator *navigator)
 {
     if (bookmarks->count == STRL_MOST_BOOKMARKS)
@@ -11,11 +24,23 @@ bool strl_bookmarks_add(strl_bookmarks *bookmarks, const char *name, const strl_
     strl_bookmark *made = &bookmarks->items[bookmarks->count++];
     *made = (strl_bookmark){.pose = strl_navigator_pose(navigator), .orthographic = navigator->orthographic};
     if (name[0])
-        snprintf(made->name, sizeof made->name, "%s", name);
+        copy_name(made->name, name);
     else
         snprintf(made->name, sizeof made->name, "view %u", bookmarks->count);
     bookmarks->next = 0;
     return true;
+}
+
+uint32_t strl_bookmarks_find(const strl_bookmarks *bookmarks, const strl_bookmark *bookmark)
+{
+    uint32_t at = 0;
+    for (; at < bookmarks->count; at++) {
+        const strl_bookmark *other = &bookmarks->items[at];
+        if (!strcmp(other->name, bookmark->name) && !memcmp(&other->pose, &bookmark->pose, sizeof other->pose) &&
+            other->orthographic == bookmark->orthographic)
+            break;
+    }
+    return at;
 }
 
 void strl_bookmarks_remove(strl_bookmarks *bookmarks, uint32_t index)
@@ -43,9 +68,9 @@ json_t *strl_bookmarks_write(const strl_bookmarks *bookmarks)
     for (uint32_t i = 0; i < bookmarks->count; i++) {
         const strl_bookmark *b = &bookmarks->items[i];
         json_array_append_new(array,
-                              json_pack("{s:s,s:[f,f,f],s:f,s:f,s:f,s:b}", "name", b->name, "eye", b->pose.eye[0],
-                                        b->pose.eye[1], b->pose.eye[2], "yaw", b->pose.yaw, "pitch", b->pose.pitch,
-                                        "distance", b->pose.distance, "orthographic", b->orthographic));
+                              json_pack("{s:o,s:[f,f,f],s:f,s:f,s:f,s:b}", "name", strl_journal_text(b->name), "eye",
+                                        b->pose.eye[0], b->pose.eye[1], b->pose.eye[2], "yaw", b->pose.yaw, "pitch",
+                                        b->pose.pitch, "distance", b->pose.distance, "orthographic", b->orthographic));
     }
     return array;
 }
@@ -59,7 +84,7 @@ static bool read_one(const json_t *object, strl_bookmark *out)
                     &pose->eye[1], &pose->eye[2], "yaw", &pose->yaw, "pitch", &pose->pitch, "distance", &pose->distance,
                     "orthographic", &orthographic) != 0)
         return false;
-    snprintf(out->name, sizeof out->name, "%s", name);
+    copy_name(out->name, name);
     out->orthographic = orthographic != 0;
     return fabs(pose->pitch) < M_PI / 2 && pose->distance > 0;
 }

@@ -28,6 +28,8 @@ typedef struct strl_bookmarks {
 
 /* An empty name becomes "view N". False where there is no room. */
 bool strl_bookmarks_add(strl_bookmarks *bookmarks, const char *name, const strl_navigator *navigator);
+/* Which one is the same in all; count where none is. */
+uint32_t strl_bookmarks_find(const strl_bookmarks *bookmarks, const strl_bookmark *bookmark);
 void strl_bookmarks_remove(strl_bookmarks *bookmarks, uint32_t index);
 /* One after the other, round and round; NULL where there is none. */
 const strl_bookmark *strl_bookmarks_next(strl_bookmarks *bookmarks);

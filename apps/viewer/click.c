@@ -92,6 +92,11 @@ static void look_at_pick(strl__viewer *v)
     look_at(v, bounds);
 }
 
+static bool find_drawn(const strl__viewer *v, double bounds[6])
+{
+    return strl_pick_style_bounds(&v->list, v->parts.styles, v->parts.tree.part_count, STRL_PART_MARKED, bounds);
+}
+
 /* The index is read once; what is not drawn now will be asked for again. */
 static void look_by_index(strl__viewer *v)
 {
@@ -100,11 +105,13 @@ static void look_by_index(strl__viewer *v)
     bool found = false;
     v->look_waits = false;
     if (strl_part_index_status(v->index, &err) != STRL_OK) {
+        strl__viewer_drop_index(v); /* a failure may pass, as that of a network: the next look begins anew */
         strl__viewer_say(v, "%s", err.message);
         return;
     }
-    for (uint32_t i = 0; i < v->parts.selected_count; i++)
-        found |= strl_part_index_widen(v->index, v->parts.tree.order[v->parts.selected_first + i], bounds);
+    for (uint32_t place = 0; place < v->parts.tree.part_count; place++)
+        if (v->parts.selected[place])
+            found |= strl_part_index_widen(v->index, v->parts.tree.order[place], bounds);
     if (found)
         look_at(v, bounds);
     else
@@ -126,6 +133,15 @@ void strl__viewer_poll_index(strl__viewer *v)
     look_by_index(v);
 }
 
+void strl__viewer_drop_index(strl__viewer *v)
+{
+    strl_part_index_destroy(v->index);
+    v->index = NULL;
+    if (v->look_waits)
+        v->message_end_ns = 0; /* it would stay until what it waits for had ended */
+    v->look_waits = false;
+}
+
 void strl__viewer_look(strl__viewer *v)
 {
     double bounds[6], share;
@@ -135,7 +151,7 @@ void strl__viewer_look(strl__viewer *v)
         look_at_pick(v);
     } else if (v->index && strl_part_index_is_done(v->index, &share)) {
         look_by_index(v);
-    } else if (strl_pick_style_bounds(&v->list, v->parts.styles, v->parts.tree.part_count, STRL_PART_MARKED, bounds)) {
+    } else if (find_drawn(v, bounds)) {
         look_at(v, bounds);
     } else if (v->index || strl_part_index_create(&location, v->parts.tree.part_count, &v->index, &err) == STRL_OK) {
         v->look_waits = true;

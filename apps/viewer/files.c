@@ -87,19 +87,24 @@ strl_status strl__viewer_open_model(strl__viewer *v, const char *path, strl_erro
         return strl_name_file(path, status, err);
     }
     set_model(v, model);
-    strl_part_index_destroy(v->index);
-    v->index = NULL;
-    v->look_waits = false;
+    strl__viewer_drop_index(v);
     strl_parts_deinit(&v->parts);
     v->parts = parts;
     v->controls.search[0] = 0;
+    bool is_other = strcmp(v->path, path) != 0;
     snprintf(v->path, sizeof v->path, "%s", path);
+    v->mesh[0] = 0;
     strl__viewer_set_title(v);
+    strl_settings_renew(&v->settings);
     strl_settings_get_bookmarks(&v->settings, info->model_id, &v->bookmarks);
     strl__viewer_reset(v);
+    if (is_other) /* a path, which has been saved, leads through the model that was there */
+        strl_recorder_deinit(&v->recorder);
     strl_journal_write(v->journal, "opened",
-                       json_pack("{s:o,s:I,s:i}", "file", strl_journal_text(path), "triangles",
-                                 (json_int_t)model->triangles, "parts", (int)info->part_count));
+                       json_pack("{s:o,s:I,s:I,s:i}", "file", strl_journal_text(path), "triangles",
+                                 (json_int_t)model->triangles, "triangles_placed",
+                                 (json_int_t)(model->placed < INT64_MAX ? model->placed : INT64_MAX), "parts",
+                                 (int)info->part_count));
     if (model->triangles == 0)
         strl__viewer_say(v, "the model is empty: of its file %llu lines, %llu points and no triangle were found",
                          (unsigned long long)info->dropped_lines, (unsigned long long)info->dropped_points);
@@ -141,18 +146,37 @@ strl_status strl__viewer_set_budgets(strl__viewer *v, strl_error *err)
 static void open_built(strl__viewer *v)
 {
     strl_error err = {0};
-    if (strl__viewer_open_model(v, v->news.container, &err) != STRL_OK)
+    if (strl__viewer_open_model(v, v->news.container, &err) != STRL_OK) {
         strl__viewer_say(v, "%s", err.message);
-    v->frames_left = STRL__FRAMES_AFTER_INPUT;
+        return;
+    }
+    memcpy(v->mesh, v->news.mesh, sizeof v->mesh);
+    if (v->news.warning[0])
+        strl__viewer_say(v, "warning: %s", v->news.warning);
+    else if (v->news.built_before)
+        strl__viewer_say(v, "built before, and younger than the mesh; files that the mesh names are not compared: "
+                            "\"build again\" is in the panel");
+}
+
+void strl__viewer_build_again(strl__viewer *v)
+{
+    strl_error err = {0};
+    if (v->mesh[0] && strl_opener_start(v->opener, v->mesh, true, &err) != STRL_OK)
+        strl__viewer_say(v, "%s", err.message);
 }
 
 void strl__viewer_poll_opener(strl__viewer *v)
 {
     strl_opener_poll(v->opener, &v->news);
-    if (v->news.state == STRL_OPENER_READY)
+    v->cancels = v->cancels && v->news.state == STRL_OPENER_BUILDS;
+    if (v->news.state == STRL_OPENER_READY) {
         open_built(v);
+        v->frames_left = STRL__FRAMES_AFTER_INPUT;
+    }
     if (v->news.state == STRL_OPENER_FAILED) {
         strl_journal_write(v->journal, "build", json_pack("{s:o}", "failed", strl_journal_text(v->news.error.message)));
+        if (v->news.warning[0])
+            strl__viewer_say(v, "warning: %s", v->news.warning);
         strl__viewer_say(v, "%s", v->news.error.status == STRL_ERR_CANCELLED ? "cancelled" : v->news.error.message);
         v->frames_left = STRL__FRAMES_AFTER_INPUT;
     }
@@ -161,7 +185,7 @@ void strl__viewer_poll_opener(strl__viewer *v)
 /* ---- settings */
 
 /* What nobody has touched in the window stays as it was remembered, whatever the command line said this time. */
-void strl__viewer_remember(strl__viewer *v)
+void strl__viewer_remember(strl__viewer *v, bool bookmarks)
 {
     strl_error err = {0};
     strl_settings *settings = &v->settings;
@@ -176,10 +200,14 @@ void strl__viewer_remember(strl__viewer *v)
     strl_window_size(v->window, size);
     if (size[0] >= 64 && size[1] >= 64 && (size[0] != v->begun.size[0] || size[1] != v->begun.size[1]))
         memcpy(settings->size, size, sizeof size);
-    settings->text_scale = v->controls.text_scale;
-    settings->show_parts = v->controls.parts;
-    settings->orthographic = v->controls.orthographic;
-    strl_settings_set_bookmarks(settings, strl_container_get_info(v->model->container)->model_id, &v->bookmarks);
+    if (v->controls.text_scale != v->begun_controls.text_scale)
+        settings->text_scale = v->controls.text_scale;
+    if (v->controls.parts != v->begun_controls.parts)
+        settings->show_parts = v->controls.parts;
+    if (v->controls.orthographic != v->begun_controls.orthographic)
+        settings->orthographic = v->controls.orthographic;
+    if (bookmarks)
+        strl_settings_set_bookmarks(settings, strl_container_get_info(v->model->container)->model_id, &v->bookmarks);
     if (strl_settings_save(settings, &err) != STRL_OK)
         strl__viewer_say(v, "%s", err.message);
 }

@@ -121,8 +121,13 @@ void budget(const char *name, uint64_t used, uint64_t most)
     ImGui::ProgressBar(most ? (float)((double)used / (double)most) : 0, ImVec2(-1, 0), text);
 }
 
+/* On the line of what was before it, where there is room. */
 void button(strl_gui_controls *controls, const char *label, strl_action action)
 {
+    float width = ImGui::CalcTextSize(label).x + 2 * ImGui::GetStyle().FramePadding.x;
+    float left = ImGui::GetItemRectMax().x + ImGui::GetStyle().ItemSpacing.x;
+    if (left + width <= ImGui::GetWindowPos().x + ImGui::GetWindowContentRegionMax().x)
+        ImGui::SameLine();
     if (ImGui::Button(label))
         strl_requests_add(&controls->requests, action, STRL_ACTION_SELECTION);
 }
@@ -155,14 +160,11 @@ void show_controls(const strl_gui_facts *facts, strl_gui_controls *controls)
     ImGui::Checkbox("flat", &controls->flat);
     ImGui::SameLine();
     ImGui::Checkbox("freeze", &controls->frozen);
-    button(controls, "home", STRL_ACTION_HOME);
-    ImGui::SameLine();
+    if (ImGui::Button("home"))
+        strl_requests_add(&controls->requests, STRL_ACTION_HOME, STRL_ACTION_SELECTION);
     button(controls, "reset", STRL_ACTION_RESET);
-    ImGui::SameLine();
     button(controls, "picture", STRL_ACTION_SCREENSHOT);
-    ImGui::SameLine();
     button(controls, facts->section->on ? "whole" : "section", STRL_ACTION_SECTION);
-    ImGui::SameLine();
     button(controls, "help", STRL_ACTION_HELP);
 }
 
@@ -224,20 +226,37 @@ void show_statistics(const strl_gui_facts *facts)
     ImGui::EndTable();
 }
 
+void show_size(const strl_gui_facts *facts)
+{
+    char stored[32], placed[32];
+    const char *plural = facts->model_triangles == 1 ? "" : "s";
+    format_count(stored, sizeof stored, facts->model_triangles);
+    format_count(placed, sizeof placed, facts->placed_triangles ? facts->placed_triangles : facts->placements);
+    if (facts->placed_triangles == facts->model_triangles || facts->placements == 1)
+        ImGui::TextColored(faint, "%s triangle%s", stored, plural);
+    else if (facts->placed_triangles)
+        ImGui::TextColored(faint, "%s triangles as placed, %s stored", placed, stored);
+    else
+        ImGui::TextColored(faint, "%s triangle%s stored, %s placements", stored, plural, placed);
+}
+
 void show_panel(const place &at, const strl_gui_facts *facts, strl_gui_controls *controls)
 {
-    char text[32];
     float width = panel_width * at.scale, room = at.height - 2 * margin * at.scale;
     ImGui::SetNextWindowPos(ImVec2(margin * at.scale, margin * at.scale), when_of(at));
     ImGui::SetNextWindowSizeConstraints(ImVec2(width, 0), ImVec2(width, room > 1 ? room : 1));
     ImGui::Begin("Stroll", NULL,
                  ImGuiWindowFlags_AlwaysAutoResize | ImGuiWindowFlags_NoFocusOnAppearing | ImGuiWindowFlags_NoNav);
-    format_count(text, sizeof text, facts->model_triangles);
     const char *slash = std::strrchr(facts->model, '/');
     ImGui::TextWrapped("%s", slash ? slash + 1 : facts->model);
     if (ImGui::IsItemHovered())
         ImGui::SetTooltip("%s", facts->model);
-    ImGui::TextColored(faint, "%s triangles", text);
+    show_size(facts);
+    if (facts->mesh[0] && !facts->builds && ImGui::SmallButton("build again"))
+        strl_requests_add(&controls->requests, STRL_ACTION_BUILD_AGAIN, 0);
+    if (facts->recorder->state == STRL_RECORDER_RECORDS)
+        ImGui::TextColored(warning, "recording, %.1f s: M ends and saves it",
+                           (double)facts->recorder->path.count / STRL_RECORDER_RATE);
     show_controls(facts, controls);
     if (ImGui::CollapsingHeader("bookmarks"))
         show_bookmarks(facts, controls);

@@ -28,6 +28,12 @@ bool asks(strl_gui_controls *controls, const char *label, strl_action action, ui
     return pressed;
 }
 
+/* Apart from what is clicked: a label's text would be an identity there, and ends at ##. */
+void draw_label(ImVec2 at, const char *text)
+{
+    ImGui::GetWindowDrawList()->AddText(at, ImGui::GetColorU32(ImGuiCol_Text), text[0] ? text : "(no name)");
+}
+
 /* A panel that is not there at first: wherever the visitor has put it, else at (x, y) of the window. */
 void begin_panel(const place &at, const char *name, float x, float y, float pivot_x, float pivot_y, float height)
 {
@@ -71,8 +77,7 @@ void part_row(const strl_parts *parts, uint32_t index, strl_gui_controls *contro
     bool has_children = index + 1 < node->end;
     uint32_t hidden = strl_parts_hidden_in(parts, node->first_part, node->part_count);
     bool shown = hidden < node->part_count;
-    bool selected = node->first_part >= parts->selected_first &&
-                    node->first_part + node->part_count <= parts->selected_first + parts->selected_count;
+    bool selected = strl_parts_selected_in(parts, node->first_part, node->part_count) == node->part_count;
     ImGui::PushID((int)index);
     if (ImGui::Checkbox("##shown", &shown))
         strl_requests_add(&controls->requests, shown ? STRL_ACTION_SHOW : STRL_ACTION_HIDE, index);
@@ -100,11 +105,34 @@ void part_row(const strl_parts *parts, uint32_t index, strl_gui_controls *contro
     }
     tooltip(node->is_part ? strl_part_tree_name(tree, tree->order[node->first_part]) : label);
     part_menu(index, controls);
-    /* Drawn apart: a label's text would be an identity, and ends at ##. */
-    ImGui::GetWindowDrawList()->AddText(at, ImGui::GetColorU32(ImGuiCol_Text), label[0] ? label : "(no name)");
+    draw_label(at, label);
     if (hidden > 0)
         ImGui::PopStyleColor();
     ImGui::PopID();
+}
+
+/* What the search has found is selected, then hidden or left alone. */
+void show_found(const strl_parts *parts, strl_gui_controls *controls)
+{
+    uint32_t found = strl_part_tree_found_in(&parts->tree, 0, parts->tree.part_count);
+    const struct {
+        const char *label;
+        strl_action action;
+    } buttons[] = {{"select##found", STRL_ACTION_SELECT},
+                   {"hide##found", STRL_ACTION_HIDE},
+                   {"alone##found", STRL_ACTION_ISOLATE}};
+    if (!parts->tree.search[0])
+        return;
+    ImGui::AlignTextToFramePadding();
+    ImGui::TextColored(faint, "%u found", found);
+    for (const auto &button : buttons) {
+        ImGui::SameLine();
+        if (!ImGui::Button(button.label) || found == 0)
+            continue;
+        strl_requests_add(&controls->requests, STRL_ACTION_SELECT, STRL_ACTION_FOUND);
+        if (button.action != STRL_ACTION_SELECT)
+            strl_requests_add(&controls->requests, button.action, STRL_ACTION_SELECTION);
+    }
 }
 
 } // namespace
@@ -115,6 +143,7 @@ void show_parts(const place &at, const strl_gui_facts *facts, strl_gui_controls 
     begin_panel(at, "Parts", at.width - margin * at.scale, margin * at.scale, 1, 0, at.height * parts_share);
     ImGui::SetNextItemWidth(-1);
     ImGui::InputTextWithHint("##search", "search", controls->search, sizeof controls->search);
+    show_found(parts, controls);
     asks(controls, "hide", STRL_ACTION_HIDE, STRL_ACTION_SELECTION);
     ImGui::SameLine();
     asks(controls, "alone", STRL_ACTION_ISOLATE, STRL_ACTION_SELECTION);
@@ -122,7 +151,8 @@ void show_parts(const place &at, const strl_gui_facts *facts, strl_gui_controls 
     asks(controls, "show all", STRL_ACTION_SHOW_ALL, 0);
     ImGui::SameLine();
     asks(controls, "look", STRL_ACTION_LOOK, STRL_ACTION_SELECTION);
-    ImGui::TextColored(faint, "%u parts, %u hidden", parts->tree.part_count, parts->hidden_count);
+    ImGui::TextColored(faint, "%u part%s, %u selected, %u hidden", parts->tree.part_count,
+                       parts->tree.part_count == 1 ? "" : "s", parts->selected_count, parts->hidden_count);
     ImGui::BeginChild("rows");
     if (facts->reveal != UINT32_MAX)
         ImGui::SetScrollY((float)facts->reveal * ImGui::GetFrameHeightWithSpacing() - ImGui::GetWindowHeight() / 2);
@@ -240,8 +270,10 @@ void show_bookmarks(const strl_gui_facts *facts, strl_gui_controls *controls)
         if (ImGui::SmallButton("x"))
             strl_requests_add(&controls->requests, STRL_ACTION_DROP_BOOKMARK, b);
         ImGui::SameLine();
-        if (ImGui::Selectable(facts->bookmarks->items[b].name))
+        ImVec2 here = ImGui::GetCursorScreenPos();
+        if (ImGui::Selectable("##bookmark"))
             strl_requests_add(&controls->requests, STRL_ACTION_GO_BOOKMARK, b);
+        draw_label(here, facts->bookmarks->items[b].name);
         ImGui::PopID();
     }
 }

@@ -27,10 +27,12 @@ typedef struct strl__frame_clock {
 } strl__frame_clock;
 
 typedef struct strl__viewer {
-    strl_viewer_desc desc; /* completed: no defaults left */
-    char path[4096]; /* of the model that is open, or its address */
-    strl_viewer_desc begun;   /* as completed at the start: what has changed since then is remembered */
-    strl_viewer_model *model; /* owned; never NULL while the window is open */
+    strl_viewer_desc desc;            /* completed: no defaults left */
+    char path[4096];                  /* of the model that is open, or its address */
+    char mesh[4096];                  /* that was dropped and of which it was built; "" = none */
+    strl_viewer_desc begun;           /* as completed at the start: what has changed since then is remembered */
+    strl_gui_controls begun_controls; /* the same */
+    strl_viewer_model *model;         /* owned; never NULL while the window is open */
     strl_window *window;
     strl_gui *gui;
     double text_scale; /* that the panels have */
@@ -60,6 +62,7 @@ typedef struct strl__viewer {
     strl_settings settings;
     strl_opener *opener;
     strl_opener_news news;
+    bool cancels; /* the build at work has been told to end */
     FILE *journal;
     char message[512];
     uint64_t message_end_ns;
@@ -79,6 +82,8 @@ void strl__viewer_click(strl__viewer *v, const strl_click *click);
 strl_pick_filter strl__viewer_filter(const strl__viewer *v);
 void strl__viewer_look(strl__viewer *v); /* at the selection; now, or once it is known where that is */
 void strl__viewer_poll_index(strl__viewer *v);
+/* With what waits for it. */
+void strl__viewer_drop_index(strl__viewer *v);
 
 /* move.c. Brings the camera up to date. True while something moves by itself. */
 bool strl__viewer_move(strl__viewer *v, const strl_window_input *input, double seconds);
@@ -98,8 +103,10 @@ void strl__viewer_set_title(strl__viewer *v); /* where there is a window */
 strl_status strl__viewer_make_renderer(strl__viewer *v, strl_error *err);
 strl_status strl__viewer_set_budgets(strl__viewer *v, strl_error *err);
 void strl__viewer_poll_opener(strl__viewer *v);
-/* A failure is said, not returned: what cannot be remembered stops nobody. */
-void strl__viewer_remember(strl__viewer *v);
+void strl__viewer_build_again(strl__viewer *v); /* of the mesh that was dropped */
+/* bookmarks: those of the model as the window has them, just read and changed. A failure is said, not returned: what cannot be
+ * remembered stops nobody. */
+void strl__viewer_remember(strl__viewer *v, bool bookmarks);
 
 /* frame.c */
 strl_status strl__viewer_draw(strl__viewer *v, strl_error *err);

@@ -3,8 +3,10 @@
 #include <math.h>
 
 #include "base/fail.h"
+#include "container/treelet.h"
 #include "frame/view.h"
 #include "platform/thread.h"
+#include "shared/placed.h"
 #include "shared/units.h"
 
 #define READ_THREADS 2u
@@ -23,14 +25,28 @@ static strl_status check_kind(const strl_location *location, strl_error *err)
     return status;
 }
 
+/* Placements that are counted before a model is shown: of more, or far away, it would be waited for. */
+#define MOST_COUNTED (1u << 20)
+#define MOST_COUNTED_FAR (1u << 12)
+
+/* 0 where that would take long or fails: it is for people. */
+static uint64_t count_placed(const strl_viewer_model *model, const strl_location *location)
+{
+    uint64_t count = strl_container_get_info(model->container)->placement_count, triangles = 0;
+    if (count <= (strl_location_is_remote(location->name) ? MOST_COUNTED_FAR : MOST_COUNTED))
+        strl_placed_triangles(model->container, &triangles, NULL);
+    return triangles;
+}
+
 /* The walk gives bounds; up axis, unit and counts are the header's. */
-static void take_facts(strl_viewer_model *model)
+static void take_facts(strl_viewer_model *model, const strl_location *location)
 {
     model->container = strl_walk_container(model->walk);
     const strl_container_info *info = strl_container_get_info(model->container);
     model->up_axis = info->up_axis;
     model->unit_metres = strl_unit_metres(info->unit);
     model->triangles = strl_container_triangle_count(model->container);
+    model->placed = count_placed(model, location);
     strl_walk_bounds(model->walk, model->bounds);
 }
 
@@ -57,7 +73,7 @@ strl_status strl_viewer_model_open(strl_viewer_model *model, const strl_location
         status = strl_walk_open(source, &desc, &model->walk, err);
     }
     if (status == STRL_OK)
-        take_facts(model);
+        take_facts(model, location);
     else
         strl_viewer_model_close(model);
     return status;
@@ -70,22 +86,6 @@ void strl_viewer_model_close(strl_viewer_model *model)
     *model = (strl_viewer_model){0};
 }
 
-static strl_box world_box(const strl_draw_item *item)
-{
-    strl_box box;
-    for (int row = 0; row < 3; row++) {
-        const double *m = item->transform + 4 * row;
-        box.min[row] = box.max[row] = m[3];
-        for (int i = 0; i < 3; i++) {
-            double a = m[i] * (item->origin[i] + item->step * (double)item->box_min[i]);
-            double b = m[i] * (item->origin[i] + item->step * (double)item->box_max[i]);
-            box.min[row] += fmin(a, b);
-            box.max[row] += fmax(a, b);
-        }
-    }
-    return box;
-}
-
 bool strl_viewer_set_range(strl_draw_list *list, const strl_camera *camera)
 {
     strl_view view;
@@ -93,9 +93,12 @@ bool strl_viewer_set_range(strl_draw_list *list, const strl_camera *camera)
     if (!strl_view_init(&view, camera))
         return false;
     for (uint32_t i = 0; i < list->count; i++) {
-        strl_box box = world_box(&list->items[i]);
+        const strl_draw_item *item = &list->items[i];
+        const strl_tree lattice = {.origin = {item->origin[0], item->origin[1], item->origin[2]}, .step = item->step};
+        strl_box box;
+        strl_placed_box(&lattice, item->transform, item->box_min, item->box_max, box.min, box.max);
         double least, most;
-        if (!list->items[i].visible || !strl_view_sees(&view, &box))
+        if (!item->visible || !strl_view_sees(&view, &box))
             continue;
         strl_view_depth_range(&view, &box, &least, &most);
         near = fmin(near, least);

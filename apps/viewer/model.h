@@ -15,7 +15,8 @@ typedef struct strl_viewer_model {
     double bounds[6];
     unsigned up_axis;
     double unit_metres; /* 0 = unknown */
-    uint64_t triangles; /* of the finest level */
+    uint64_t triangles,
+        placed; /* of the finest level: each tree's once, and as often as it is placed; placed 0 = unknown */
 } strl_viewer_model;
 
 /* The model stays where it is until strl_viewer_model_close. STRL_ERR_ARGUMENT where the file is no container. */

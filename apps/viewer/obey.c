@@ -42,40 +42,56 @@ static void scale_error(strl__viewer *v, float factor)
 
 /* ---- parts */
 
-/* The places that a request is about. False where it is about nothing. */
-static bool places_of(const strl__viewer *v, uint32_t node, uint32_t *first, uint32_t *count)
-{
-    const strl_part_tree *tree = &v->parts.tree;
-    *first = v->parts.selected_first, *count = v->parts.selected_count;
-    if (node < tree->node_count)
-        *first = tree->nodes[node].first_part, *count = tree->nodes[node].part_count;
-    return *count > 0;
-}
-
 /* Shown at what is selected. */
 static void toggle_parts(strl__viewer *v)
 {
     v->controls.parts = !v->controls.parts;
     if (v->controls.parts && v->parts.selected_count > 0)
-        v->reveal = strl_part_tree_reveal(&v->parts.tree, v->parts.tree.order[v->parts.selected_first]);
+        v->reveal = strl_part_tree_reveal(&v->parts.tree, v->parts.tree.order[strl_parts_first_selected(&v->parts)]);
+}
+
+static void select_parts(strl__viewer *v, uint32_t node)
+{
+    const strl_part_tree *tree = &v->parts.tree;
+    if (node < tree->node_count)
+        strl_parts_select(&v->parts, tree->nodes[node].first_part, tree->nodes[node].part_count);
+    else if (node == STRL_ACTION_FOUND)
+        strl_parts_select_found(&v->parts);
+}
+
+static void obey_node(strl__viewer *v, strl_action action, const strl_part_node *node)
+{
+    if (action == STRL_ACTION_ISOLATE)
+        strl_parts_isolate(&v->parts, node->first_part, node->part_count);
+    else
+        strl_parts_hide(&v->parts, node->first_part, node->part_count, action == STRL_ACTION_HIDE);
+}
+
+static void obey_selection(strl__viewer *v, strl_action action)
+{
+    if (action == STRL_ACTION_ISOLATE)
+        strl_parts_isolate_selected(&v->parts);
+    else
+        strl_parts_hide_selected(&v->parts, action == STRL_ACTION_HIDE);
 }
 
 static void obey_parts(strl__viewer *v, strl_request request)
 {
-    uint32_t first, count;
-    if (request.action == STRL_ACTION_SHOW_ALL) {
-        strl_parts_show_all(&v->parts);
-    } else if (!places_of(v, request.index, &first, &count)) {
+    const strl_part_tree *tree = &v->parts.tree;
+    if (request.action == STRL_ACTION_SELECT) {
+        select_parts(v, request.index);
+        return;
+    }
+    if (request.action != STRL_ACTION_SHOW_ALL && request.index >= tree->node_count && v->parts.selected_count == 0) {
         strl__viewer_say(v, "nothing is selected: click a part, or a line of the list");
         return;
-    } else if (request.action == STRL_ACTION_SELECT) {
-        strl_parts_select(&v->parts, first, count);
-        return;
-    } else if (request.action == STRL_ACTION_ISOLATE) {
-        strl_parts_isolate(&v->parts, first, count);
-    } else {
-        strl_parts_hide(&v->parts, first, count, request.action == STRL_ACTION_HIDE);
     }
+    if (request.action == STRL_ACTION_SHOW_ALL)
+        strl_parts_show_all(&v->parts);
+    else if (request.index < tree->node_count)
+        obey_node(v, request.action, &tree->nodes[request.index]);
+    else
+        obey_selection(v, request.action);
     strl_journal_write(v->journal, "hidden", json_pack("{s:i}", "count", (int)v->parts.hidden_count));
 }
 
@@ -161,6 +177,31 @@ static void go_bookmark(strl__viewer *v, const strl_bookmark *bookmark)
     strl__viewer_say(v, "%s", bookmark->name);
 }
 
+/* As they are now: another window of the same model may have written since. */
+static void renew_bookmarks(strl__viewer *v)
+{
+    strl_settings_renew(&v->settings);
+    strl_settings_get_bookmarks(&v->settings, strl_container_get_info(v->model->container)->model_id, &v->bookmarks);
+}
+
+static void drop_bookmark(strl__viewer *v, uint32_t index)
+{
+    if (index >= v->bookmarks.count)
+        return;
+    const strl_bookmark dropped = v->bookmarks.items[index];
+    renew_bookmarks(v);
+    strl_bookmarks_remove(&v->bookmarks, strl_bookmarks_find(&v->bookmarks, &dropped));
+}
+
+static void add_bookmark(strl__viewer *v)
+{
+    renew_bookmarks(v);
+    if (strl_bookmarks_add(&v->bookmarks, v->controls.bookmark, &v->navigator))
+        strl__viewer_say(v, "bookmark %s", v->bookmarks.items[v->bookmarks.count - 1].name);
+    else
+        strl__viewer_say(v, "there is no room for more than %u bookmarks of a model", STRL_MOST_BOOKMARKS);
+}
+
 static void obey_bookmarks(strl__viewer *v, strl_request request)
 {
     if (request.action == STRL_ACTION_NEXT_BOOKMARK) {
@@ -172,13 +213,11 @@ static void obey_bookmarks(strl__viewer *v, strl_request request)
         return;
     }
     if (request.action == STRL_ACTION_DROP_BOOKMARK)
-        strl_bookmarks_remove(&v->bookmarks, request.index);
-    else if (strl_bookmarks_add(&v->bookmarks, v->controls.bookmark, &v->navigator))
-        strl__viewer_say(v, "bookmark %s", v->bookmarks.items[v->bookmarks.count - 1].name);
+        drop_bookmark(v, request.index);
     else
-        strl__viewer_say(v, "there is no room for more than %u bookmarks of a model", STRL_MOST_BOOKMARKS);
+        add_bookmark(v);
     v->controls.bookmark[0] = 0;
-    strl__viewer_remember(v);
+    strl__viewer_remember(v, true);
 }
 
 /* ---- camera and pictures */
@@ -261,11 +300,26 @@ static void obey_picture(strl__viewer *v, strl_action action)
     }
 }
 
+static void cancel_build(strl__viewer *v)
+{
+    strl_opener_cancel(v->opener);
+    v->cancels = true;
+}
+
 static void set_budgets(strl__viewer *v)
 {
     strl_error err = {0};
     if (strl__viewer_set_budgets(v, &err) != STRL_OK)
         strl__viewer_say(v, "%s", err.message);
+}
+
+/* Who presses Esc while a mesh is built means the build. */
+static bool quit(strl__viewer *v)
+{
+    bool ends = v->news.state != STRL_OPENER_BUILDS || v->cancels;
+    if (!ends)
+        cancel_build(v);
+    return ends;
 }
 
 bool strl__viewer_obey(strl__viewer *v, strl_request request)
@@ -284,7 +338,9 @@ bool strl__viewer_obey(strl__viewer *v, strl_request request)
     else if (action == STRL_ACTION_BUDGETS)
         set_budgets(v);
     else if (action == STRL_ACTION_CANCEL_BUILD)
-        strl_opener_cancel(v->opener);
+        cancel_build(v);
+    else if (action == STRL_ACTION_BUILD_AGAIN)
+        strl__viewer_build_again(v);
     else if (action >= STRL_ACTION_SELECT && action <= STRL_ACTION_SHOW_ALL)
         obey_parts(v, request);
     else if (action >= STRL_ACTION_SECTION && action <= STRL_ACTION_SECTION_BACK)
@@ -295,5 +351,5 @@ bool strl__viewer_obey(strl__viewer *v, strl_request request)
         obey_picture(v, action);
     else
         obey_camera(v, action);
-    return action == STRL_ACTION_QUIT;
+    return action == STRL_ACTION_QUIT && quit(v);
 }

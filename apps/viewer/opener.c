@@ -9,20 +9,26 @@
 #include "base/hash.h"
 #include "base/memory.h"
 #include "stroll/build.h"
-#include "container/layout.h"
+#include "platform/file.h"
 #include "platform/file.h"
 #include "platform/output.h"
 #include "platform/thread.h"
+#include "shared/folder.h"
+#include "shared/importer.h"
+#include "shared/location.h"
 
 struct strl_opener {
     char *cache;
     strl_thread *thread;
     atomic_bool cancelled;
-    strl_opener_state state; /* the owner's thread only */
+    strl_opener_state state; /* the owner's thread only, as what follows but for the two paths */
+    bool of_mesh, built_before;
     char input[4096], output[4096];
     strl_mutex mutex; /* guards the rest */
     strl_build_progress progress;
     bool done;
+    char warning[480]; /* the first */
+    unsigned warning_count;
     strl_status status;
     strl_error error;
 };
@@ -64,6 +70,15 @@ static bool report(void *context, const strl_build_progress *progress)
     return !atomic_load(&opener->cancelled);
 }
 
+static void note_warning(void *context, const char *sentence)
+{
+    strl_opener *opener = context;
+    strl_mutex_lock(&opener->mutex);
+    if (opener->warning_count++ == 0)
+        snprintf(opener->warning, sizeof opener->warning, "%s", sentence);
+    strl_mutex_unlock(&opener->mutex);
+}
+
 static void build(void *context)
 {
     strl_opener *opener = context;
@@ -74,7 +89,9 @@ static void build(void *context)
                                   .input_count = 1,
                                   .output = opener->output,
                                   .jobs = processors > 1 ? processors - 1 : 1,
+                                  .importer = strl_importer(),
                                   .progress = report,
+                                  .warn = note_warning,
                                   .context = opener};
     strl_build_result result;
     strl_error error = {0};
@@ -90,21 +107,15 @@ static void build(void *context)
 
 static bool is_container(const char *path)
 {
-    strl_file *file = NULL;
-    char magic[8];
-    size_t got = 0;
-    bool is = strl_file_open(path, &file, NULL) == STRL_OK &&
-              strl_file_read_some(file, 0, magic, sizeof magic, &got, NULL) == STRL_OK && got == sizeof magic &&
-              memcmp(magic, STRL__MAGIC, sizeof magic) == 0;
-    strl_file_close(file, NULL);
-    return is;
+    bool is = false;
+    return strl_location_is_container(&(strl_location){.name = path}, &is, NULL) == STRL_OK && is;
 }
 
 /* Names in the cache tell files of one name in different folders apart. */
 static strl_status cache_name(strl_opener *opener, strl_error *err)
 {
     const char *slash = strrchr(opener->input, '/'), *name = slash ? slash + 1 : opener->input;
-    strl_status status = strl_path_make_directory(opener->cache, err);
+    strl_status status = strl_folder_make(opener->cache, err);
     int bytes = snprintf(opener->output, sizeof opener->output, "%s/%016" PRIx64 "-%s.stroll", opener->cache,
                          strl__checksum(opener->input, strlen(opener->input)), name);
     if (status == STRL_OK && (bytes < 0 || (size_t)bytes >= sizeof opener->output))
@@ -129,7 +140,7 @@ static bool is_built(const strl_opener *opener)
            is_container(opener->output);
 }
 
-strl_status strl_opener_start(strl_opener *opener, const char *file, strl_error *err)
+strl_status strl_opener_start(strl_opener *opener, const char *file, bool again, strl_error *err)
 {
     strl_file_info info;
     if (opener->state == STRL_OPENER_BUILDS)
@@ -141,13 +152,18 @@ strl_status strl_opener_start(strl_opener *opener, const char *file, strl_error 
         return status;
     memcpy(opener->input, file, strlen(file) + 1);
     opener->state = STRL_OPENER_READY;
-    if (is_container(file)) {
+    opener->warning_count = 0;
+    opener->of_mesh = !is_container(file);
+    opener->built_before = false;
+    if (!opener->of_mesh) {
         memcpy(opener->output, file, strlen(file) + 1);
         return STRL_OK;
     }
     status = choose_output(opener, err);
-    if (status == STRL_OK && is_built(opener))
+    if (status == STRL_OK && !again && is_built(opener)) {
+        opener->built_before = true;
         return STRL_OK;
+    }
     opener->done = false;
     opener->progress = (strl_build_progress){0};
     atomic_store(&opener->cancelled, false);
@@ -173,6 +189,16 @@ static void describe(const strl_build_progress *p, strl_opener_news *news)
                  (double)p->triangles_in * 1e-6);
 }
 
+/* Once the thread has ended. */
+static void describe_warnings(const strl_opener *opener, strl_opener_news *news)
+{
+    if (opener->warning_count == 1)
+        snprintf(news->warning, sizeof news->warning, "%s", opener->warning);
+    else if (opener->warning_count > 1)
+        snprintf(news->warning, sizeof news->warning, "%s (and %u more warning%s)", opener->warning,
+                 opener->warning_count - 1, opener->warning_count == 2 ? "" : "s");
+}
+
 void strl_opener_poll(strl_opener *opener, strl_opener_news *news)
 {
     *news = (strl_opener_news){.state = opener->state};
@@ -189,8 +215,13 @@ void strl_opener_poll(strl_opener *opener, strl_opener_news *news)
         strl_thread_join(opener->thread);
         opener->thread = NULL;
     }
-    if (news->state == STRL_OPENER_READY)
+    if (news->state == STRL_OPENER_READY) {
         memcpy(news->container, opener->output, sizeof news->container);
+        memcpy(news->mesh, opener->input, opener->of_mesh ? sizeof news->mesh : 0);
+        news->built_before = opener->built_before;
+    }
+    if (news->state == STRL_OPENER_READY || news->state == STRL_OPENER_FAILED)
+        describe_warnings(opener, news);
     if (news->state != STRL_OPENER_BUILDS)
         opener->state = STRL_OPENER_IDLE;
 }

@@ -125,12 +125,13 @@ static bool grow_tree(strl_part_tree *tree, uint64_t most_nodes)
 
 /* ---- rows */
 
-static bool below_matches(const strl_part_tree *tree, const strl_part_node *node)
+/* One look at each part, whatever its depth. */
+static void mark_found(strl_part_tree *tree)
 {
-    for (uint32_t i = 0; i < node->part_count; i++)
-        if (strcasestr(strl_part_tree_name(tree, tree->order[node->first_part + i]), tree->search))
-            return true;
-    return false;
+    for (uint32_t place = 0; place < tree->part_count; place++) {
+        bool found = tree->search[0] && strcasestr(strl_part_tree_name(tree, tree->order[place]), tree->search);
+        tree->found_before[place + 1] = tree->found_before[place] + found;
+    }
 }
 
 /* A search shows what it finds whether it was open or not. */
@@ -140,7 +141,7 @@ static void find_rows(strl_part_tree *tree)
     for (uint32_t n = 0; n < tree->node_count;) {
         const strl_part_node *node = &tree->nodes[n];
         bool searching = tree->search[0] != 0;
-        if (searching && !below_matches(tree, node)) {
+        if (searching && strl_part_tree_found_in(tree, node->first_part, node->part_count) == 0) {
             n = node->end;
             continue;
         }
@@ -162,7 +163,13 @@ void strl_part_tree_search(strl_part_tree *tree, const char *text)
     size_t bytes = strnlen(text, sizeof tree->search - 1);
     memcpy(tree->search, text, bytes);
     tree->search[bytes] = 0;
+    mark_found(tree);
     find_rows(tree);
+}
+
+uint32_t strl_part_tree_found_in(const strl_part_tree *tree, uint32_t first, uint32_t count)
+{
+    return tree->found_before[first + count] - tree->found_before[first];
 }
 
 uint32_t strl_part_tree_reveal(strl_part_tree *tree, uint32_t part)
@@ -193,7 +200,8 @@ strl_status strl_part_tree_init(strl_part_tree *tree, uint32_t part_count, uint6
     tree->names = strl__alloc_zero(part_count, sizeof *tree->names);
     tree->order = strl__alloc_zero(part_count, sizeof *tree->order);
     tree->places = strl__alloc_zero(part_count, sizeof *tree->places);
-    strl_status status = tree->names && tree->order && tree->places
+    tree->found_before = strl__alloc_zero((size_t)part_count + 1, sizeof *tree->found_before);
+    strl_status status = tree->names && tree->order && tree->places && tree->found_before
                              ? load_names(tree, half, name, context, err)
                              : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u parts", part_count);
     if (status == STRL_OK) {
@@ -224,6 +232,7 @@ void strl_part_tree_deinit(strl_part_tree *tree)
     strl__free(tree->names);
     strl__free(tree->order);
     strl__free(tree->places);
+    strl__free(tree->found_before);
     strl__free(tree->nodes);
     strl__free(tree->rows);
     *tree = (strl_part_tree){0};

@@ -38,10 +38,11 @@ typedef struct strl_part_tree {
     uint32_t *rows; /* nodes that a list shows */
     uint32_t row_count;
     char search[STRL_PART_TREE_SEARCH]; /* what the rows were found with */
+    uint32_t *found_before; /* [part_count + 1]: how many of the places before each one the search has found */
 } strl_part_tree;
 
 /* name(context, part, ...) tells each name (UTF-8, cut to fit). memory_bytes bounds names and nodes, but for the least of
- * both that each part needs, some 60 bytes; 0 = 512 MiB. Beyond it parts have no name, and paths are not split: a model
+ * both that each part needs, some 64 bytes; 0 = 512 MiB. Beyond it parts have no name, and paths are not split: a model
  * with many opens all the same. The tree is empty on failure. */
 typedef strl_status (*strl_part_name_fn)(void *context, uint32_t part, char *name, size_t size, strl_error *err);
 strl_status strl_part_tree_init(strl_part_tree *tree, uint32_t part_count, uint64_t memory_bytes,
@@ -54,6 +55,8 @@ const char *strl_part_tree_name(const strl_part_tree *tree, uint32_t part);
 void strl_part_tree_toggle(strl_part_tree *tree, uint32_t node);
 /* Shows only parts whose path contains `text`, letters of ASCII in either case, with all steps above them; "" = all. */
 void strl_part_tree_search(strl_part_tree *tree, const char *text);
+/* How many of a range of places the search has found, at once; 0 where none is on. */
+uint32_t strl_part_tree_found_in(const strl_part_tree *tree, uint32_t first, uint32_t count);
 /* Opens everything above a part. Returns its row; UINT32_MAX where a search hides it. */
 uint32_t strl_part_tree_reveal(strl_part_tree *tree, uint32_t part);
 

@@ -7,6 +7,7 @@
 #include "base/fail.h"
 #include "base/memory.h"
 #include "platform/output.h"
+#include "shared/folder.h"
 
 #define MOST_BYTES (1024.0 * 1024 * 1024 * 1024)
 
@@ -76,26 +77,6 @@ void strl_settings_deinit(strl_settings *settings)
     *settings = (strl_settings){0};
 }
 
-static strl_status make_folder(const char *path, strl_error *err)
-{
-    char folder[4096];
-    const char *slash = strrchr(path, '/');
-    size_t bytes = slash && slash > path ? (size_t)(slash - path) : 0;
-    if (bytes == 0 || bytes >= sizeof folder)
-        return STRL_OK;
-    memcpy(folder, path, bytes);
-    folder[bytes] = 0;
-    char *above = strrchr(folder, '/');
-    if (above && above > folder && !strl_path_exists(folder)) {
-        *above = 0;
-        strl_status status = strl_path_make_directory(folder, err);
-        *above = '/';
-        if (status != STRL_OK)
-            return status;
-    }
-    return strl_path_make_directory(folder, err);
-}
-
 static void write_values(const strl_settings *settings)
 {
     json_t *root = settings->root;
@@ -116,7 +97,7 @@ strl_status strl_settings_save(const strl_settings *settings, strl_error *err)
     if (!settings->path || !settings->root)
         return STRL_OK;
     write_values(settings);
-    strl_status status = make_folder(settings->path, err);
+    strl_status status = strl_folder_make_for(settings->path, err);
     if (status == STRL_OK)
         status = strl_output_open(settings->path, NULL, &output, err);
     if (status == STRL_OK)

@@ -43,7 +43,7 @@ const char strl_viewer_keys[] =
     "P              save the picture as PNG\n"
     "drop a file    opens a container; builds one of a mesh first\n"
     "F1             this help\n"
-    "Esc            quit\n";
+    "Esc            cancel a build; quit\n";
 
 void strl__viewer_say(strl__viewer *v, const char *format, ...)
 {
@@ -132,7 +132,7 @@ static void take_dropped(strl__viewer *v, const strl_window_input *input)
         return;
     if (!input->dropped[0])
         strl__viewer_say(v, "the path of the dropped file is too long");
-    else if (strl_opener_start(v->opener, input->dropped, &err) != STRL_OK)
+    else if (strl_opener_start(v->opener, input->dropped, false, &err) != STRL_OK)
         strl__viewer_say(v, "%s", err.message);
     else if (input->dropped_count > 1)
         strl__viewer_say(v, "%s is opened, the other %u files are not", input->dropped, input->dropped_count - 1);
@@ -245,6 +245,7 @@ static strl_status open_viewer(strl__viewer *v, strl_error *err)
     if (status != STRL_OK)
         return status;
     v->controls.orthographic = v->settings.orthographic;
+    v->begun_controls = v->controls;
     strl__viewer_set_title(v);
     if (remembers != STRL_OK)
         strl__viewer_say(v, "%s", slip.message);
@@ -284,7 +285,7 @@ strl_status strl_viewer_run(const strl_viewer_desc *desc, strl_error *err)
     if (status == STRL_OK) {
         status = run_loop(v, err);
         strl__viewer_end_recording(v);
-        strl__viewer_remember(v);
+        strl__viewer_remember(v, false);
     }
     close_viewer(v);
     return status;

@@ -134,8 +134,9 @@ def hit(boxes, ray, hidden=(), highest=math.inf):
 
 
 class Session:
-    def __init__(self, viewer, display, boxes):
+    def __init__(self, viewer, display, boxes, stroll):
         self.viewer, self.display, self.boxes, self.home = viewer, display, boxes, Home(boxes)
+        self.stroll = stroll
         self.views = 0
 
     def view(self):
@@ -143,6 +144,14 @@ class Session:
         self.views += 1  # each time elsewhere, so that no older rest is taken for this one
         self.viewer.point(PARK[0] + 4 * (self.views % 8), PARK[1])
         return self.display.shoot(*BETWEEN)
+
+    def erase(self):
+        """What is typed. Keys are held, because slow frames see only what is down."""
+        for keys in (("ctrl", "a"), ("BackSpace",)):
+            self.viewer.tool(*(word for key in keys for word in ("keydown", key)))
+            time.sleep(1)  # held, the keys repeat: there is no rest
+            self.viewer.tool(*(word for key in keys for word in ("keyup", key)))
+            self.view()
 
     def check_pick(self, x, y, orthographic=False, **which):
         """Clicks and compares; the pixel's middle is where the ray goes."""
@@ -233,8 +242,8 @@ def check_list(session):
     viewer.press(1100, 50)  # the search field
     viewer.tool("type", "CHIMNEY")
     session.view()
-    viewer.press(1120, 166)  # below site and house
-    viewer.point(1120, 166)
+    viewer.press(1120, 189)  # below site and house
+    viewer.point(1120, 189)
     viewer.tool("click", "3")  # its menu, which Escape closes, and not the window
     viewer.rest()
     viewer.key("Escape")
@@ -245,11 +254,22 @@ def check_list(session):
     eye = viewer.event("arrived")["eye"]
     _, low, high = session.boxes["site/house/chimney"]
     assert math.dist(eye, [(a + b) / 2 for a, b in zip(low, high)]) < 4 * math.dist(low, high), eye
-    viewer.point(998, 114)  # the box before the whole site, of which something is shown
+    viewer.point(998, 137)  # the box before the whole site, of which something is shown
     viewer.tool("click", "1")
     assert viewer.event("hidden")["count"] == len(session.boxes)
+    viewer.key("u")
+    viewer.event("hidden", count=0)
     viewer.press(1100, 50)
-    viewer.key("ctrl+a", "BackSpace")
+    session.erase()
+    viewer.tool("type", "tree")
+    session.view()
+    trees = sum("tree" in name for name in session.boxes)
+    viewer.press(1130, 74)  # hides what is found
+    assert viewer.event_before("hidden")["count"] == trees
+    viewer.press(1176, 74)  # and leaves it alone
+    assert viewer.event_before("hidden")["count"] == len(session.boxes) - trees
+    viewer.press(1100, 50)
+    session.erase()
     viewer.press(640, 760)
     viewer.key("r", "f")
     here = session.view()
@@ -420,6 +440,35 @@ def check_drop(session, display, folder):
         assert viewer.click(640, 400)["part"] == "tower"
         hand.drop(int(viewer.window), 600, 400, f"{mesh}.stroll")
         assert viewer.event("opened")["parts"] == 2
+        check_build_again(session, hand, mesh)
+        check_cancel(session, hand, folder)
+
+
+def check_build_again(session, hand, mesh):
+    """A file that the mesh names is another: the container is opened all the same, which is said, and can be built again."""
+    viewer = session.viewer
+    mesh.with_suffix(".mtl").unlink()
+    hand.drop(int(viewer.window), 600, 400, mesh)
+    assert viewer.event("opened")["parts"] == 2
+    assert "build again" in viewer.event("said")["text"]
+    viewer.rest()
+    viewer.point(66, 82)
+    viewer.tool("click", "1")
+    viewer.event("opened")
+    text = viewer.event("said")["text"]
+    assert "warning" in text and "dropped tower.mtl" in text, text
+
+
+def check_cancel(session, hand, folder):
+    """Esc ends a build, and not the window."""
+    viewer, mesh = session.viewer, folder / "large.ply"
+    subprocess.run([session.stroll, "scene", "isosurface", "--triangles", "2M", "-o", mesh, "--quiet"], check=True)
+    hand.drop(int(viewer.window), 600, 400, mesh)
+    time.sleep(0.3)
+    viewer.key("Escape")
+    assert viewer.event("said")["text"] == "cancelled"
+    viewer.rest()
+    assert not mesh.with_name(mesh.name + ".stroll").exists()
 
 
 def check_memory(stroll, display, container, folder):
@@ -434,6 +483,35 @@ def check_memory(stroll, display, container, folder):
         viewer.quit()
     finally:
         viewer.end()
+
+
+def count_bookmarks(display):
+    text = (pathlib.Path(display.environment["XDG_CONFIG_HOME"]) / "stroll/viewer.json").read_text()
+    return sum(len(some) for some in json.loads(text)["bookmarks"].values())
+
+
+def check_two_windows(stroll, display, container, folder):
+    """Of the same model: what one has marked the other neither forgets nor brings back."""
+    viewers = []
+    before = count_bookmarks(display)
+    try:
+        for name in ("first", "second"):
+            (folder / name).mkdir(parents=True)
+            viewers.append(Viewer(stroll, display, container, folder / name, size=SIZE))
+            viewers[-1].event("opened")
+            viewers[-1].rest()
+        for step, viewer in enumerate(reversed(viewers)):
+            viewer.tool("windowfocus", "--sync", viewer.window)
+            viewer.key("b")
+            viewer.event("said")
+            assert count_bookmarks(display) == before + step + 1
+        for viewer in viewers:
+            viewer.tool("windowfocus", "--sync", viewer.window)
+            viewer.quit()
+        assert count_bookmarks(display) == before + 2, "a bookmark is lost"
+    finally:
+        for viewer in viewers:
+            viewer.end()
 
 
 def newest_bookmark(display):
@@ -549,7 +627,7 @@ def run_drawing(stroll, display, container, boxes, folder, *options):
     """What another renderer has a part in: picks on what it shows, hidden and marked parts, sections, looks."""
     folder.mkdir()
     viewer = Viewer(stroll, display, container, folder, *options, size=SIZE)
-    session = Session(viewer, display, boxes)
+    session = Session(viewer, display, boxes, stroll)
     try:
         viewer.event("opened")
         viewer.rest()
@@ -565,7 +643,7 @@ def run_drawing(stroll, display, container, boxes, folder, *options):
 def run_session(stroll, display, container, boxes, folder, pictures, *options):
     folder.mkdir()
     viewer = Viewer(stroll, display, container, folder, *options, size=SIZE)
-    session = Session(viewer, display, boxes)
+    session = Session(viewer, display, boxes, stroll)
 
     try:
         opened = viewer.event("opened")
@@ -605,6 +683,7 @@ def main():
         with Display((SIZE[0] + 40, SIZE[1] + 40)) as display:
             run_session(stroll, display, container, boxes, folder / "auto", pictures)
             check_memory(stroll, display, container, folder / "again")
+            check_two_windows(stroll, display, container, folder / "two")
             check_roof(stroll, display, folder / "roof")
             check_replaced(stroll, display, container, folder / "replaced")
             check_scale(stroll, display, container, folder / "scale")

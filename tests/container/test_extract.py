@@ -1,11 +1,15 @@
 #!/usr/bin/env python3
 """stroll info and stroll extract on the committed containers: facts, uniform cuts as PLY, sentences."""
 import json
+import math
 import os
 import struct
 import subprocess
 import sys
 import tempfile
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "readers"))
+import gltf_writer as w  # noqa: E402
 
 STROLL = sys.argv[1]
 GOLDEN = os.path.join(os.environ.get("STRL_TEST_ROOT", "."), "tests/container/golden")
@@ -104,6 +108,23 @@ def what_cannot_be_is_one_sentence(folder):
     assert "cannot open" in run("info", os.path.join(folder, "absent"), status=1)
 
 
+def small_copies_keep_their_vertices(folder):
+    """A lattice that is fine for the world as a mesh is can be too fine for floats where the mesh is placed a thousandth as large."""
+    model = w.Model()
+    points = [(math.sin(a) * math.cos(b), math.sin(a) * math.sin(b), math.cos(a))
+              for i in range(13) for j in range(24) for a, b in [(math.pi * (i + 0.5) / 13, 2 * math.pi * j / 24)]]
+    faces = [24 * i + c for i in range(12) for j in range(24)
+             for c in (j, j + 24, (j + 1) % 24, (j + 1) % 24, j + 24, (j + 1) % 24 + 24)]
+    mesh = model.mesh({"attributes": {"POSITION": model.accessor(points, w.FLOAT)}, "indices": model.accessor(faces, w.U32)})
+    model.scene(*[model.node(mesh=mesh, translation=[k / 8, 0, 0], scale=[1e-3] * 3) for k in range(24)])
+    glb, built, out = (os.path.join(folder, name) for name in ("small.glb", "small.stroll", "small.ply"))
+    model.glb(glb)
+    run("build", glb, "-o", built, "--quiet")
+    assert json.loads(run("info", built, "--json"))["placements"] == 24
+    run("extract", built, "--error", "0", "-o", out)
+    assert read_ply(out)[2].startswith("<dddfff"), read_ply(out)[2]
+
+
 def a_full_disk_leaves_no_file(folder):
     """The file size limit stands for the disk: the write fails with EFBIG."""
     out = os.path.join(folder, "cut.ply")
@@ -115,7 +136,7 @@ def a_full_disk_leaves_no_file(folder):
 
 info_states_what_was_committed()
 for test in (a_cut_at_zero_is_all_leaves_and_a_wide_one_the_root, equal_cuts_are_equal_bytes,
-             what_cannot_be_is_one_sentence, a_full_disk_leaves_no_file):
+             what_cannot_be_is_one_sentence, small_copies_keep_their_vertices, a_full_disk_leaves_no_file):
     with tempfile.TemporaryDirectory() as scratch:
         test(scratch)
         print(test.__name__, "ok")

@@ -121,6 +121,10 @@ class Viewer:
             return None
         return self.wait_for(find, f"event {kind} {facts}")
 
+    def event_before(self, kind):
+        """The newest event of the kind."""
+        return next(event for event in reversed(self.events()) if event["event"] == kind)
+
     def rest(self):
         """Waits until nothing moves and everything has arrived."""
         return self.event("rest")

@@ -42,14 +42,16 @@ static void write_balls(const char *path)
     fclose(file);
 }
 
-static void build(const char *input, const char *output)
+typedef strl_status build_fn(const strl_build_desc *desc, strl_build_result *result, strl_error *err);
+
+static strl_build_result build(build_fn *build_as, const char *input, const char *output)
 {
     strl_build_result result;
     strl_error err = {0};
     const strl_build_desc desc = {.inputs = &input, .input_count = 1, .output = output, .memory_bytes = 256 << 20};
-    if (strl_build_clusters(&desc, &result, &err) != STRL_OK)
+    if (build_as(&desc, &result, &err) != STRL_OK)
         fail_msg("%s", err.message);
-    assert_int_equal(result.parts, BALLS);
+    return result;
 }
 
 static int ball_of(strl_container *container, uint32_t part)
@@ -103,16 +105,25 @@ static void check_labels(strl_container *container, const strl_draw_list *list, 
     }
 }
 
+static strl_part_index *make_index(const char *path, uint32_t part_count)
+{
+    strl_part_index *index = NULL;
+    double share, before = 0;
+    const strl_location location = {.name = path};
+    assert_int_equal(strl_part_index_create(&location, part_count, &index, NULL), STRL_OK);
+    while (!strl_part_index_is_done(index, &share)) {
+        assert_true(share >= before && share <= 1); /* it does not begin anew */
+        before = share;
+        strl_sleep_ns(100000);
+    }
+    assert_int_equal(strl_part_index_status(index, NULL), STRL_OK);
+    return index;
+}
+
 /* Each ball is where it was written, though most have vanished from what is drawn from afar. */
 static void check_index(strl_container *container, const char *path)
 {
-    strl_part_index *index = NULL;
-    double share;
-    const strl_location location = {.name = path};
-    assert_int_equal(strl_part_index_create(&location, BALLS, &index, NULL), STRL_OK);
-    while (!strl_part_index_is_done(index, &share))
-        strl_sleep_ns(1000000);
-    assert_int_equal(strl_part_index_status(index, NULL), STRL_OK);
+    strl_part_index *index = make_index(path, BALLS);
     for (uint32_t part = 0; part < BALLS; part++) {
         double bounds[6] = {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY};
         assert_true(strl_part_index_widen(index, part, bounds));
@@ -123,6 +134,7 @@ static void check_index(strl_container *container, const char *path)
     double bounds[6];
     assert_false(strl_part_index_widen(index, BALLS, bounds));
     strl_part_index_destroy(index);
+    const strl_location location = {.name = path};
     assert_int_equal(strl_part_index_create(&location, BALLS, &index, NULL), STRL_OK); /* gone before it has ended */
     strl_part_index_destroy(index);
 }
@@ -135,7 +147,7 @@ static void vertices_know_their_part_at_every_level(void **state)
     snprintf(input, sizeof input, "%s", strl_test_path("balls.obj"));
     snprintf(output, sizeof output, "%s", strl_test_path("balls.stroll"));
     write_balls(input);
-    build(input, output);
+    assert_int_equal(build(strl_build_clusters, input, output).parts, BALLS);
     strl_container *container = NULL;
     strl_source *source = NULL;
     strl_walk *walk = NULL;
@@ -164,8 +176,106 @@ static void vertices_know_their_part_at_every_level(void **state)
     strl_path_remove(output, NULL);
 }
 
+/* Every triangle of theirs is in one node, most of them in none without children. */
+static void parts_of_sample_trees_are_found(void **state)
+{
+    (void)state;
+    char input[600], output[600];
+    strl_container *container = NULL;
+    snprintf(input, sizeof input, "%s", strl_test_path("balls.obj"));
+    snprintf(output, sizeof output, "%s", strl_test_path("balls.stroll"));
+    write_balls(input);
+    assert_int_equal(build(strl_build_samples, input, output).parts, BALLS);
+    assert_int_equal(strl_container_open_path(output, &container, NULL), STRL_OK);
+    check_index(container, output);
+    strl_container_close(container);
+    strl_path_remove(input, NULL);
+    strl_path_remove(output, NULL);
+}
+
+/* ---- copies */
+
+#define COPIES 24
+
+/* One ball, of which each node of a row is a copy. */
+static void write_copies(const char *gltf, const char *bin, const char *bin_name)
+{
+    FILE *file = fopen(bin, "wb");
+    assert_non_null(file);
+    for (int r = 0; r <= RINGS; r++)
+        for (int s = 0; s < RINGS; s++) {
+            double t = M_PI * r / RINGS, a = 2 * M_PI * s / RINGS;
+            const float point[3] = {(float)(sin(t) * cos(a)), (float)(sin(t) * sin(a)), (float)cos(t)};
+            assert_int_equal(fwrite(point, sizeof point, 1, file), 1);
+        }
+    for (int r = 0; r < RINGS; r++)
+        for (int s = 0; s < RINGS; s++) {
+            uint16_t i = (uint16_t)(r * RINGS + s), j = (uint16_t)(r * RINGS + (s + 1) % RINGS);
+            const uint16_t faces[6] = {i, (uint16_t)(i + RINGS), j, j, (uint16_t)(i + RINGS), (uint16_t)(j + RINGS)};
+            assert_int_equal(fwrite(faces, sizeof faces, 1, file), 1);
+        }
+    fclose(file);
+    int points = (RINGS + 1) * RINGS, corners = RINGS * RINGS * 6;
+    file = fopen(gltf, "w");
+    assert_non_null(file);
+    fprintf(
+        file,
+        "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"uri\":\"%s\",\"byteLength\":%d}],\"bufferViews\":["
+        "{\"buffer\":0,\"byteLength\":%d},{\"buffer\":0,\"byteOffset\":%d,\"byteLength\":%d}],\"accessors\":["
+        "{\"bufferView\":0,\"componentType\":5126,\"count\":%d,\"type\":\"VEC3\",\"min\":[-1,-1,-1],\"max\":[1,1,1]},"
+        "{\"bufferView\":1,\"componentType\":5123,\"count\":%d,\"type\":\"SCALAR\"}],\"meshes\":[{\"name\":\"ball\","
+        "\"primitives\":[{\"attributes\":{\"POSITION\":0},\"indices\":1}]}],\"scenes\":[{\"nodes\":[0]}],\"nodes\":["
+        "{\"name\":\"row\",\"children\":[1",
+        bin_name, points * 12 + corners * 2, points * 12, points * 12, corners * 2, points, corners);
+    for (int c = 2; c <= COPIES; c++)
+        fprintf(file, ",%d", c);
+    fprintf(file, "]}");
+    for (int c = 0; c < COPIES; c++)
+        fprintf(file, ",{\"name\":\"ball %d\",\"mesh\":0,\"translation\":[%g,0,0]}", c, c * SPACING);
+    fprintf(file, "]}\n");
+    fclose(file);
+}
+
+/* Each copy is a part with a box of its own. */
+static void copies_are_found_one_by_one(void **state)
+{
+    (void)state;
+    char input[600], bin[600], output[600];
+    snprintf(input, sizeof input, "%s", strl_test_path("copies.gltf"));
+    snprintf(bin, sizeof bin, "%s", strl_test_path("copies.bin"));
+    snprintf(output, sizeof output, "%s", strl_test_path("copies.stroll"));
+    write_copies(input, bin, "copies.bin");
+    strl_build_result result = build(strl_build_clusters, input, output);
+    assert_true(result.trees == 1 && result.placements == COPIES && result.parts == COPIES + 1);
+    strl_container *container = NULL;
+    assert_int_equal(strl_container_open_path(output, &container, NULL), STRL_OK);
+    strl_part_index *index = make_index(output, result.parts);
+    uint32_t found = 0;
+    for (uint32_t part = 0; part < result.parts; part++) {
+        char name[64];
+        int copy = -1;
+        double bounds[6] = {INFINITY, INFINITY, INFINITY, -INFINITY, -INFINITY, -INFINITY};
+        assert_int_equal(strl_container_part(container, part, name, sizeof name, NULL), STRL_OK);
+        bool is_copy = sscanf(name, "row/ball %d", &copy) == 1;
+        found += is_copy;
+        assert_true(strl_part_index_widen(index, part, bounds));
+        double low = is_copy ? copy * SPACING : 0, high = is_copy ? low : (COPIES - 1) * SPACING;
+        assert_true(fabs(bounds[0] - low + 1) < 1e-3 && fabs(bounds[3] - high - 1) < 1e-3);
+    }
+    assert_int_equal(found, COPIES);
+    strl_part_index_destroy(index);
+    strl_container_close(container);
+    strl_path_remove(input, NULL);
+    strl_path_remove(bin, NULL);
+    strl_path_remove(output, NULL);
+}
+
 int main(void)
 {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(vertices_know_their_part_at_every_level)};
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(vertices_know_their_part_at_every_level),
+        cmocka_unit_test(parts_of_sample_trees_are_found),
+        cmocka_unit_test(copies_are_found_one_by_one),
+    };
     return cmocka_run_group_tests(tests, strl_test_folder_make, strl_test_folder_remove);
 }

@@ -139,6 +139,43 @@ static void styles_follow_what_is_hidden_and_selected(void **state)
     strl_parts_deinit(&parts);
 }
 
+/* Of any places, not of a range alone. */
+static void what_is_found_is_selected_hidden_and_left_alone(void **state)
+{
+    (void)state;
+    strl_parts parts = make();
+    strl_part_tree_search(&parts.tree, "so"); /* two of one name */
+    assert_int_equal(strl_part_tree_found_in(&parts.tree, 0, PART_COUNT), 2);
+    strl_part_tree_search(&parts.tree, "O");
+    uint32_t found = strl_part_tree_found_in(&parts.tree, 0, PART_COUNT), told = 0;
+    for (uint32_t part = 0; part < PART_COUNT; part++)
+        told += strchr(names[part], 'o') || strchr(names[part], 'O');
+    assert_int_equal(found, told);
+    strl_parts_select_found(&parts);
+    assert_int_equal(parts.selected_count, found);
+    assert_int_equal(strl_parts_first_selected(&parts), parts.tree.places[6]); /* House */
+    for (uint32_t part = 0; part < PART_COUNT; part++)
+        assert_int_equal(parts.styles[part], strchr(names[part], 'o') ? STRL_PART_MARKED : STRL_PART_PLAIN);
+    const strl_part_node wall = parts.tree.nodes[find_node(&parts.tree, "wall", 1)];
+    assert_int_equal(strl_parts_selected_in(&parts, wall.first_part, wall.part_count), wall.part_count);
+    strl_parts_hide_selected(&parts, true);
+    assert_int_equal(parts.hidden_count, found);
+    assert_int_equal(strl_parts_hidden_in(&parts, wall.first_part, wall.part_count), wall.part_count);
+    strl_parts_hide_selected(&parts, false);
+    strl_parts_isolate_selected(&parts);
+    assert_int_equal(parts.hidden_count, PART_COUNT - found);
+    assert_int_equal(parts.styles[2], STRL_PART_HIDDEN);
+    strl_parts_isolate_selected(&parts);
+    assert_int_equal(parts.hidden_count, 0);
+    strl_part_tree_search(&parts.tree, "");
+    strl_parts_select_found(&parts);
+    assert_int_equal(parts.selected_count, 0);
+    strl_parts_isolate_selected(&parts); /* nothing is meant: nothing happens */
+    assert_int_equal(parts.hidden_count, 0);
+    assert_int_equal(strl_parts_first_selected(&parts), UINT32_MAX);
+    strl_parts_deinit(&parts);
+}
+
 static strl_status refuse_fifth(void *context, uint32_t part, char *name, size_t size, strl_error *err)
 {
     (void)context;
@@ -153,7 +190,7 @@ static void a_failure_leaves_nothing(void **state)
     strl_error err = {0};
     assert_int_equal(strl_parts_init(&parts, PART_COUNT, refuse_fifth, NULL, &err), STRL_ERR_FORMAT);
     assert_string_equal(err.message, "no fifth name");
-    for (uint64_t n = 1; n < 40; n++) {
+    for (uint64_t n = 1; n < 60; n++) {
         strl__alloc_fail_after(n);
         strl_status status = strl_parts_init(&parts, PART_COUNT, name_part, (void *)names, &err);
         strl__alloc_fail_after(0);
@@ -163,7 +200,7 @@ static void a_failure_leaves_nothing(void **state)
         }
         assert_int_equal(status, STRL_ERR_MEMORY);
     }
-    fail_msg("a tree of ten parts allocates forty times");
+    fail_msg("a tree of ten parts allocates sixty times");
 }
 
 static strl_status name_many(void *context, uint32_t part, char *name, size_t size, strl_error *err)
@@ -206,7 +243,7 @@ static strl_status name_deep(void *context, uint32_t part, char *name, size_t si
 static void names_and_nodes_keep_to_their_bytes(void **state)
 {
     (void)state;
-    enum { MANY = 10000, BYTES = 4 << 20, LEAST = 60 };
+    enum { MANY = 10000, BYTES = 4 << 20, LEAST = 64 };
     strl_part_tree tree;
     assert_int_equal(strl_part_tree_init(&tree, MANY, BYTES, name_deep, NULL, NULL), STRL_OK);
     assert_true(tree.text_bytes + tree.node_count * sizeof *tree.nodes <= BYTES + (size_t)LEAST * MANY);
@@ -230,6 +267,7 @@ int main(void)
         cmocka_unit_test(every_part_is_below_the_steps_of_its_path),
         cmocka_unit_test(rows_are_what_is_open_or_found),
         cmocka_unit_test(styles_follow_what_is_hidden_and_selected),
+        cmocka_unit_test(what_is_found_is_selected_hidden_and_left_alone),
         cmocka_unit_test(a_failure_leaves_nothing),
         cmocka_unit_test(many_parts_stay_quick),
         cmocka_unit_test(names_and_nodes_keep_to_their_bytes),

@@ -111,6 +111,35 @@ static void what_another_window_wrote_is_kept(void **state)
     strl_path_remove(path, NULL);
 }
 
+/* A letter of several bytes is there as a whole or not at all: what is no UTF-8 could not be written. */
+static void long_names_are_cut_between_letters(void **state)
+{
+    (void)state;
+    static strl_bookmarks bookmarks, found;
+    char name[STRL_BOOKMARK_NAME + 8] = "";
+    strl_navigator navigator;
+    strl_navigator_init(&navigator, bounds, 2, 1);
+    memset(name, 'x', STRL_BOOKMARK_NAME - 2);
+    strcpy(name + STRL_BOOKMARK_NAME - 2, "\xc3\xa4"); /* its second byte does not fit */
+    assert_true(strl_bookmarks_add(&bookmarks, name, &navigator));
+    assert_true(strl_bookmarks_add(&bookmarks, "br\xfc", &navigator));
+    json_t *array = json_pack("[{s:s,s:[f,f,f],s:f,s:f,s:f}]", "name", name, "eye", 1.0, 2.0, 3.0, "yaw", 0.0, "pitch",
+                              0.0, "distance", 1.0);
+    strl_bookmarks_read(&found, array);
+    json_decref(array);
+    assert_int_equal(found.count, 1);
+    assert_int_equal(strlen(found.items[0].name), STRL_BOOKMARK_NAME - 2);
+    array = strl_bookmarks_write(&bookmarks);
+    strl_bookmarks_read(&found, array);
+    json_decref(array);
+    assert_int_equal(found.count, 2);
+    assert_int_equal(strlen(found.items[0].name), STRL_BOOKMARK_NAME - 2);
+    assert_string_equal(found.items[1].name, "br?");
+    assert_int_equal(strl_bookmarks_find(&bookmarks, &bookmarks.items[1]), 1);
+    bookmarks.items[1].pose.yaw += 1;
+    assert_int_equal(strl_bookmarks_find(&found, &bookmarks.items[1]), 2);
+}
+
 static void what_is_not_understood_stays(void **state)
 {
     (void)state;
@@ -259,6 +288,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(settings_and_bookmarks_come_back),
         cmocka_unit_test(what_another_window_wrote_is_kept),
+        cmocka_unit_test(long_names_are_cut_between_letters),
         cmocka_unit_test(what_is_not_understood_stays),
         cmocka_unit_test(a_broken_file_is_told_and_not_overwritten),
         cmocka_unit_test(folders_are_made_and_nothing_is_written_without_a_name),
