@@ -29,8 +29,6 @@ FAULT_FPS = 10
 MOVING, BEGIN, LASTING = 0.2, 0.04, 0.15
 OPENED_REQUESTS = 5  # the walk has begun to refine
 
-CROWD_FPS = 2  # so that 200 walks leave a processor or two some time
-CROWD_LEAST_FRAMES = 8
 CROWD_CONNECTIONS = 8  # a walk has six
 
 
@@ -135,14 +133,14 @@ def part_remote(bench, model):
 
 
 # ---- faults
-def write_arc(bench, path, container, frames, moving):
-    """A quarter of a turn at 1.5 radii in so much of the time, then standing still."""
+def write_arc(bench, path, container, frames):
+    """A quarter of a turn at 1.5 radii, then standing still."""
     bounds = bench.program("info", container, "--json").json()["bounds"]
     low, high = bounds[:3], bounds[3:]
     centre, radius = [(a + b) / 2 for a, b in zip(low, high)], math.dist(low, high) / 2
     places = []
     for frame in range(frames):
-        angle = math.pi / 2 * min(1, frame / (moving * frames) if moving else 1)
+        angle = math.pi / 2 * min(1, frame / (MOVING * frames))
         eye = [centre[0] + 1.5 * radius * math.cos(angle), centre[1] + 1.5 * radius * math.sin(angle), centre[2] + 0.4 * radius]
         places.append({"eye": eye, "target": centre, "up": [0, 0, 1]})
     path.write_text(json.dumps({"fov_y_deg": 60, "frames": places}), encoding="utf-8")
@@ -208,7 +206,7 @@ def faults_of(bench, model, structure):
     container = container_of(bench, model, structure)
     other = container_of(bench, model, next(name for name in STRUCTURES if name != structure))
     frames, images, path = bench.options.frames * WALK_FRAMES_A_FRAME, bench.scratch / "remote_images", bench.scratch / "remote_path.json"
-    write_arc(bench, path, container, frames, MOVING)
+    write_arc(bench, path, container, frames)
     options, seconds = ("--size", small(bench.options.size), "--path", path, "-o", images), frames / FAULT_FPS
     rows = []
     for fault in FAULTS:
@@ -252,30 +250,31 @@ def replayed(bench, container):
         ranges = asked_by_a_walk(bench, site, site.put(container, "model.stroll"))
     with Site(bench, "remote") as site:  # whose memory nobody has used yet
         site.put(container, "model.stroll")
-        figures = crowd.replay(site.serve.port, "/model.stroll", ranges, container.read_bytes(), bench.options.clients)
+        with serving.on_processors(serving.of_walks()):
+            figures = crowd.replay(site.serve.port, "/model.stroll", ranges, container.read_bytes(), bench.options.clients)
         return {**figures, "peak_bytes": site.serve.peak_bytes()}
 
 
-def walking(bench, container):
-    count, path = bench.options.clients, bench.scratch / "remote_path.json"
-    write_arc(bench, path, container, max(CROWD_LEAST_FRAMES, bench.options.frames), 0)
+def programs(bench, container):
+    count = bench.options.clients
     with Site(bench, "remote") as site:
         site.put(container, "model.stroll")
         site.serve.kill()  # all programs have one address: its limits are those of one
         site.serve.start("--rate", 0, "--connections", CROWD_CONNECTIONS * count)
         command = [bench.stroll, "render", f"http://127.0.0.1:{site.serve.port}/model.stroll", "--no-cache", "--size",
-                   small(bench.options.size), "--path", path, "--realtime", CROWD_FPS, "--backend", "null", "--quiet", "--stats"]
-        figures = crowd.programs(command, bench.scratch / "remote_crowd", count)
+                   small(bench.options.size), "--path", "orbit", "--frames", 1, "--backend", "null", "--quiet", "--stats"]
+        with serving.on_processors(serving.of_walks()):
+            figures = crowd.programs(command, bench.scratch / "remote_crowd", count)
         return {**figures, **site.serve.logged(), "peak_bytes": site.serve.peak_bytes()}
 
 
 def part_remote_clients(bench, model):
-    settings = {"clients": bench.options.clients, "frames": bench.options.frames, "size": bench.options.size}
+    settings = {"clients": bench.options.clients, "size": bench.options.size}
     if bench.kept("remote_clients", model, settings):
         return
     bench.log.add("remote_clients", model, settings,
                   **{structure: {"replayed": replayed(bench, container_of(bench, model, structure)),
-                                 "programs": walking(bench, container_of(bench, model, structure))} for structure in STRUCTURES})
+                                 "programs": programs(bench, container_of(bench, model, structure))} for structure in STRUCTURES})
 
 
 PARTS = {"remote": (part_remote, ("isosurface_1m",)), "remote_faults": (part_remote_faults, ("isosurface_1m",)),

@@ -17,6 +17,11 @@ def processors():
     return (len(every) - 1, {every[-1]}) if len(every) > 1 else (None, set(every))
 
 
+def of_walks():
+    every = sorted(os.sched_getaffinity(0))
+    return set(every[:-1] or every)
+
+
 @contextlib.contextmanager
 def on_processors(chosen):
     """This thread, and those that it starts meanwhile."""

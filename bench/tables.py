@@ -307,7 +307,7 @@ def fault_rows(records):
                        number(row["healed_s"], 1) if row["healed"] else "not", number(row["same"]), row["said"] or "nothing")
 
 
-CLIENT_WORDS = {"replayed": "a walk's requests, one connection each", "programs": "a walk, `stroll render --realtime`"}
+CLIENT_WORDS = {"replayed": "a walk's requests, one connection each", "programs": "`stroll render`, settled"}
 
 
 def client_rows(records):
