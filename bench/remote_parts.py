@@ -24,7 +24,7 @@ FINAL_FRAMES = 3
 
 FAULTS = ("none", "killed", "500", "cut", "stall", "wrong", "swapped")
 FAULT_LINK = (5, 80)
-FAULT_FPS = 10
+FAULT_FPS, FAULT_FRAMES_A_FRAME = 4, 2  # half a minute at a rate that software keeps
 # Of the walk's time: the camera moves, the fault begins after so much of it and lasts so long.
 MOVING, BEGIN, LASTING = 0.2, 0.04, 0.15
 OPENED_REQUESTS = 5  # the walk has begun to refine
@@ -198,14 +198,15 @@ def fault_figures(lines, start, accident, covered):
 
 
 def small(size):
-    """A quarter as wide and high: a picture in each tenth of a second, in software too."""
+    """A quarter as wide and high: a few pictures a second, in software too."""
     return "x".join(str(max(16, int(word) // 4)) for word in size.split("x"))
 
 
 def faults_of(bench, model, structure):
     container = container_of(bench, model, structure)
     other = container_of(bench, model, next(name for name in STRUCTURES if name != structure))
-    frames, images, path = bench.options.frames * WALK_FRAMES_A_FRAME, bench.scratch / "remote_images", bench.scratch / "remote_path.json"
+    frames = bench.options.frames * FAULT_FRAMES_A_FRAME
+    images, path = bench.scratch / "remote_images", bench.scratch / "remote_path.json"
     write_arc(bench, path, container, frames)
     options, seconds = ("--size", small(bench.options.size), "--path", path, "-o", images), frames / FAULT_FPS
     rows = []
@@ -231,7 +232,7 @@ def faults_of(bench, model, structure):
 
 
 def part_remote_faults(bench, model):
-    settings = {"frames": bench.options.frames * WALK_FRAMES_A_FRAME, "size": small(bench.options.size), "link": list(FAULT_LINK)}
+    settings = {"frames": bench.options.frames * FAULT_FRAMES_A_FRAME, "size": small(bench.options.size), "link": list(FAULT_LINK)}
     if bench.kept("remote_faults", model, settings):
         return
     bench.log.add("remote_faults", model, settings, **{structure: faults_of(bench, model, structure) for structure in STRUCTURES})
