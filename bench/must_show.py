@@ -28,8 +28,14 @@ replaces each part's own models. Parts:
     kills         a build killed at random moments and resumed, until --kills of them            (isosurface_10m)
     cap           a build under the system's own limit, which ends a program that passes it   (isosurface_10m, plant_1m)
     walk_cold     a walk under --memory 600M, the file cold and warm                   (isosurface_10m, isosurface_372m)
+    sampled       builds of sample trees: rate, memory, bytes over Morton order           (isosurface, scans, boxes, chessboard, landscape)
+    chessboard    time of a frame against size, splats of 1, 4 and 8 pixels                          (chessboards of 80 K to 320 M)
+    large         walks through a landscape of 400 M, one of 2 G placed, and 10,000 scans       (names: MODEL samples, MODEL clusters)
     theorem       sample trees: how many fronts' cells show none of their visible triangles  (chessboard, isosurface, scans, landscape)
     splats        sample trees with splats of 1, 3 and 5 pixels against the input as read        (landscape_2m_obj, dragon_scans)
+    remote        walks over six links against the file: first and final image, missing nodes, frame times    (isosurface_1m)
+    remote_faults   a server that is killed, fails, truncates, stalls, sends wrong bytes, gets another file     (isosurface_1m)
+    remote_clients  --clients of stroll serve at once                                                         (isosurface_1m)
 
 The largest scene takes 9 GB of --scratch, its build 30 GB more. Parts scale, shapes and walk_cold delete the scenes that
 they have made (--keep leaves them).
@@ -50,6 +56,7 @@ import counts
 import file_parts
 import measure
 import promise_parts
+import remote_parts
 import sample_parts
 import scale_parts
 import scene_parts
@@ -386,7 +393,7 @@ PARTS = {"build": (part_build, MODELS), "images": (part_images, MODELS), "psnr":
          "sizes": (part_sizes, ("isosurface_1m", "isosurface_10m", "dragon_scans", "terrain_n49e011", "iso_cthead", "boxes_1m")),
          "dependencies": (part_dependencies, ("isosurface_10m",)),
          "walk": (part_walk, (("isosurface_1m", "isosurface_10m"),)), "roots": (part_roots, ("",)), **scale_parts.PARTS,
-         **promise_parts.PARTS, **file_parts.PARTS, **scene_parts.PARTS, **sample_parts.PARTS}
+         **promise_parts.PARTS, **file_parts.PARTS, **scene_parts.PARTS, **sample_parts.PARTS, **remote_parts.PARTS}
 
 
 def models_of(part, chosen):
@@ -438,9 +445,10 @@ def parse_options():
     parser.add_argument("--size", default="1280x720", help="of images (1280x720)")
     parser.add_argument("--pairs", type=int, default=5, help="of builds in part rate (5)")
     parser.add_argument("--runs", type=int, default=3,
-                        help="builds of each model in parts scale, shapes and claims; one of what is over 20 M triangles (3)")
+                        help="builds of each model in parts scale, shapes and claims, one of what is over 20 M triangles; rounds of part remote (3)")
     parser.add_argument("--kills", type=int, default=50, help="of builds in part kills (50)")
     parser.add_argument("--theorem-pairs", type=int, default=1_000_000, help="of cells and eyes in part theorem (1,000,000)")
+    parser.add_argument("--clients", type=int, default=200, help="at once in part remote_clients (200)")
     parser.add_argument("--again", action="store_true", help="measure what the log has already")
     parser.add_argument("--keep", action="store_true", help="keep the frames, and the scenes that parts delete")
     parser.add_argument("--write-docs", action="store_true", help="put the figures of the log into the tables, the counts and the errors")

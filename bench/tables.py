@@ -344,6 +344,47 @@ def large_rows(records):
                mebibytes(record["bytes"]), number(record["frame_ms"]["median"], 1), number(record["frame_ms"]["p99"], 1),
                number(record["select_ms"]["median"]), *(number(int(record[name]["median"])) for name in ("triangles", "splats", "draws")),
                number(record["requests_a_frame"], 1), number(int(record["missing_nodes"]["p99"])))
+STRUCTURES = ("clusters", "samples")
+FRAME_TIME_LIMIT = 1.1
+
+
+def link_rows(records):
+    for record in records_of(records, "remote"):
+        for structure in STRUCTURES:
+            local = record[structure][0]
+            for row in record[structure]:
+                over = row["frame_ms"]["p99"] / local["frame_ms"]["p99"]
+                yield (f"{record['model']} {structure}", "the file" if row is local else "{:g} Mbit/s, {:g} ms".format(*row["link"]),
+                       least_to_most(row["first_s"], 2), number(row["final_bytes"]["median"] / 2**20, 2), least_to_most(row["final_s"], 2),
+                       number(row["same"]), number(row["walk_frames"], 0), number(row["missing_frames"], 0),
+                       number(row["select_ms"]["median"], 2), number(row["frame_ms"]["median"], 2), number(row["frame_ms"]["p99"], 2),
+                       f"x {number(over)}", "the base" if row is local else number(over <= FRAME_TIME_LIMIT))
+
+
+FAULT_WORDS = {"none": "nothing happens", "killed": "killed, started again", "500": "answers 500", "cut": "truncates", "stall": "stalls",
+               "wrong": "sends wrong bytes", "swapped": "has another file"}
+
+
+def fault_rows(records):
+    for record in records_of(records, "remote_faults"):
+        for structure in STRUCTURES:
+            for row in record[structure]:
+                yield (f"{record['model']} {structure}", FAULT_WORDS[row["fault"]], number(row["lasted_s"], 1), row["frames"],
+                       row["missing_frames"], percent(row["covered_least"], 1), number(row["frame_gap_s"], 2),
+                       number(row["healed_s"], 1) if row["healed"] else "not", number(row["same"]), row["said"] or "nothing")
+
+
+CLIENT_WORDS = {"replayed": "a walk's requests, one connection each", "programs": "`stroll render`, settled"}
+
+
+def client_rows(records):
+    for record in records_of(records, "remote_clients"):
+        for structure in STRUCTURES:
+            for name, words in CLIENT_WORDS.items():
+                row = record[structure][name]
+                yield (f"{record['model']} {structure}", words, row["clients"], row["served"], number(row["seconds"], 1),
+                       number(row["requests"]), row["refused"], mebibytes(row["bytes"]), number(row["request_ms"]["median"], 1),
+                       number(row["request_ms"]["p99"], 1), number(row["request_ms"]["max"], 1), mebibytes(row["peak_bytes"]))
 
 
 def scale_lines(records):
@@ -567,6 +608,15 @@ TABLES = (
     ("splats", "Sample trees with splats, against the input as read",
      ("model", "path", "splat px", "frames", "pixels that differ", "by more than 16 of 255", "PSNR median dB", "least dB",
       "uncovered", "overcovered", "depth within", "triangles a frame", "splats a frame"), splat_rows),
+    ("remote", "Walks over links",
+     ("model", "link", "first image, s", "MiB until the final image", "final image, s", "final image as of the file", "frames of the walk",
+      "with missing nodes", "select_ms, median", "frame_ms, median", "p99", "over the file's", "at most 10 % more"), link_rows),
+    ("remote_faults", "Faults of the server under a walk",
+     ("model", "the server", "for, s", "frames until whole", "with missing nodes", "pixels covered, least, of the final front's",
+      "longest from frame to frame, s", "whole again after, s", "last image as of the file", "said"), fault_rows),
+    ("remote_clients", "Clients of `stroll serve` at once",
+     ("model", "a client is", "clients", "served", "seconds", "requests", "refused", "bytes", "ms of a request, median", "p99", "most",
+      "server's peak memory"), client_rows),
     ("roots", "Roots", ("file", "triangles in", "root triangles", f"at most {MOST_ROOT_TRIANGLES:,}"), root_rows),
 )
 

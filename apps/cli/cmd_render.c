@@ -23,6 +23,7 @@
 typedef struct render_options {
     const char *input, *camera, *path, *save_path, *output, *stats;
     uint64_t frames, seed, supersample, memory_bytes, gpu_memory_bytes;
+    uint64_t begun_ns;
     uint32_t size[2];
     double error_px, splat_px, fps;
     bool full, realtime, depth, wireframe, flat, no_occlusion, frames_given, quiet;
@@ -148,6 +149,7 @@ static strl_status render_frames(const render_options *o, strl_render_model *mod
         uint64_t disk_waits = strl_thread_disk_waits();
         status = model->klass->draw(model, renderer, &camera, &options, &stats, err);
         stats.disk_waits = strl_thread_disk_waits() - disk_waits;
+        stats.elapsed_ns = strl_clock_ns() - o->begun_ns;
         if (status == STRL_OK)
             status = strl_render_output_add(&output, f, renderer, &stats, err);
         strl_cli_coarse_add(&coarse, o->error_px, stats.allowed_error_px, stats.max_error_px);
@@ -304,7 +306,8 @@ static int parse(strl_cli_args *args, render_options *o)
 static int run(strl_cli_args *args)
 {
     render_options o = {.frames = 60, .seed = 1, .supersample = 1, .memory_bytes = 512ull << 20,
-                        .gpu_memory_bytes = 512ull << 20, .size = {1280, 720}, .error_px = 1, .fps = DEFAULT_FPS};
+                        .gpu_memory_bytes = 512ull << 20, .size = {1280, 720}, .error_px = 1, .fps = DEFAULT_FPS,
+                        .begun_ns = strl_clock_ns()};
     strl_cli_progress progress;
     strl_error err = {0};
     bool camera_wrong = false;

@@ -15,6 +15,7 @@
 /* Of one image; what --stats writes. */
 typedef struct strl_image_stats {
     uint64_t frame_ns, select_ns, draw_ns; /* frame: from camera to finished pixels; select: of the last front */
+    uint64_t elapsed_ns;                   /* from the command's begin to finished pixels, opening and images before included */
     uint64_t triangles, bytes_read, resident_bytes, gpu_bytes, uploaded_bytes;
     uint64_t splats;
     uint32_t nodes, nodes_culled, draws, requests, missing_nodes, evictions;

@@ -179,9 +179,10 @@ static int add_network(json_t *line, const strl_network_stats *n)
 static strl_status write_stats(strl_render_output *output, size_t frame, const strl_image_stats *s, strl_error *err)
 {
     /* cull_ms: frustum culling is part of selecting; occlusion will have a stage of its own. */
-    json_t *line = json_pack("{s:I,s:b,s:f,s:f,s:f,s:f}", "frame", (json_int_t)frame, "realtime", output->desc.realtime,
-                             "frame_ms", (double)s->frame_ns * 1e-6, "select_ms", (double)s->select_ns * 1e-6,
-                             "cull_ms", 0.0, "draw_ms", (double)s->draw_ns * 1e-6);
+    json_t *line = json_pack("{s:I,s:b,s:f,s:f,s:f,s:f,s:f}", "frame", (json_int_t)frame, "realtime", output->desc.realtime,
+                             "elapsed_ms", (double)s->elapsed_ns * 1e-6, "frame_ms", (double)s->frame_ns * 1e-6,
+                             "select_ms", (double)s->select_ns * 1e-6, "cull_ms", 0.0, "draw_ms",
+                             (double)s->draw_ns * 1e-6);
     const struct {
         const char *name;
         uint64_t value;

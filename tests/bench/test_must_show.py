@@ -23,6 +23,7 @@ MODELS = ("isosurface_3k", "isosurface_6k")
 ONE_EACH = ("build", "images_orbit", "images_flythrough", "psnr_orbit", "psnr_flythrough", "verify", "backends",
             "rate", "bytes", "sizes", "dependencies", "walk", "scale", "shapes", "cap", "walk_cold", "claims", "decode", "kills",
             "model", "assembly", "sampled", "chessboard", "theorem", "splats")
+REMOTE = ("remote", "remote_faults", "remote_clients")  # run on one model, see test_remote
 
 
 class Test:
@@ -44,14 +45,14 @@ class Test:
     def must_show(self, *words, models=MODELS):
         command = [sys.executable, "-B", ROOT / "bench" / "must_show.py", "--data", self.data, "--stroll", self.program,
                    "--scratch", self.folder / "scratch", "--log", self.log, "--docs", self.docs,
-                   "--counts", self.counts, "--errors", self.errors, "--kills", 2, "--models", ",".join(models), "--frames", 2, "--size", "160x90", "--pairs", 1,
-                   "--runs", 1, "--theorem-pairs", 2000, *words]
+                   "--counts", self.counts, "--errors", self.errors, "--kills", 2, "--clients", 8, "--models", ",".join(models), "--frames", 2,
+                   "--size", "160x90", "--pairs", 1, "--runs", 1, "--theorem-pairs", 2000, *words]
         return subprocess.run([str(word) for word in command], capture_output=True, text=True)
 
     def test_parts(self):
         subprocess.run([self.program, "scene", "plain-plane", "--triangles", "2K", "-o", self.data / "plane.ply",
                         "--quiet"], check=True)
-        parts = list(must_show.PARTS)
+        parts = [part for part in must_show.PARTS if part not in REMOTE]
         result = self.must_show("--write-docs", "--psnr-frames", 1, "--parts", ",".join(parts))
         self.check("every part is measured", result.returncode == 0, result.stderr)
         records = measure.Log(self.log, {}).latest()
@@ -97,6 +98,25 @@ class Test:
                        rows[0]["pairs"] == 2000 and rows[0]["premise"] > 1000 and rows[0]["broken"] == 0 and rows[0]["holds"], rows[0])
             sizes = {(row["path"], row["splat"]) for row in records["splats", model]["rows"]}
             self.check("splats of three sizes are compared on two paths", len(sizes) == 6, sizes)
+    def test_remote(self):
+        """Of a model and a walk that are large enough for the network to be in the way."""
+        model = "isosurface_60k"
+        result = self.must_show("--write-docs", "--parts", ",".join(REMOTE), "--frames", 4, "--size", "640x360", models=(model,))
+        records = measure.Log(self.log, {}).latest()
+        self.check("the parts about addresses are measured", result.returncode == 0, result.stderr)
+        for structure in ("clusters", "samples"):
+            links = records["remote", model][structure]
+            self.check(f"{structure}: images over every link are the file's", [row["same"] for row in links] == [True] * 7, links)
+            by_link = {tuple(row["link"] or ()): row for row in links}
+            self.check(f"{structure}: a link takes its time, and no bytes fail", not any(row["failures"] + row["faults"] for row in links)
+                       and by_link[5, 80]["final_s"]["min"] > 0.24 and by_link[5, 80]["final_bytes"]["min"] > 10**5, by_link[5, 80])
+            faults = {row["fault"]: row for row in records["remote_faults", model][structure]}
+            self.check(f"{structure}: each fault has happened", len(faults) == 7 and all(row["lasted_s"] >= 0 for row in faults.values()) and
+                       faults["none"]["faults"] == 0 and faults["none"]["said"] == "", faults)
+            for name, row in records["remote_clients", model][structure].items():
+                self.check(f"{structure}: all clients are served ({name})", row["served"] == row["clients"] == 8 and
+                           row["refused"] == 0 and row["request_ms"]["count"] == row["requests"] > 8 and row["bytes"] > 8 * 10**5 and
+                           row["peak_bytes"] > 2**20, row)
 
     def test_tables(self):
         text = self.docs.read_text()
@@ -192,7 +212,7 @@ def main():
         return 77
     with tempfile.TemporaryDirectory() as folder:
         test = Test(program, pathlib.Path(folder))
-        for part in (test.test_parts, test.test_samples, test.test_tables, test.test_scale, test.test_origins, test.test_sheet, test.test_png,
+        for part in (test.test_parts, test.test_samples, test.test_remote, test.test_tables, test.test_scale, test.test_origins, test.test_sheet, test.test_png,
                      test.test_resume, test.test_refusals):
             part()
         return 1 if test.failures else 0

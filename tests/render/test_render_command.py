@@ -87,9 +87,12 @@ class Test:
             self.check("the orbit's elevation is 20 degrees", abs(rise - math.sin(math.radians(20))) < 1e-9, rise)
         with open(stats) as file:
             lines = [json.loads(line) for line in file]
-        needed = ("frame frame_ms select_ms cull_ms draw_ms triangles splats nodes nodes_culled draws requests bytes_read "
+        needed = ("frame elapsed_ms frame_ms select_ms cull_ms draw_ms triangles splats nodes nodes_culled draws requests bytes_read "
                   "resident_bytes gpu_bytes covered_pixels max_error_px missing_nodes disk_waits").split()
         self.check("statistics have a line a frame with every field", len(lines) == 4 and all(n in l for l in lines for n in needed), lines)
+        elapsed = [0] + [l["elapsed_ms"] for l in lines]
+        self.check("the time since the begin grows by each frame's", all(now - before >= line["frame_ms"] for before, now, line
+                                                                         in zip(elapsed, elapsed[1:], lines)), lines)
         self.check("all triangles are drawn", all(l["triangles"] == 2 * SIDE * SIDE for l in lines), lines)
         depth = read_pfm(self.root + "/orbit/frame_00000.pfm")
         covered = sum(v < float("inf") for row in depth for v in row)
