@@ -155,9 +155,10 @@ def model_lines(model, curves, image):
 def markdown(records, skipped, images):
     """images: folder of the pictures as the document names it."""
     own = {key: record for key, record in records.items() if key[0].startswith("curve ")}
-    machines = tables.machines_of(own)
-    lines = tables.machine_lines(machines)
-    lines += [f"`bench/curve.py --data DIR`, {tables.origin_of(own, [name for name, _ in own], machines)}", ""]
+    places = tables.places_of(own, [name for name, _ in own])
+    names = tables.machine_names(list(dict.fromkeys(machine for _, machine in places)))
+    lines = tables.machine_lines(names)
+    lines += [f"`bench/curve.py --data DIR`, {tables.origin_text(places, names)}", ""]
     for model in dict.fromkeys(model for _, model in own):
         lines += model_lines(model, curves_of(own, model), f"{images}/curve_{model}.svg")
     lines += [text for model in skipped for text in (f"Skipped, its data was not there: {model}.", "")]

@@ -482,9 +482,13 @@ def machine_names(machines):
     return {machine: f"machine {number}" if len(machines) > 1 else "" for number, machine in enumerate(machines, 1)}
 
 
+def machine_lines(names):
+    return [text for machine, name in names.items() for text in (f"{name.capitalize() or 'Machine'}: {machine}.", "")]
+
+
 def text_of(document):
     names = machine_names(document.machines())
-    lines = [text for machine, name in names.items() for text in (f"{name.capitalize() or 'Machine'}: {machine}.", "")]
+    lines = machine_lines(names)
     for title, table in document.tables.items():
         lines += table_lines(title, table, names)
     return "\n".join(lines + [text for line in document.closing for text in (line, "")]).rstrip() + "\n"
