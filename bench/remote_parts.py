@@ -212,14 +212,15 @@ def faults_of(bench, model, structure):
     rows = []
     for fault in FAULTS:
         with Site(bench, "remote") as site:
+            shutil.rmtree(images, ignore_errors=True)
             if not rows:
                 local, _ = walk_lines(bench, container, site, *options)
                 reference, covered = images_of(images)[-1], [line["covered_pixels"] for line in local]
+                shutil.rmtree(images)
             url = site.put(container, "model.stroll")
             site.shape(FAULT_LINK)
             accident = Accident(site, fault, other, BEGIN * seconds, LASTING * seconds)
             accident.start()
-            shutil.rmtree(images)
             try:
                 lines, start = walk_lines(bench, url, site, "--realtime", FAULT_FPS, *options)
             finally:

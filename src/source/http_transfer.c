@@ -86,6 +86,16 @@ static void spread(strl__http_transfer *transfer, const uint8_t *data, size_t si
     transfer->received += size;
 }
 
+/* A stall is counted from the last bytes that came, not from when somebody looked. */
+static void note_progress(strl__http_transfer *transfer, uint64_t now_ns)
+{
+    uint64_t come = transfer->received + transfer->discarded;
+    if (come - transfer->watched_bytes < STALL_BYTES)
+        return;
+    transfer->watched_ns = now_ns;
+    transfer->watched_bytes = come;
+}
+
 /* Mutex held. */
 static bool take_body(strl__http_transfer *transfer, const uint8_t *data, size_t size)
 {
@@ -95,6 +105,7 @@ static bool take_body(strl__http_transfer *transfer, const uint8_t *data, size_t
         judge(transfer);
     if (transfer->verdict != STRL__HTTP_GOOD) {
         transfer->discarded += size;
+        note_progress(transfer, now_ns);
         return transfer->discarded <= MOST_DISCARDED;
     }
     if (size > asked - transfer->received) {
@@ -110,6 +121,7 @@ static bool take_body(strl__http_transfer *transfer, const uint8_t *data, size_t
     transfer->receiving = true;
     http->stats.bytes += size;
     spread(transfer, data, size);
+    note_progress(transfer, now_ns);
     return true;
 }
 
@@ -213,11 +225,6 @@ bool strl__http_transfer_stalled(strl__http_transfer *transfer, uint64_t now_ns)
     uint64_t come = transfer->received + transfer->discarded;
     if (now_ns < strl__http_transfer_deadline(transfer))
         return false;
-    if (come - transfer->watched_bytes >= STALL_BYTES) {
-        transfer->watched_ns = now_ns;
-        transfer->watched_bytes = come;
-        return false;
-    }
     transfer->verdict = STRL__HTTP_AGAIN;
     strl__fail(&transfer->error, STRL_ERR_NETWORK,
                "the server stalled: %" PRIu64 " bytes came in %" PRIu32 " ms, expected %u at least",

@@ -435,6 +435,22 @@ static void attempts_are_bounded_and_their_failure_says_why(void **state)
     }
 }
 
+/* Counted from when somebody looked, it took up to two times as long. */
+static void a_stall_is_counted_from_the_last_bytes_that_came(void **state)
+{
+    (void)state;
+    const fault_rule stalls = {.stall = true, .after = 50000};
+    const strl_http_desc desc = {.stall_ms = 3000, .attempts = 1};
+    fault_server *server = fault_server_create(&good, by_number, LISTED(well, stalls));
+    strl_source *source = must_open(fault_server_url(server, "/model"), &desc);
+    uint64_t begin_ns = strl_clock_ns();
+    check_read_fails(source, 100000, 100000, "the server stalled");
+    uint64_t took_ns = strl_clock_ns() - begin_ns;
+    assert_true(took_ns >= 3000 * MS && took_ns < 5500 * MS);
+    strl_source_close(source);
+    fault_server_destroy(server);
+}
+
 static void a_server_that_says_when_is_not_asked_before(void **state)
 {
     (void)state;
@@ -936,6 +952,7 @@ int main(void)
         cmocka_unit_test(faults_that_pass_are_tried_again_and_leave_no_trace),
         cmocka_unit_test(an_answer_cut_short_is_continued_not_begun_anew),
         cmocka_unit_test(attempts_are_bounded_and_their_failure_says_why),
+        cmocka_unit_test(a_stall_is_counted_from_the_last_bytes_that_came),
         cmocka_unit_test(a_server_that_says_when_is_not_asked_before),
         cmocka_unit_test(a_server_that_was_killed_and_comes_back_is_read_on),
         cmocka_unit_test(reads_wait_for_a_server_that_restarts_soon),
