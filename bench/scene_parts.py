@@ -11,6 +11,7 @@ SAMPLED = ("isosurface_1m", "isosurface_10m", "dragon_scans", "boxes_1m", "chess
 STRUCTURES = {"samples": SAMPLES, "clusters": ()}
 LARGE = ("landscape_400m samples", "landscape_2g_placed samples", "landscape_2g_placed clusters", "dragon_scans_x10000 samples",
          "dragon_scans_x10000 clusters")
+ROOMY = ("--memory", "4G", "--gpu-memory", "4G")  # the size of the splats decides, not a budget
 COLUMNS = ("frame_ms", "select_ms", "triangles", "splats", "draws", "requests", "missing_nodes")
 
 
@@ -54,7 +55,7 @@ def part_chessboard(bench, models):
         container = bench.container_of(model, *SAMPLES)
         splats = {}
         for splat in SPLATS:
-            frames = frames_of(bench, container, "orbit", "--frames", settings["frames"], "--splat", splat)
+            frames = frames_of(bench, container, "orbit", "--frames", settings["frames"], "--splat", splat, *ROOMY)
             splats[str(splat)] = columns_of(frames[len(frames) // 2:])
         bench.log.add("chessboard", model, settings, splats=splats)
         bench.forget_scenes([model])
