@@ -160,6 +160,16 @@ strl_draw_list walk_frame(strl_walk *walk, const strl_camera *camera)
     return list;
 }
 
+strl_status walk_frame_without_memory(strl_walk *walk, const strl_camera *camera, uint64_t n, strl_draw_list *list)
+{
+    strl__alloc_fail_after(n);
+    strl_status status = strl_walk_frame(walk, camera, list, NULL);
+    strl_walk_pump(walk, 2000000);
+    strl__alloc_fail_after(0);
+    assert_true(status == STRL_OK || status == STRL_ERR_MEMORY);
+    return status;
+}
+
 strl_draw_list settle(strl_walk *walk, const strl_camera *camera, unsigned max_frames)
 {
     for (unsigned i = 0; i < max_frames; i++) {

@@ -43,6 +43,8 @@ strl_walk *open_walk(strl_source *source, const strl_walk_desc *desc);
 /* Frames and pumps until the walk has settled; fails the test where it does not in max_frames. */
 strl_draw_list settle(strl_walk *walk, const strl_camera *camera, unsigned max_frames);
 strl_draw_list walk_frame(strl_walk *walk, const strl_camera *camera);
+/* A frame and what is decoded after it, of which the n-th allocation fails: it gets through, or says that there is no memory. */
+strl_status walk_frame_without_memory(strl_walk *walk, const strl_camera *camera, uint64_t n, strl_draw_list *list);
 
 /* The items of a placement cover the height field without a crack: every edge inside is run as
  * often in one direction as in the other (nodes may meet in an edge of four triangles), each open
