@@ -37,12 +37,13 @@ static const cell *cell_at(const model *m, size_t first, size_t end, const int64
 
 static bool add_cells(model *m, const strl_node *node, const strl_brick_head *head, brick *to)
 {
-    uint32_t splats = strl_brick_splats(head), level = 0;
+    uint32_t levels = node->parent == STRL_NONE ? 1 : head->level_count; /* behind it the first brick has a preview */
+    uint32_t splats = head->splat_end[levels - 1], level = 0;
     if (!strl__grow(&m->cells, &m->cell_capacity, m->cell_count + splats, sizeof *m->cells))
         return false;
-    to->levels = head->level_count;
+    to->levels = levels;
     for (uint32_t i = 0; i <= splats; i++) {
-        while (level < head->level_count && (level == 0 ? 0 : head->splat_end[level - 1]) <= i)
+        while (level < levels && (level == 0 ? 0 : head->splat_end[level - 1]) <= i)
             to->first[level++] = m->cell_count;
         if (i == splats)
             break;
@@ -51,7 +52,7 @@ static bool add_cells(model *m, const strl_node *node, const strl_brick_head *he
         for (int k = 0; k < 3; k++)
             c->at[k] = (node->anchor[k] + head->splat[i].centre[k]) >> c->side;
     }
-    to->first[head->level_count] = m->cell_count;
+    to->first[levels] = m->cell_count;
     return true;
 }
 

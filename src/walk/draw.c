@@ -79,5 +79,5 @@ strl_status strl__draw_list(strl_walk *walk, const strl_view *view, strl_draw_li
     list->count = (uint32_t)walk->front.count;
     list->far_distance = largest > 0 ? largest : 1;
     list->near_distance = fmin(fmax(least, list->far_distance * LEAST_NEAR), list->far_distance / 2);
-    return strl__draw_splats(walk, list, err);
+    return strl__draw_splats(walk, view, list, err);
 }

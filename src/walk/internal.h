@@ -24,6 +24,7 @@
 #define STRL__REQUEST_NODES 32u /* most nodes that one page is read for at a time */
 #define STRL__MAX_REQUESTS 256u
 #define STRL__SPLAT_ROOM 2048u /* bytes that a decoded node may take beside what its record says: splats of an empty brick */
+#define STRL__PREVIEW_ROOM (STRL_BRICK_SPLATS * sizeof(strl_splat)) /* the same of the first node of a tree */
 #define STRL__MOST_POINT_PX 64.0 /* what every GL draws */
 #define STRL__GIVE_UP_FAILURES 3u /* from then on strl_walk_settled does not wait for it; it is still retried */
 
@@ -462,7 +463,7 @@ strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const
                                strl__mesh *mesh, strl_error *err);
 
 /* splats.c: behind the other items of the list. */
-strl_status strl__draw_splats(strl_walk *walk, strl_draw_list *list, strl_error *err);
+strl_status strl__draw_splats(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err);
 
 /* draw.c */
 strl_status strl__draw_list(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err);

@@ -44,7 +44,8 @@ static void make_labels(const strl_pm *pm, strl_vertex_label *labels)
 
 uint64_t strl__node_bytes(const strl_node *record, bool labels)
 {
-    return strl_node_decoded_bytes(record) + (record->rung == STRL_RUNG_SAMPLED ? STRL__SPLAT_ROOM : 0) + (labels ? record->vertex_count * sizeof(strl_vertex_label) : 0);
+    uint64_t splats = record->rung != STRL_RUNG_SAMPLED ? 0 : record->parent == STRL_NONE && record->child_count ? STRL__PREVIEW_ROOM : STRL__SPLAT_ROOM;
+    return strl_node_decoded_bytes(record) + splats + (labels ? record->vertex_count * sizeof(strl_vertex_label) : 0);
 }
 
 static strl_status allocate(const strl_node *record, const strl_pm *pm, bool labels, strl__mesh *mesh, strl_error *err)

@@ -1,51 +1,206 @@
-/* The splats of a frame: of all bricks whose cells are small enough, merged into items of points, one or more a placement, and of
- * placements that are too far away (far.c). */
+/* The splats of a frame: of all bricks whose cells are small enough, merged into items of points, a few for each placement, and of
+ * placements that are too far away (far.c). Where what is below a brick has not arrived, coarser ones close the hole. */
 #include "walk/internal.h"
 
 #include <math.h>
 #include <string.h>
 
-#define SIZES 4u /* of splats, shares of the allowed one: a cell is as a rule half as large as the one above */
+#include "geometry/octahedral.h"
+
+#define SHARES 4u        /* sizes of splats, parts of the allowed one: a cell is as a rule half as large as the one above */
+#define MISSING_SIZES 8u /* of those that close holes: STRL__MOST_POINT_PX and halves of it, two for each */
+#define SIZES (SHARES + MISSING_SIZES)
 #define MOST_POINTS 65535u /* of an item: indices have 16 bits */
+#define SQUARE_OF_CUBE 1.3160741 /* a cube of side 1 covers at most as much as a square of this side */
+#define MOST_PARTS 32.0 /* along a side of a cell that is larger than any point */
 
-typedef struct shown {
-    const strl_splat *splats;
-    uint32_t count;
-} shown;
+/* Points of one placement, counted or made. */
+typedef struct sink {
+    strl_walk *walk;
+    const strl_view *view;
+    const int64_t *origin; /* least corner of the tree's box, which all cells lie near */
+    bool counts;           /* they are counted alone */
+    size_t at[SIZES];      /* how many so far, or where the next goes */
+} sink;
 
-/* Of the state that the brick is drawn in. Of one whose children are wanted and not there yet, none: see missing_splats. */
-static shown shown_splats(const strl__active *active)
+/* ---- points */
+
+/* 0 = all faces are parallel, STRL_SPREAD_MOST = any direction: then their mean is half as long as they are together, all being
+ * turned to one side. */
+static uint16_t spread_of(const strl_splat *splat)
 {
-    const strl__mesh *mesh = &active->node->mesh;
-    if (active->sight.empty || !mesh->splat_end || active->state >= mesh->step_count)
-        return (shown){0};
-    uint32_t first = active->state ? mesh->splat_end[active->state - 1] : 0;
-    return (shown){mesh->splats + first, mesh->splat_end[active->state] - first};
+    uint32_t twice = 2 * (255u - splat->parallel);
+    return (uint16_t)((twice < 255 ? twice : 255) * STRL_SPREAD_MOST / 255);
 }
 
-/* The least size that covers the cells of the brick's splats: 0 = a part of the allowed one, to SIZES - 1 = all of it. Where that is a pixel
- * there is but one. */
-static unsigned size_of(const strl_walk *walk, const strl__active *active)
+static void place_point(const sink *self, const strl_node *record, const int32_t place[3], strl_vertex *point)
+{
+    for (int k = 0; k < 3; k++)
+        point->position[k] = (int32_t)(uint32_t)((uint64_t)record->anchor[k] - (uint64_t)self->origin[k] + (uint64_t)(int64_t)place[k]);
+}
+
+static strl_vertex point_of_splat(const sink *self, const strl_node *record, const strl_splat *splat)
+{
+    strl_vertex point;
+    place_point(self, record, splat->centre, &point);
+    for (int k = 0; k < 2; k++)
+        point.normal[k] = (uint16_t)(splat->normal[k] * 1023u / 255u);
+    point.normal[0] |= (uint16_t)(spread_of(splat) << STRL_SPREAD_SHIFT);
+    for (int k = 0; k < 3; k++)
+        point.rgba[k] = (uint8_t)(splat->rgba >> 8 * k);
+    point.rgba[3] = (uint8_t)((splat->rgba >> 24) * splat->coverage / 255);
+    return point;
+}
+
+static void take_splats(sink *self, const strl_node *record, const strl_splat *splats, uint32_t count, unsigned size)
+{
+    for (uint32_t i = 0; i < count && !self->counts; i++)
+        self->walk->points[self->at[size] + i] = point_of_splat(self, record, &splats[i]);
+    self->at[size] += count;
+}
+
+/* ---- what is there */
+
+/* The least size that covers the cells of the brick's splats: 0 = a part of the allowed one, to SHARES - 1 = all of it. Where that is a
+ * pixel there is but one. */
+static unsigned share_of(const strl_walk *walk, const strl__active *active)
 {
     const strl__mesh *mesh = &active->node->mesh;
     double allowed = walk->stats.allowed_error_px;
     if (!(walk->splat_ratio * allowed > 1))
-        return SIZES - 1;
+        return SHARES - 1;
     double size = (double)mesh->errors[active->state] * active->placed->length_scale;
-    double parts = ceil(SIZES * strl_sight_error_px(&active->sight, size) / allowed);
-    return parts >= SIZES ? SIZES - 1 : parts >= 1 ? (unsigned)parts - 1 : 0;
+    double parts = ceil(SHARES * strl_sight_error_px(&active->sight, size) / allowed);
+    return parts >= SHARES ? SHARES - 1 : parts >= 1 ? (unsigned)parts - 1 : 0;
 }
 
-/* How many splats of each size the front's items [first, end) show. */
-static void count_sizes(const strl_walk *walk, size_t first, size_t end, size_t count[SIZES])
+/* Of the state that the brick is drawn in. */
+static void take_shown(sink *self, const strl__active *active)
 {
-    memset(count, 0, SIZES * sizeof *count);
-    for (size_t i = first; i < end; i++) {
-        uint32_t splats = shown_splats(&walk->front.items[i]).count;
-        if (splats)
-            count[size_of(walk, &walk->front.items[i])] += splats;
+    const strl__mesh *mesh = &active->node->mesh;
+    if (active->state >= mesh->step_count)
+        return;
+    uint32_t first = active->state ? mesh->splat_end[active->state - 1] : 0, end = mesh->splat_end[active->state];
+    if (first < end)
+        take_splats(self, active->node->record, mesh->splats + first, end - first, share_of(self->walk, active));
+}
+
+/* ---- what is not there yet */
+
+typedef struct splat_run {
+    const strl_node *record;
+    const strl_splat *splats;
+    uint32_t count;
+    uint8_t least_side;
+} splat_run;
+
+static splat_run finest_splats(const strl__node *node)
+{
+    const strl__mesh *mesh = &node->mesh;
+    uint32_t states = mesh->splat_end ? mesh->step_count : 0;
+    uint32_t first = states > 1 ? mesh->splat_end[states - 2] : 0, end = states ? mesh->splat_end[states - 1] : 0;
+    splat_run run = {node->record, mesh->splats + first, end - first, UINT8_MAX};
+    for (uint32_t i = 0; i < run.count; i++)
+        run.least_side = run.splats[i].side < run.least_side ? run.splats[i].side : run.least_side;
+    return run;
+}
+
+/* The least size that is not less than px, as far as there is one. */
+static unsigned missing_size(double px)
+{
+    double halves = px > 0 ? 2 * log2(STRL__MOST_POINT_PX / px) : MISSING_SIZES;
+    return SHARES + (halves <= 0 ? 0 : halves < MISSING_SIZES ? (unsigned)halves : MISSING_SIZES - 1);
+}
+
+static bool is_within(const strl_node *record, const strl_node *from, const strl_splat *splat)
+{
+    for (int k = 0; k < 3; k++) {
+        int64_t at = from->anchor[k] + splat->centre[k];
+        if (at < record->box_min[k] || at > record->box_max[k])
+            return false;
+    }
+    return true;
+}
+
+/* What the camera sees of the cell. */
+static strl_sight sight_of(const sink *self, const strl__active *active, const strl_node *record, const strl_splat *splat)
+{
+    int64_t least[3], most[3], half = ((int64_t)1 << splat->side) / 2;
+    for (int k = 0; k < 3; k++) {
+        least[k] = record->anchor[k] + splat->centre[k] - half;
+        most[k] = record->anchor[k] + splat->centre[k] + half;
+    }
+    const strl_box box = strl__world_box(self->walk->trees[active->placed->tree].tree, active->placed, least, most);
+    return strl_view_sight(self->view, &box);
+}
+
+static void cross(const float a[3], const float b[3], float product[3])
+{
+    for (int k = 0; k < 3; k++)
+        product[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+}
+
+/* Two directions in the mean plane of what lies in the cell, at right angles, of length 1. */
+static void find_plane(const strl_splat *splat, float across[3], float up[3])
+{
+    const uint16_t code[2] = {(uint16_t)(splat->normal[0] * STRL_OCT_MAX / 255u), (uint16_t)(splat->normal[1] * STRL_OCT_MAX / 255u)};
+    float normal[3], axis[3] = {0};
+    int least = 0;
+    strl_oct_decode(code, normal);
+    for (int k = 1; k < 3; k++)
+        least = fabsf(normal[k]) < fabsf(normal[least]) ? k : least;
+    axis[least] = 1;
+    cross(normal, axis, across);
+    float length = sqrtf(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]); /* not 0: the axis is far from the normal */
+    for (int k = 0; k < 3; k++)
+        across[k] /= length;
+    cross(normal, across, up);
+}
+
+/* A cell larger than any point is covered by several, in that plane. */
+static void take_plane(sink *self, const strl_node *record, const strl_splat *splat, double px)
+{
+    const int parts = (int)fmin(ceil(px / STRL__MOST_POINT_PX), MOST_PARTS);
+    const double side = ldexp(SQUARE_OF_CUBE, splat->side) / parts;
+    float across[3], up[3];
+    find_plane(splat, across, up);
+    for (int i = 0; i < parts * parts; i++) {
+        strl_splat part = *splat;
+        double x = side * (i % parts + 0.5 - parts / 2.0), y = side * (i / parts + 0.5 - parts / 2.0);
+        for (int k = 0; k < 3; k++)
+            part.centre[k] = (int32_t)fmin(fmax(splat->centre[k] + x * (double)across[k] + y * (double)up[k], INT32_MIN), INT32_MAX);
+        take_splats(self, record, &part, 1, SHARES);
     }
 }
+
+static void take_cell(sink *self, const strl__active *active, const strl_node *record, const strl_splat *splat)
+{
+    const strl_sight sight = sight_of(self, active, record, splat);
+    const double size = ldexp(SQUARE_OF_CUBE, splat->side) * active->placed->length_scale;
+    const double px = self->walk->splat_ratio * strl_sight_error_px(&sight, size);
+    if (!sight.seen)
+        return;
+    if (px > STRL__MOST_POINT_PX)
+        take_plane(self, record, splat, px);
+    else
+        take_splats(self, record, splat, 1, missing_size(px));
+}
+
+/* The finest splats of the brick, or those of the tree's preview that lie in it, where these are finer. */
+static void take_missing(sink *self, const strl__active *active)
+{
+    const strl__node *node = active->node;
+    if (active->state < node->mesh.step_count || active->open || node->record->child_count == 0)
+        return;
+    splat_run own = finest_splats(node), preview = finest_splats(self->walk->trees[active->placed->tree].root);
+    bool is_finer = preview.least_side < own.least_side;
+    splat_run run = is_finer ? preview : own;
+    for (uint32_t i = 0; i < run.count; i++)
+        if (!is_finer || is_within(node->record, run.record, &run.splats[i]))
+            take_cell(self, active, run.record, &run.splats[i]);
+}
+
+/* ---- of a placement */
 
 /* Behind the front's items of the same placement. */
 static size_t end_of_placement(const strl__front *front, size_t first)
@@ -56,85 +211,42 @@ static size_t end_of_placement(const strl__front *front, size_t first)
     return end;
 }
 
-/* What is below has not arrived: the finest splats of the brick close its holes, as large as their cells. */
-static shown missing_splats(const strl__active *active)
+/* The points of the front's items [first, end), which are of one placement. */
+static void take_all(sink *self, size_t first, size_t end)
 {
-    const strl__mesh *mesh = &active->node->mesh;
-    if (active->sight.empty || !mesh->splat_end || active->state < mesh->step_count || active->open ||
-        active->node->record->child_count == 0)
-        return (shown){0};
-    uint32_t first = mesh->step_count > 1 ? mesh->splat_end[mesh->step_count - 2] : 0;
-    return (shown){mesh->splats + first, mesh->splat_end[mesh->step_count - 1] - first};
+    for (size_t i = first; i < end; i++) {
+        const strl__active *active = &self->walk->front.items[i];
+        if (active->sight.empty || !active->node->mesh.splat_end)
+            continue;
+        take_shown(self, active);
+        take_missing(self, active);
+    }
 }
 
-/* 0 = all faces are parallel, STRL_SPREAD_MOST = any direction: then their mean is half as long as they are together, all being
- * turned to one side. */
-static uint16_t spread_of(const strl_splat *splat)
+static sink make_sink(strl_walk *walk, const strl_view *view, size_t first)
 {
-    uint32_t twice = 2 * (255u - splat->parallel);
-    return (uint16_t)((twice < 255 ? twice : 255) * STRL_SPREAD_MOST / 255);
+    const strl_tree *tree = walk->trees[walk->front.items[first].placed->tree].tree;
+    return (sink){.walk = walk, .view = view, .origin = tree->box_min, .counts = true};
 }
 
-/* Relative to the least corner of the tree's box, which all cells lie near. */
-static strl_vertex make_point(const strl_node *record, const strl_splat *splat, const int64_t origin[3])
+static strl_status add_points(strl_walk *walk, const strl_view *view, size_t first, size_t end, strl_error *err)
 {
-    strl_vertex point;
-    for (int k = 0; k < 3; k++)
-        point.position[k] = (int32_t)(uint32_t)((uint64_t)record->anchor[k] - (uint64_t)origin[k] + (uint64_t)(int64_t)splat->centre[k]);
-    for (int k = 0; k < 2; k++)
-        point.normal[k] = (uint16_t)(splat->normal[k] * 1023u / 255u);
-    point.normal[0] |= (uint16_t)(spread_of(splat) << STRL_SPREAD_SHIFT);
-    for (int k = 0; k < 3; k++)
-        point.rgba[k] = (uint8_t)(splat->rgba >> 8 * k);
-    point.rgba[3] = (uint8_t)((splat->rgba >> 24) * splat->coverage / 255);
-    return point;
-}
-
-static void put_points(strl_walk *walk, const strl__active *active, shown added, size_t at)
-{
-    const strl_tree *tree = walk->trees[active->placed->tree].tree;
-    for (uint32_t i = 0; i < added.count; i++)
-        walk->points[at + i] = make_point(active->node->record, &added.splats[i], tree->box_min);
-}
-
-static strl_status make_room(strl_walk *walk, size_t count, strl_error *err)
-{
-    if (!strl__grow(&walk->points, &walk->point_capacity, walk->point_count + count, sizeof *walk->points))
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu splats", walk->point_count + count);
+    sink counted = make_sink(walk, view, first);
+    take_all(&counted, first, end);
+    sink made = counted;
+    size_t all = 0;
+    made.counts = false;
+    for (unsigned k = 0; k < SIZES; all += counted.at[k++])
+        made.at[k] = walk->point_count + all;
+    if (!strl__grow(&walk->points, &walk->point_capacity, walk->point_count + all, sizeof *walk->points))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu splats", walk->point_count + all);
+    if (all)
+        take_all(&made, first, end);
+    walk->point_count += all;
     return STRL_OK;
 }
 
-/* Those of the front's items [first, end), which are of one placement, by size. */
-static strl_status add_shown(strl_walk *walk, size_t first, size_t end, strl_error *err)
-{
-    size_t count[SIZES], at[SIZES], all = 0;
-    count_sizes(walk, first, end, count);
-    for (unsigned k = 0; k < SIZES; all += count[k++])
-        at[k] = walk->point_count + all;
-    strl_status status = make_room(walk, all, err);
-    for (size_t i = first; i < end && !status; i++) {
-        const strl__active *active = &walk->front.items[i];
-        shown splats = shown_splats(active);
-        if (!splats.count)
-            continue;
-        unsigned size = size_of(walk, active);
-        put_points(walk, active, splats, at[size]);
-        at[size] += splats.count;
-    }
-    walk->point_count += status ? 0 : all;
-    return status;
-}
-
-static strl_status add_missing(strl_walk *walk, const strl__active *active, strl_error *err)
-{
-    shown splats = missing_splats(active);
-    strl_status status = make_room(walk, splats.count, err);
-    if (!status) {
-        put_points(walk, active, splats, walk->point_count);
-        walk->point_count += splats.count;
-    }
-    return status;
-}
+/* ---- items */
 
 static bool fill_numbers(strl_walk *walk)
 {
@@ -184,49 +296,39 @@ static strl_draw_item shape_of(const strl_walk *walk, const strl__active *active
     return item;
 }
 
-static double missing_px(const strl_walk *walk, const strl__active *active)
+static double px_of_size(const strl_walk *walk, unsigned size)
 {
-    const strl__mesh *mesh = &active->node->mesh;
-    double size = (double)mesh->errors[mesh->step_count - 1] * active->placed->length_scale;
-    return walk->splat_ratio * strl_sight_error_px(&active->sight, size);
+    if (size >= SHARES)
+        return STRL__MOST_POINT_PX * exp2(-0.5 * (size - SHARES));
+    return walk->splat_ratio * walk->stats.allowed_error_px * (size + 1) / SHARES;
 }
 
-/* Items are made when all points are there: the array has its place only then. Of what has arrived they are as large as their cells, or
- * things would look denser than they are. */
-static strl_status list_splats(strl_walk *walk, strl_draw_list *list, strl_error *err)
+/* Items are made when all points are there: the array has its place only then. */
+static strl_status list_splats(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err)
 {
     const strl__front *front = &walk->front;
     strl_status status = STRL_OK;
     size_t at = 0;
     for (size_t i = 0, next; i < front->count && !status; i = next) {
-        size_t count[SIZES];
         next = end_of_placement(front, i);
-        count_sizes(walk, i, next, count);
-        for (unsigned k = 0; k < SIZES && !status; at += count[k++]) {
-            double px = walk->splat_ratio * walk->stats.allowed_error_px * (k + 1) / SIZES;
-            const strl_draw_item shape = shape_of(walk, &front->items[i], px);
-            status = add_items(walk, &shape, walk->points + at, count[k], list, err);
+        sink counted = make_sink(walk, view, i);
+        take_all(&counted, i, next);
+        for (unsigned k = 0; k < SIZES && !status; at += counted.at[k++]) {
+            const strl_draw_item shape = shape_of(walk, &front->items[i], px_of_size(walk, k));
+            status = add_items(walk, &shape, walk->points + at, counted.at[k], list, err);
         }
-    }
-    for (size_t i = 0; i < front->count && !status; i++) {
-        uint32_t count = missing_splats(&front->items[i]).count;
-        const strl_draw_item shape = shape_of(walk, &front->items[i], count ? missing_px(walk, &front->items[i]) : 0);
-        status = add_items(walk, &shape, walk->points + at, count, list, err);
-        at += count;
     }
     return status;
 }
 
-strl_status strl__draw_splats(strl_walk *walk, strl_draw_list *list, strl_error *err)
+strl_status strl__draw_splats(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err)
 {
     strl_status status = STRL_OK;
     walk->point_count = 0;
     for (size_t i = 0, next; i < walk->front.count && !status; i = next) {
         next = end_of_placement(&walk->front, i);
-        status = add_shown(walk, i, next, err);
+        status = add_points(walk, view, i, next, err);
     }
-    for (size_t i = 0; i < walk->front.count && !status; i++)
-        status = add_missing(walk, &walk->front.items[i], err);
     size_t points = walk->point_count;
     for (unsigned size = 0; size < STRL__FAR_SIZES; size++)
         points += walk->far[size].count;
@@ -234,7 +336,7 @@ strl_status strl__draw_splats(strl_walk *walk, strl_draw_list *list, strl_error 
         return status;
     if (!fill_numbers(walk))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for splats");
-    status = list_splats(walk, list, err);
+    status = list_splats(walk, view, list, err);
     for (unsigned size = 0; size < STRL__FAR_SIZES && !status; size++) {
         const strl_draw_item far = strl__far_item(walk, size);
         status = add_items(walk, &far, walk->far[size].items, walk->far[size].count, list, err);

@@ -427,6 +427,40 @@ static void count_below(const strl_octree *octree, const strl_octant *octant, bo
     }
 }
 
+/* ---- the preview */
+
+/* How many cells a cut through the octree at `depth` has; with content they become those of `level`. */
+static uint32_t cut_cells(const strl_octree *octree, uint32_t index, uint32_t depth, uint32_t level, brick_content *content)
+{
+    const strl_octant *octant = &octree->octant[index];
+    uint32_t count = 0;
+    if (octant->depth < depth)
+        for (uint32_t i = 0; i < octant->child_count; i++)
+            count += cut_cells(octree, octant->child[i], depth, level, content);
+    if (count)
+        return count;
+    if (content) {
+        content->cell[level][content->cell_count[level]++] = index;
+        content->size[level] = fmaxf(content->size[level], size_of(octree, octant));
+    }
+    return 1;
+}
+
+/* The second level of the first brick. Large triangles are in no splat but that of their cell. */
+static strl_status add_preview(const strl_octree *octree, uint32_t root, strl_arena *arena, brick_content *content, strl_error *err)
+{
+    uint32_t count = 0, depth = STRL_PREVIEW_DEPTH + 1;
+    while (depth > octree->octant[root].depth && (count == 0 || count >= STRL_BRICK_SPLATS))
+        count = cut_cells(octree, root, --depth, 0, NULL);
+    if (octree->octant[root].is_leaf || depth <= octree->octant[root].depth)
+        return STRL_OK;
+    content->cell[content->level_count] = strl_arena_alloc(arena, count, sizeof **content->cell);
+    if (!content->cell[content->level_count])
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %u cells", count);
+    cut_cells(octree, root, depth, content->level_count++, content);
+    return STRL_OK;
+}
+
 static strl_status find_content(const strl_octree *octree, const strl_octant *octant, bool is_whole, strl_arena *arena,
                                 brick_content *content, strl_error *err)
 {
@@ -520,6 +554,8 @@ strl_status strl_bricks_add_root(strl_brick_set *set, const strl_octree *octree,
     brick_content content;
     uint32_t brick;
     strl_status status = find_content(octree, &above, false, arena, &content, err);
+    if (!status)
+        status = add_preview(octree, root, arena, &content, err);
     if (!status)
         status = add_brick(set, octree, &content, STRL_NO_BRICK, arena, &brick, err);
     strl_arena_rewind(arena, mark);

@@ -12,6 +12,7 @@
 /* More than these, of one brick, are told by several. */
 #define STRL_BRICK_TRIANGLES 8192u
 #define STRL_NO_BRICK UINT32_MAX
+#define STRL_PREVIEW_DEPTH 5u
 
 typedef struct strl_brick {
     strl_node record;     /* boxes, counts and errors; ids and levels are given when all bricks are known */
@@ -35,7 +36,8 @@ typedef struct strl_brick_set {
  * and parent alone. arena: for temporaries. */
 strl_status strl_bricks_add(strl_brick_set *set, const strl_octree *octree, uint32_t octant, uint32_t parent, strl_arena *arena,
                             strl_error *err);
-/* The first brick of a tree: what its root cell stores. */
+/* The first brick of a tree: what its root cell stores, and the preview: splats of the finest cells down to STRL_PREVIEW_DEPTH of
+ * which a brick has room for all. They close the holes as long as what is below is not there. */
 strl_status strl_bricks_add_root(strl_brick_set *set, const strl_octree *octree, uint32_t octant, strl_arena *arena,
                                  strl_error *err);
 /* Boxes of parents around those of their children; sizes never less than theirs. */

@@ -33,6 +33,7 @@ void strl_chunks_deinit(strl_chunks *chunks)
 {
     for (size_t i = 0; i < chunks->count; i++) {
         strl__free(chunks->chunk[i].item);
+        strl__free(chunks->chunk[i].below);
         strl__free(chunks->chunk[i].run);
     }
     strl__free(chunks->chunk);
@@ -141,6 +142,29 @@ static bool let_rise(const strl_octree *octree, uint32_t *order, uint32_t *count
     return true;
 }
 
+/* What the preview needs: all children of cells above its depth. */
+static strl_status hand_up_below(const strl_octree *octree, strl_octant *above, strl_chunk *chunk, strl_error *err)
+{
+    uint32_t first = chunk->below_count, count = above->depth < STRL_PREVIEW_DEPTH ? above->child_count : 0;
+    size_t capacity = chunk->below_capacity;
+    if (!strl__grow(&chunk->below, &capacity, (size_t)first + count, sizeof *chunk->below))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %u cells", first + count);
+    chunk->below_capacity = (uint32_t)capacity;
+    for (uint32_t i = 0; i < count; i++) {
+        chunk->below[first + i] = octree->octant[above->child[i]];
+        above->child[i] = first + i;
+    }
+    above->child_count = count;
+    chunk->below_count += count;
+    strl_status status = STRL_OK;
+    for (uint32_t i = 0; i < count && !status; i++) {
+        strl_octant child = chunk->below[first + i]; /* the array moves */
+        status = hand_up_below(octree, &child, chunk, err);
+        chunk->below[first + i] = child;
+    }
+    return status;
+}
+
 static strl_status hand_up(const strl_octree *octree, uint32_t root, strl_chunk *chunk, strl_error *err)
 {
     chunk->root = octree->octant[root];
@@ -153,7 +177,7 @@ static strl_status hand_up(const strl_octree *octree, uint32_t root, strl_chunk 
         const strl_sample_item *item = &octree->item[chunk->root.first_item + i];
         chunk->item[i] = rise(octree, item->triangle, item->weight);
     }
-    return STRL_OK;
+    return hand_up_below(octree, &chunk->root, chunk, err);
 }
 
 /* A root that stores too much gets a cell over it that draws no more than it may. */

@@ -25,6 +25,8 @@ typedef struct strl_chunk {
     strl_octant root; /* items: of `item` */
     strl_risen *item; /* owned; what the root stores and has drawn */
     uint32_t item_count;
+    strl_octant *below; /* [below_count] upper cells below the root, each before what is below it, children as places in this array; owned */
+    uint32_t below_count, below_capacity;
     strl_node first;  /* record of its first brick, where it has any */
     uint32_t run_count;
     strl_stored_run *run; /* [run_count] by depth; owned */

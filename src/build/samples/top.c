@@ -50,15 +50,31 @@ static strl_status load(const strl_sample_stage *stage, top *t, strl_error *err)
     return status;
 }
 
+/* The upper cells of a piece: without items, for the preview alone. */
+static strl_status add_below(top *t, const strl_chunk *chunk, strl_octant *root, strl_error *err)
+{
+    uint32_t first = (uint32_t)t->octree.octant_count, index;
+    strl_status status = STRL_OK;
+    for (uint32_t i = 0; i < chunk->below_count && !status; i++) {
+        strl_octant cell = chunk->below[i];
+        cell.first_item = cell.item_count = 0;
+        for (uint32_t k = 0; k < cell.child_count; k++)
+            cell.child[k] += first;
+        status = strl_octree_add(&t->octree, &cell, &index, err);
+    }
+    for (uint32_t k = 0; k < root->child_count; k++)
+        root->child[k] += first;
+    return status;
+}
+
 static strl_status add_piece(top *t, uint32_t index, uint32_t *octant, strl_error *err)
 {
     const strl_chunk *chunk = &t->chunks->chunk[index];
     strl_octree *octree = &t->octree;
     strl_octant root = chunk->root;
-    strl_status status = STRL_OK;
+    strl_status status = add_below(t, chunk, &root, err);
     root.first_item = (uint32_t)octree->item_count;
     root.chunk = root.is_leaf ? STRL_NO_CHUNK : index;
-    root.child_count = 0;
     for (uint32_t i = 0; i < chunk->item_count && !status; i++) {
         octree->owner[t->first[index] + i] = (uint32_t)octree->octant_count;
         status = strl_octree_add_item(octree, t->first[index] + i, chunk->item[i].weight, err);

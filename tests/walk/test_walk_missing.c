@@ -1,0 +1,206 @@
+/* A walk through a sample tree of which little has arrived: what is not there yet leaves no hole. The model is a ball, so that which
+ * pixels it covers is known without the library. */
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+#include "base/memory.h"
+#include "build/sample_tree.h"
+#include "walk/walk_checks.h"
+
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define RINGS 150u
+#else
+#define RINGS 300u
+#endif
+#define SECTORS (2 * RINGS)
+#define RADIUS 0.5
+#define WIDTH 640
+#define HEIGHT 480
+#define FOV 60.0
+#define PI 3.14159265358979323846
+#define MOST_UNCOVERED 0.0002 /* of the ball: planes in its cells meet at an angle */
+
+static uint8_t *bytes;
+static size_t size;
+static bool covered[HEIGHT][WIDTH];
+
+static int create_ball(void **state)
+{
+    if (built_setup(state) != 0)
+        return -1;
+    mesh_file mesh = {0};
+    for (uint32_t ring = 0; ring <= RINGS; ring++)
+        for (uint32_t sector = 0; sector < SECTORS; sector++) {
+            double across = PI * ring / RINGS, around = 2 * PI * sector / SECTORS;
+            mesh_file_add_vertex(&mesh, RADIUS * sin(across) * cos(around), RADIUS * sin(across) * sin(around), RADIUS * cos(across));
+        }
+    for (uint32_t ring = 0; ring < RINGS; ring++)
+        for (uint32_t sector = 0; sector < SECTORS; sector++) {
+            uint32_t a = ring * SECTORS + sector, b = ring * SECTORS + (sector + 1) % SECTORS;
+            mesh_file_add_face(&mesh, a, a + SECTORS, b + SECTORS);
+            mesh_file_add_face(&mesh, a, b + SECTORS, b);
+        }
+    mesh_file_write_ply(&mesh, built_path("ball.ply"));
+    mesh_file_free(&mesh);
+    sample_tree_build("ball.ply", "ball.stroll", (strl_build_desc){0});
+    bytes = built_read_file(built_path("ball.stroll"), &size);
+    return 0;
+}
+
+static int destroy_ball(void **state)
+{
+    free(bytes);
+    return built_teardown(state);
+}
+
+/* Along x, looking at the middle. */
+static strl_camera camera_at(double distance)
+{
+    return (strl_camera){.eye = {distance, 0, 0}, .up = {0, 0, 1}, .fov_y_deg = FOV, .width = WIDTH, .height = HEIGHT};
+}
+
+/* ---- an image of what is covered */
+
+typedef struct pixel_place {
+    double x, y, depth;
+} pixel_place;
+
+static pixel_place project(const strl_draw_item *item, const strl_vertex *vertex, double distance)
+{
+    double at[3], focal = HEIGHT / 2.0 / tan(FOV / 2 * PI / 180);
+    for (int k = 0; k < 3; k++)
+        at[k] = item->origin[k] + (double)(item->anchor[k] + vertex->position[k]) * item->step;
+    double depth = distance - at[0];
+    return (pixel_place){WIDTH / 2.0 + focal * at[1] / depth, HEIGHT / 2.0 - focal * at[2] / depth, depth};
+}
+
+/* Of the half that is seen: the other one covers the same pixels and would hide what is missing. */
+static bool is_before(const pixel_place *p, double distance)
+{
+    return p->depth > 0 && p->depth < distance;
+}
+
+static int bounded(double value, int most)
+{
+    return value < 0 ? 0 : value > most ? most : (int)value;
+}
+
+static void cover_point(const strl_draw_item *item, const strl_vertex *vertex, double distance)
+{
+    pixel_place p = project(item, vertex, distance);
+    double half = (double)item->point_px / 2;
+    if (!is_before(&p, distance))
+        return;
+    for (int y = bounded(ceil(p.y - half - 0.5), HEIGHT); y < bounded(p.y + half + 0.5, HEIGHT); y++)
+        for (int x = bounded(ceil(p.x - half - 0.5), WIDTH); x < bounded(p.x + half + 0.5, WIDTH); x++)
+            covered[y][x] = true;
+}
+
+static double edge(const pixel_place *a, const pixel_place *b, double x, double y)
+{
+    return (b->x - a->x) * (y - a->y) - (b->y - a->y) * (x - a->x);
+}
+
+static void cover_triangle(const strl_draw_item *item, const uint16_t *corner, double distance)
+{
+    pixel_place p[3];
+    for (int c = 0; c < 3; c++) {
+        p[c] = project(item, &item->vertices[corner[c]], distance);
+        if (!is_before(&p[c], distance))
+            return;
+    }
+    double least[2] = {fmin(p[0].x, fmin(p[1].x, p[2].x)), fmin(p[0].y, fmin(p[1].y, p[2].y))};
+    double most[2] = {fmax(p[0].x, fmax(p[1].x, p[2].x)), fmax(p[0].y, fmax(p[1].y, p[2].y))};
+    for (int y = bounded(least[1] - 0.5, HEIGHT); y < bounded(most[1] + 1, HEIGHT); y++)
+        for (int x = bounded(least[0] - 0.5, WIDTH); x < bounded(most[0] + 1, WIDTH); x++) {
+            double a = edge(&p[0], &p[1], x + 0.5, y + 0.5), b = edge(&p[1], &p[2], x + 0.5, y + 0.5),
+                   c = edge(&p[2], &p[0], x + 0.5, y + 0.5);
+            if ((a >= 0 && b >= 0 && c >= 0) || (a <= 0 && b <= 0 && c <= 0))
+                covered[y][x] = true;
+        }
+}
+
+/* Share of the pixels within the ball's outline, less two, that nothing covers. */
+static double uncovered_share(const strl_draw_list *list, double distance)
+{
+    uint32_t pixels = 0, open = 0;
+    double focal = HEIGHT / 2.0 / tan(FOV / 2 * PI / 180), outline = focal * RADIUS / sqrt(distance * distance - RADIUS * RADIUS) - 2;
+    memset(covered, 0, sizeof covered);
+    for (uint32_t i = 0; i < list->count; i++) {
+        const strl_draw_item *item = &list->items[i];
+        for (uint32_t k = 0; k < item->draw_count && item->visible; k += item->point_px > 0 ? 1 : 3)
+            if (item->point_px > 0)
+                cover_point(item, &item->vertices[item->indices[k]], distance);
+            else
+                cover_triangle(item, &item->indices[item->draw_first + k], distance);
+    }
+    for (int y = 0; y < HEIGHT; y++)
+        for (int x = 0; x < WIDTH; x++)
+            if (hypot(x + 0.5 - WIDTH / 2.0, y + 0.5 - HEIGHT / 2.0) < outline) {
+                pixels++;
+                open += !covered[y][x];
+            }
+    assert_true(pixels > 3000);
+    return (double)open / pixels;
+}
+
+/* ---- tests */
+
+/* Nothing but what opening reads. */
+static void the_first_image_has_no_hole(void **state)
+{
+    (void)state;
+    for (double distance = 1.2; distance < 4; distance += 0.4) {
+        watched_source *source = watched_source_open(memory_source(bytes, size));
+        strl_walk *walk = open_walk(&source->base, &(strl_walk_desc){.error_px = 1});
+        source->walking = true;
+        source->hold_percent = 100;
+        const strl_camera camera = camera_at(distance);
+        strl_draw_list list = walk_frame(walk, &camera);
+        assert_true(strl_walk_get_stats(walk)->missing_nodes > 0);
+        double share = uncovered_share(&list, distance);
+        if (share > MOST_UNCOVERED)
+            fail_msg("at %g %g of the ball are open", distance, share);
+        source->hold_percent = 0;
+        strl_walk_close(walk);
+    }
+}
+
+/* From the first image to the last, also where cells are larger than any point can be. */
+static void nor_has_any_that_comes_behind_it(void **state)
+{
+    (void)state;
+    for (double distance = 0.53; distance < 1.6; distance *= 1.2) {
+        watched_source *source = watched_source_open(memory_source(bytes, size));
+        strl_walk *walk = open_walk(&source->base, &(strl_walk_desc){.error_px = 1});
+        const strl_camera camera = camera_at(distance);
+        source->walking = true;
+        source->hold_percent = 90;
+        unsigned late = 0;
+        for (unsigned frame = 0; frame < 2000 && (frame == 0 || !strl_walk_settled(walk)); frame++) {
+            strl_draw_list list = walk_frame(walk, &camera);
+            double share = uncovered_share(&list, distance);
+            if (share > MOST_UNCOVERED)
+                fail_msg("at %g %g of the ball are open in frame %u", distance, share, frame);
+            late += strl_walk_get_stats(walk)->missing_nodes > 0;
+            strl_walk_pump(walk, UINT64_MAX);
+        }
+        assert_true(strl_walk_settled(walk) && late > 2);
+        strl_walk_close(walk);
+    }
+}
+
+int main(void)
+{
+    const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_first_image_has_no_hole),
+        cmocka_unit_test(nor_has_any_that_comes_behind_it),
+    };
+    return cmocka_run_group_tests(tests, create_ball, destroy_ball);
+}
