@@ -18,7 +18,7 @@
 typedef struct sink {
     strl_walk *walk;
     const strl_view *view;
-    const int64_t *origin; /* least corner of the tree's box, which all cells lie near */
+    const strl_tree *tree; /* points are relative to the least corner of its box, in which all lie */
     bool counts;           /* they are counted alone */
     size_t at[SIZES];      /* how many so far, or where the next goes */
 } sink;
@@ -36,7 +36,7 @@ static uint16_t spread_of(const strl_splat *splat)
 static void place_point(const sink *self, const strl_node *record, const int32_t place[3], strl_vertex *point)
 {
     for (int k = 0; k < 3; k++)
-        point->position[k] = (int32_t)(uint32_t)((uint64_t)record->anchor[k] - (uint64_t)self->origin[k] + (uint64_t)(int64_t)place[k]);
+        point->position[k] = (int32_t)(uint32_t)((uint64_t)record->anchor[k] - (uint64_t)self->tree->box_min[k] + (uint64_t)(int64_t)place[k]);
 }
 
 static strl_vertex point_of_splat(const sink *self, const strl_node *record, const strl_splat *splat)
@@ -130,7 +130,7 @@ static strl_sight sight_of(const sink *self, const strl__active *active, const s
         least[k] = record->anchor[k] + splat->centre[k] - half;
         most[k] = record->anchor[k] + splat->centre[k] + half;
     }
-    const strl_box box = strl__world_box(self->walk->trees[active->placed->tree].tree, active->placed, least, most);
+    const strl_box box = strl__world_box(self->tree, active->placed, least, most);
     return strl_view_sight(self->view, &box);
 }
 
@@ -167,8 +167,10 @@ static void take_plane(sink *self, const strl_node *record, const strl_splat *sp
     for (int i = 0; i < parts * parts; i++) {
         strl_splat part = *splat;
         double x = side * (i % parts + 0.5 - parts / 2.0), y = side * (i / parts + 0.5 - parts / 2.0);
-        for (int k = 0; k < 3; k++)
-            part.centre[k] = (int32_t)fmin(fmax(splat->centre[k] + x * (double)across[k] + y * (double)up[k], INT32_MIN), INT32_MAX);
+        for (int k = 0; k < 3; k++) {
+            double at = splat->centre[k] + x * (double)across[k] + y * (double)up[k], anchor = (double)record->anchor[k];
+            part.centre[k] = (int32_t)lrint(fmin(fmax(at, (double)self->tree->box_min[k] - anchor), (double)self->tree->box_max[k] - anchor));
+        }
         take_splats(self, record, &part, 1, SHARES);
     }
 }
@@ -225,8 +227,7 @@ static void take_all(sink *self, size_t first, size_t end)
 
 static sink make_sink(strl_walk *walk, const strl_view *view, size_t first)
 {
-    const strl_tree *tree = walk->trees[walk->front.items[first].placed->tree].tree;
-    return (sink){.walk = walk, .view = view, .origin = tree->box_min, .counts = true};
+    return (sink){.walk = walk, .view = view, .tree = walk->trees[walk->front.items[first].placed->tree].tree, .counts = true};
 }
 
 static strl_status add_points(strl_walk *walk, const strl_view *view, size_t first, size_t end, strl_error *err)
