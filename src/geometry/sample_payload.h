@@ -11,7 +11,7 @@
 typedef struct strl_splat {
     int32_t centre[3];  /* of what lies in it, lattice units from the node's anchor; as of strl_splat_place */
     uint8_t side;       /* of the cell: 2^side lattice units */
-    uint8_t coverage;   /* 255 = as much as a wall through the cell */
+    uint8_t coverage;   /* of the cell's side, as it is seen: 255 = as a wall through the cell */
     uint8_t normal[2];  /* octahedral, of both sides */
     uint8_t parallel;   /* 255 = all faces are parallel, 0 = any direction */
     uint32_t rgba;      /* mean colour, sRGB-encoded */

@@ -353,6 +353,7 @@ struct strl_walk {
     size_t item_capacity;
     strl_vertex *points; /* splats of the frame */
     size_t point_count, point_capacity;
+    float scattered[256]; /* of a splat's coverage: 0 = the faces are a wall, 1 = there is nearly none */
     strl__far_points far[STRL__FAR_SIZES]; /* of the frame */
     double far_near, far_far;              /* depths of their boxes; far_far 0: there is none */
     uint16_t *numbers; /* 0, 1, 2, ...; NULL where there was no splat yet */

@@ -19,6 +19,8 @@ typedef struct sink {
     strl_walk *walk;
     const strl_view *view;
     const strl_tree *tree; /* points are relative to the least corner of its box, in which all lie */
+    float sight[3];        /* direction to the brick in the tree's space, of length 1 */
+    double unit_share;     /* of a point, what the side of a cell of one lattice unit takes */
     bool counts;           /* they are counted alone */
     size_t at[SIZES];      /* how many so far, or where the next goes */
 } sink;
@@ -39,6 +41,27 @@ static void place_point(const sink *self, const strl_node *record, const int32_t
         point->position[k] = (int32_t)(uint32_t)((uint64_t)record->anchor[k] - (uint64_t)self->tree->box_min[k] + (uint64_t)(int64_t)place[k]);
 }
 
+/* How much of a direction, of length 1, lies along the splat's line. */
+static float along_line(const strl_splat *splat, const float direction[3])
+{
+    const uint16_t code[2] = {(uint16_t)(splat->normal[0] * STRL_OCT_MAX / 255u), (uint16_t)(splat->normal[1] * STRL_OCT_MAX / 255u)};
+    float normal[3];
+    strl_oct_decode(code, normal);
+    return fabsf(normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2]);
+}
+
+/* Points that are larger than their cells overlap: as many as lie in one pixel hide together what a cell hides, so that a wall stays one,
+ * from wherever it is looked at. Of scattered faces that lie parallel less is seen from the side, the more scattered the more. */
+static float opacity_of(const sink *self, const strl_splat *splat)
+{
+    if (splat->coverage == 255)
+        return 1;
+    float along = 1 - (float)spread_of(splat) / STRL_SPREAD_MOST;
+    float turned = along * (1 - along_line(splat, self->sight)) * self->walk->scattered[splat->coverage];
+    float hidden = (float)splat->coverage / 255 * (1 - turned);
+    return 1 - powf(1 - hidden, (float)fmin(1, ldexp(self->unit_share, 2 * splat->side)));
+}
+
 static strl_vertex point_of_splat(const sink *self, const strl_node *record, const strl_splat *splat)
 {
     strl_vertex point;
@@ -48,7 +71,7 @@ static strl_vertex point_of_splat(const sink *self, const strl_node *record, con
     point.normal[0] |= (uint16_t)(spread_of(splat) << STRL_SPREAD_SHIFT);
     for (int k = 0; k < 3; k++)
         point.rgba[k] = (uint8_t)(splat->rgba >> 8 * k);
-    point.rgba[3] = (uint8_t)((splat->rgba >> 24) * splat->coverage / 255);
+    point.rgba[3] = (uint8_t)((float)(splat->rgba >> 24) * opacity_of(self, splat) + 0.5f);
     return point;
 }
 
@@ -74,6 +97,28 @@ static unsigned share_of(const strl_walk *walk, const strl__active *active)
     return parts >= SHARES ? SHARES - 1 : parts >= 1 ? (unsigned)parts - 1 : 0;
 }
 
+static double px_of_size(const strl_walk *walk, unsigned size)
+{
+    if (size >= SHARES)
+        return STRL__MOST_POINT_PX * exp2(-0.5 * (size - SHARES));
+    return walk->splat_ratio * walk->stats.allowed_error_px * (size + 1) / SHARES;
+}
+
+/* As of a placement that turns and scales alike along all axes; of others near enough for looks. */
+static void find_sight(sink *self, const strl__active *active)
+{
+    const double *transform = active->placed->transform;
+    double way[3], turned[3], square = 0;
+    for (int k = 0; k < 3; k++)
+        way[k] = self->view->orthographic ? self->view->forward[k] : (active->box.min[k] + active->box.max[k]) / 2 - self->view->eye[k];
+    for (int k = 0; k < 3; k++) {
+        turned[k] = transform[k] * way[0] + transform[4 + k] * way[1] + transform[8 + k] * way[2];
+        square += turned[k] * turned[k];
+    }
+    for (int k = 0; k < 3; k++)
+        self->sight[k] = square > 0 ? (float)(turned[k] / sqrt(square)) : 0;
+}
+
 /* Of the state that the brick is drawn in. */
 static void take_shown(sink *self, const strl__active *active)
 {
@@ -81,8 +126,13 @@ static void take_shown(sink *self, const strl__active *active)
     if (active->state >= mesh->step_count)
         return;
     uint32_t first = active->state ? mesh->splat_end[active->state - 1] : 0, end = mesh->splat_end[active->state];
-    if (first < end)
-        take_splats(self, active->node->record, mesh->splats + first, end - first, share_of(self->walk, active));
+    if (first == end)
+        return;
+    unsigned size = share_of(self->walk, active);
+    double unit = self->walk->splat_ratio * strl_sight_error_px(&active->sight, active->placed->length_scale) / fmax(1, px_of_size(self->walk, size));
+    self->unit_share = unit * unit;
+    find_sight(self, active);
+    take_splats(self, active->node->record, mesh->splats + first, end - first, size);
 }
 
 /* ---- what is not there yet */
@@ -192,6 +242,8 @@ static void take_cell(sink *self, const strl__active *active, const strl_node *r
 static void take_missing(sink *self, const strl__active *active)
 {
     const strl__node *node = active->node;
+    self->unit_share = 1;
+    find_sight(self, active);
     if (active->state < node->mesh.step_count || active->open || node->record->child_count == 0)
         return;
     splat_run own = finest_splats(node), preview = finest_splats(self->walk->trees[active->placed->tree].root);
@@ -295,13 +347,6 @@ static strl_draw_item shape_of(const strl_walk *walk, const strl__active *active
     memcpy(item.origin, tree->origin, sizeof item.origin);
     memcpy(item.transform, placement->transform, sizeof item.transform);
     return item;
-}
-
-static double px_of_size(const strl_walk *walk, unsigned size)
-{
-    if (size >= SHARES)
-        return STRL__MOST_POINT_PX * exp2(-0.5 * (size - SHARES));
-    return walk->splat_ratio * walk->stats.allowed_error_px * (size + 1) / SHARES;
 }
 
 /* Items are made when all points are there: the array has its place only then. */
