@@ -93,22 +93,31 @@ def part_theorem(bench, model):
 
 # ---- splats
 
+def against(bench, model, reference, ours, size, *options):
+    """What ours shows beside the reference, with its cameras."""
+    stats, seconds = bench.render(bench.container_of(model, *STRUCTURE), ours, reference / "path.json", "--splat", size, "--depth", *options)
+    return bench.program("compare", reference, ours, "--error", size, "--psnr", 0, "--json", allowed=(0, 1)).json(), stats, seconds
+
+
 def compare_splats(bench, model, path, frames):
-    """All sizes of splats beside one render of the input's own triangles, with its cameras."""
-    reference, ours, rows = bench.scratch / f"{model}_{path}_full", bench.scratch / f"{model}_{path}_splats", []
+    """All sizes of splats beside one render of the input's own triangles, with one sample a pixel and with 4 x 4."""
+    reference, smooth, ours = (bench.scratch / f"{model}_{path}_{name}" for name in ("full", "smooth", "splats"))
+    rows = []
     bench.render(bench.reference_of(model), reference, path, "--frames", frames, "--full", "--depth")
+    bench.render(bench.reference_of(model), smooth, reference / "path.json", "--full", "--depth", "--supersample", 4)
     for size in SPLATS:
-        stats, seconds = bench.render(bench.container_of(model, *STRUCTURE), ours, reference / "path.json", "--splat", size,
-                                      "--depth")
-        compared = bench.program("compare", reference, ours, "--error", size, "--psnr", 0, "--json", allowed=(0, 1)).json()
+        compared, stats, seconds = against(bench, model, reference, ours, size)
         if frames > 1:
             sheet = bench.scratch / "sheets" / f"{model}_{path}_splat{size}.png"
             sheet.parent.mkdir(exist_ok=True)
             sheets.side_by_side(reference / "contact.png", ours / "contact.png", frames, sheet)
-        rows.append({"path": path, "splat": size, "compare": compared, "seconds": seconds,
+        bench.drop(ours)
+        smoothly, _, _ = against(bench, model, smooth, ours, size, "--supersample", 4)
+        rows.append({"path": path, "splat": size, "compare": compared, "smooth": smoothly, "seconds": seconds,
                      **{name: measure.spread([frame[name] for frame in stats]) for name in ("triangles", "splats")}})
         bench.drop(ours)
     bench.drop(reference)
+    bench.drop(smooth)
     return rows
 
 

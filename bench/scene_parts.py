@@ -1,11 +1,14 @@
 """The parts of must_show.py about sample trees and placements: how fast and how small they are built, and what a frame costs where
 a scene grows. Each takes the Bench and a model, or all models at once where they are compared."""
+import json
+
 import measure
 import scale_parts
 
 SAMPLES = ("--structure", "samples")
 MORTON_MOST = 20_000_000  # triangles; the bench program holds them in memory
 SPLATS = (1, 4, 8)
+LARGE_SPLATS = (1, 5)  # 5: as Klein et al. (2005) draw their largest landscape
 CHESSBOARDS = ("chessboard_80k", "chessboard_8m", "chessboard_32m", "chessboard_320m")
 SAMPLED = ("isosurface_1m", "isosurface_10m", "dragon_scans", "boxes_1m", "chessboard_8m", "landscape_10m", "landscape_400m")
 STRUCTURES = {"samples": SAMPLES, "clusters": ()}
@@ -46,16 +49,27 @@ def columns_of(frames):
     return {name: measure.spread([frame[name] for frame in frames]) for name in COLUMNS}
 
 
+def twice(bench, container, frames):
+    """An orbit, and the same again."""
+    path = bench.scratch / "twice.json"
+    bench.program("render", container, "--path", "orbit", "--seed", 1, "--size", "64x36", "--frames", frames, "--error", 64, "--backend", "null",
+                  "--save-path", path)
+    cameras = json.loads(path.read_text(encoding="utf-8"))
+    cameras["frames"] *= 2
+    path.write_text(json.dumps(cameras), encoding="utf-8")
+    return path
+
+
 def part_chessboard(bench, models):
-    """The field of view stays, the fields of the board become smaller. The first half of a path loads what it sees."""
+    """The field of view stays, the fields of the board become smaller. The first turn loads what the second one shows."""
     settings = {"frames": bench.options.frames, "size": bench.options.size, "models": list(models)}
     if all([bench.kept("chessboard", model, settings) for model in models]):
         return
     for model in models:
         container = bench.container_of(model, *SAMPLES)
-        splats = {}
+        splats, path = {}, twice(bench, container, settings["frames"])
         for splat in SPLATS:
-            frames = frames_of(bench, container, "orbit", "--frames", settings["frames"], "--splat", splat, *ROOMY)
+            frames = frames_of(bench, container, path, "--splat", splat, *ROOMY)
             splats[str(splat)] = columns_of(frames[len(frames) // 2:])
         bench.log.add("chessboard", model, settings, splats=splats)
         bench.forget_scenes([model])
@@ -65,15 +79,18 @@ def part_large(bench, name):
     """A path over the surface, as a visitor walks it: never waiting for bytes. name: a model and, behind a space, a structure."""
     model, _, structure = name.partition(" ")
     options = STRUCTURES[structure or "samples"]
-    settings = {"frames": bench.options.frames, "size": bench.options.size}
+    splats = LARGE_SPLATS if structure == "samples" else LARGE_SPLATS[:1]
+    settings = {"frames": bench.options.frames, "size": bench.options.size, "splats": list(splats)}
     if bench.kept("large", name, settings):
         return
     container = bench.container_of(model, *options)
     facts = bench.program("info", container, "--json").json()
-    frames = frames_of(bench, container, "flythrough", "--frames", settings["frames"], "--realtime")
+    rows = []
+    for splat in splats:
+        frames = frames_of(bench, container, "flythrough", "--frames", settings["frames"], "--realtime", "--splat", splat)
+        rows.append({"splat": splat, "requests_a_frame": sum(frame["requests"] for frame in frames) / len(frames), **columns_of(frames)})
     bench.log.add("large", name, settings, bytes=container.stat().st_size, stored=facts["triangles"],
-                  placed=facts["triangles_placed"], placements=facts["placements"],
-                  requests_a_frame=sum(frame["requests"] for frame in frames) / len(frames), **columns_of(frames))
+                  placed=facts["triangles_placed"], placements=facts["placements"], rows=rows)
     bench.forget_scenes([model])
 
 

@@ -153,7 +153,7 @@ def splat_rows(records):
             either = max(1, compare["covered_in_either"])
             yield (record["model"], row["path"], row["splat"], compare["frames"], percent(compare["differing_pixels"] / either, 2),
                    percent(compare["visibly_differing_pixels"] / either, 2), number(compare["psnr_median_db"]),
-                   number(compare["psnr_min_db"]), number(compare["uncovered_pixels"]), number(compare["overcovered_pixels"]),
+                   number(compare["psnr_min_db"]), number(row["smooth"]["psnr_median_db"]), number(compare["uncovered_pixels"]), number(compare["overcovered_pixels"]),
                    percent(compare["depth_within"], 2), number(int(row["triangles"]["median"])), number(int(row["splats"]["median"])))
 
 
@@ -340,10 +340,13 @@ def chessboard_lines(records):
 
 def large_rows(records):
     for record in sorted(records_of(records, "large"), key=lambda record: (record["placed"], record["model"])):
-        yield (record["model"], number(record["stored"]), number(record["placed"]), number(record["placements"]),
-               mebibytes(record["bytes"]), number(record["frame_ms"]["median"], 1), number(record["frame_ms"]["p99"], 1),
-               number(record["select_ms"]["median"]), *(number(int(record[name]["median"])) for name in ("triangles", "splats", "draws")),
-               number(record["requests_a_frame"], 1), number(int(record["missing_nodes"]["p99"])))
+        for row in record["rows"]:
+            yield (record["model"], number(record["stored"]), number(record["placed"]), number(record["placements"]),
+                   mebibytes(record["bytes"]), row["splat"], number(row["frame_ms"]["median"], 1), number(row["frame_ms"]["p99"], 1),
+                   number(row["select_ms"]["median"]), *(number(int(row[name]["median"])) for name in ("triangles", "splats", "draws")),
+                   number(row["requests_a_frame"], 1), number(int(row["missing_nodes"]["p99"])))
+
+
 STRUCTURES = ("clusters", "samples")
 FRAME_TIME_LIMIT = 1.1
 
@@ -601,7 +604,7 @@ TABLES = (
     ("chessboard", "The chessboard: time of a frame against size",
      ("model", "splats, px", "frame_ms, median", "p99", "select_ms, median", "triangles", "splats", "draws", "over the smallest"), chessboard_rows),
     ("large", "Walks through large scenes",
-     ("model and structure", "triangles stored", "triangles placed", "placements", "container", "frame_ms, median", "p99", "select_ms, median",
+     ("model and structure", "triangles stored", "triangles placed", "placements", "container", "splats, px", "frame_ms, median", "p99", "select_ms, median",
       "triangles", "splats", "draws", "pages read a frame", "missing nodes, p99"), large_rows),
     ("theorem", "Sample trees: cells of which no visible triangle is drawn",
      ("model", "p", "cells that can fail", "triangles of one, median, most", "pairs of cell and eye", "fail", "share, 95 %",
@@ -611,7 +614,7 @@ TABLES = (
      ("model", "pairs of cell and eye", "drawn: the cell's and what is above it", "drawn: what is above it"), unsampled_rows),
     ("splats", "Sample trees with splats, against the input as read",
      ("model", "path", "splat px", "frames", "pixels that differ", "by more than 16 of 255", "PSNR median dB", "least dB",
-      "uncovered", "overcovered", "depth within", "triangles a frame", "splats a frame"), splat_rows),
+      "median dB, 4 x 4 samples", "uncovered", "overcovered", "depth within", "triangles a frame", "splats a frame"), splat_rows),
     ("remote", "Walks over links",
      ("model", "link", "first image, s", "MiB until the final image", "final image, s", "final image as of the file", "frames of the walk",
       "with missing nodes", "select_ms, median", "frame_ms, median", "p99", "over the file's", "at most 10 % more"), link_rows),
