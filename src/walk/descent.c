@@ -108,6 +108,13 @@ static strl__outlook find_child(strl__descent *c, strl__node *parent, uint32_t i
         *child = NULL;
         return STRL__BACKING_OFF;
     }
+    /* The place for occlusion too: what is known to be hidden is left out here in the same way, of trees that add alone, because of one
+     * that replaces a group needs all its children. */
+    if (*child && strl__faces_away(&c->facing, (*child)->record)) {
+        c->turned_away++;
+        *child = NULL;
+        return STRL__HERE;
+    }
     if (*child) {
         bool waiting = (*child)->residency == STRL__ABSENT && (*child)->retry.frame > walk->frame;
         if (waiting && (*child)->retry.failures < STRL__GIVE_UP_FAILURES)
@@ -130,6 +137,7 @@ strl_status strl__find_children(strl__descent *c, const strl__group *group, doub
 {
     strl_walk *walk = c->walk;
     walk->children.count = 0;
+    c->turned_away = 0;
     *worst = STRL__HERE;
     for (uint32_t i = group->first; i != STRL_NONE; i = walk->level.items[i].next) {
         strl__node *parent = walk->level.items[i].node;

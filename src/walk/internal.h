@@ -300,6 +300,7 @@ typedef struct strl__cut {
     bool overflow;         /* result: more than capacity; the rest is undefined */
     bool records_missing;  /* result: the cut ends early for want of records that are on their way */
     bool waits;            /* result: something is missing that has not been given up */
+    uint32_t backfacing;   /* result: nodes left out with all below them, see facing.c */
     uint32_t missing;      /* result: nodes of the wanted front that are not in the front, or groups'
                              members cut short */
 } strl__cut;
@@ -312,6 +313,7 @@ struct strl_walk {
     double error_px;
     double splat_ratio; /* pixels of a splat for each of the allowed error */
     bool labels; /* kept for each vertex */
+    strl_cull cull;
     double bounds[6];
     strl__walk_tree *trees;
     uint32_t tree_count;

@@ -38,7 +38,7 @@ strl_status strl_bricks_add(strl_brick_set *set, const strl_octree *octree, uint
 /* The first brick of a tree: what its root cell stores. */
 strl_status strl_bricks_add_root(strl_brick_set *set, const strl_octree *octree, uint32_t octant, strl_arena *arena,
                                  strl_error *err);
-/* Boxes of parents around those of their children; sizes never less than theirs. */
+/* Boxes and cones of parents around those of their children; sizes never less than theirs. */
 void strl_bricks_close(strl_brick_set *set);
 void strl_bricks_deinit(strl_brick_set *set);
 
