@@ -229,7 +229,7 @@ strl_status strl__cut_run(strl_walk *walk, strl__cut *cut, strl_error *err)
     cut->bytes = walk->root_bytes;
     if (cut->kind == STRL__CUT_FRONT) {
         walk->wanted.count = walk->split.count = walk->ahead.count = 0;
-        walk->missing.count = walk->prefetch.count = walk->front.count = walk->wanted_runs.count = 0;
+        walk->missing.count = walk->prefetch.count = walk->along.count = walk->front.count = walk->wanted_runs.count = 0;
         for (unsigned size = 0; size < STRL__FAR_SIZES; size++)
             walk->far[size].count = 0, walk->far[size].px = 0;
         walk->far_far = 0;

@@ -349,6 +349,7 @@ struct strl_walk {
     strl__runs wanted_runs;           /* of which the front has placements, or may have */
     strl__splits split, split_before; /* of this frame and the last */
     strl__candidates missing, prefetch;
+    strl__candidates along; /* left out of the cut: they come where their page is read for others */
     strl__front front;
     strl_draw_item *items;
     size_t item_capacity;

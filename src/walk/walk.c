@@ -161,6 +161,7 @@ void strl_walk_close(strl_walk *walk)
                            walk->split_before.items,
                            walk->missing.items,
                            walk->prefetch.items,
+                           walk->along.items,
                            walk->front.items,
                            walk->items,
                            walk->points,
