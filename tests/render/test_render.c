@@ -4,6 +4,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <cmocka.h>
+#include <epoxy/gl.h>
 
 #include "render/glcommon/context.h"
 #include "render/patches.h"
@@ -619,6 +620,14 @@ static void a_renderer_draws_with_the_context_its_caller_made_and_resizes(void *
         assert_int_equal(strl_renderer_read_colour(renderer, borrowed.rgba[0], NULL), STRL_ERR_ARGUMENT);
         shoot(renderer, &camera, &all.list, NULL, &borrowed);
         assert_int_equal(count_different(&own, &borrowed, 2), 0);
+        GLint front;
+        all.list.cull = STRL_CULL_BACK;
+        all.items[all.count - 1].transform[0] = -1;
+        shoot(renderer, &camera, &all.list, NULL, &borrowed);
+        all.list.cull = STRL_CULL_NONE;
+        all.items[all.count - 1].transform[0] = 1;
+        glGetIntegerv(GL_FRONT_FACE, &front);
+        assert_true(front == GL_CCW && !glIsEnabled(GL_CULL_FACE)); /* as others expect to find it */
         strl_renderer_destroy(renderer);
         strl__gl_context_destroy(context);
     }
