@@ -352,6 +352,9 @@ static bool *listed_bricks(const strl_draw_list *list)
             assert_false(*brick);
             *brick = true;
         }
+    for (size_t p = 0; p < PLACES; p++) /* bricks add up: none is drawn without what is above it */
+        for (uint32_t id = 1; id < model.tree.node_count; id++)
+            assert_true(!listed[p * model.tree.node_count + id] || listed[p * model.tree.node_count + model.node[id].parent]);
     return listed;
 }
 
@@ -461,6 +464,37 @@ static void one_side_takes_less_memory(void **state)
     free(bytes);
 }
 
+static void late_or_without_memory_the_walk_goes_on(void **state)
+{
+    (void)state;
+    uint64_t random = 7;
+    watched_source *source = watched_source_open(memory_source(with_cones, size_with));
+    strl_walk *walk = open_walk(&source->base, &(strl_walk_desc){.error_px = 0.5, .requests_in_flight = 2, .cull = STRL_CULL_BACK});
+    unsigned late = 0;
+    source->walking = true;
+    source->hold_percent = 80;
+    for (unsigned i = 0; i < CAMERAS; i++) {
+        strl_camera camera = any_camera(&random);
+        for (unsigned frame = 0; frame < 8; frame++) {
+            strl_draw_list list = walk_frame(walk, &camera);
+            free(listed_bricks(&list));
+            late += strl_walk_get_stats(walk)->missing_nodes > 0;
+            strl_walk_pump(walk, 1);
+        }
+    }
+    assert_true(late > CAMERAS / 2);
+    source->hold_percent = 0;
+    for (uint64_t n = 1; n < 200; n += 1 + n / 8) {
+        strl_draw_list list;
+        strl_camera camera = any_camera(&random);
+        walk_frame_without_memory(walk, &camera, n, &list);
+        free(listed_bricks(&list));
+    }
+    strl_camera camera = any_camera(&random);
+    settle(walk, &camera, 2000);
+    strl_walk_close(walk);
+}
+
 /* ---- pictures */
 
 typedef struct picture {
@@ -539,6 +573,7 @@ int main(void)
         cmocka_unit_test(without_the_word_cones_do_nothing),
         cmocka_unit_test(settled_lists_are_the_same_from_wherever_one_comes),
         cmocka_unit_test(one_side_takes_less_memory),
+        cmocka_unit_test(late_or_without_memory_the_walk_goes_on),
         cmocka_unit_test(pictures_with_cones_are_those_without),
     };
     return cmocka_run_group_tests(tests, create_model, destroy_model);
