@@ -6,7 +6,7 @@
 #define AXIS_MOST 32767.0
 /* Far above what rounding does to cosines and angles of unit vectors, far below what a cone's two bytes tell apart. */
 #define SLACK 1e-9
-#define CENTRING 24 /* steps towards the direction that is farthest off (Badoiu and Clarkson 2003) */
+#define CENTRING 16 /* steps towards the direction that is farthest off (Badoiu and Clarkson 2003) */
 
 static double dot(const double a[3], const double b[3])
 {
