@@ -9,6 +9,7 @@
 
 #include "progress.h"
 #include "stroll/error.h"
+#include "stroll/frame.h"
 
 #define STRL_BENCH_MOST_FIGURES 16u
 
@@ -24,6 +25,7 @@ typedef struct strl_bench {
     uint64_t triangles; /* wanted */
     unsigned runs;      /* at least 1 */
     unsigned jobs;      /* threads of scene and build, at least 1 */
+    strl_cull cull;     /* of select and draw */
     strl_cli_progress *progress;
     bool (*stopped)(void);            /* the user asked to stop */
     char *folder, *scene, *container; /* paths, owned by cmd_bench.c */

@@ -99,6 +99,7 @@ static strl_status open_walk(strl_bench *bench, walk_bench *self, strl_error *er
     const strl_render_model_desc desc = {.location = {.name = bench->container},
                                          .realtime = true,
                                          .error_px = ERROR_PX,
+                                         .cull = bench->cull,
                                          .memory_bytes = MEMORY_BYTES,
                                          .progress = bench->progress};
     const strl_renderer_desc null = {.backend = STRL_BACKEND_NULL, .width = image_size[0], .height = image_size[1]};
@@ -128,12 +129,12 @@ static void close_walk(walk_bench *self)
     strl__free(self->frames_ms);
 }
 
-static void write_note(const walk_bench *self, strl_bench_figure *figure)
+static void write_note(const walk_bench *self, strl_cull cull, strl_bench_figure *figure)
 {
     static const char *const backends[] = {
         [STRL_BACKEND_GL45] = "gl45", [STRL_BACKEND_GL3] = "gl3", [STRL_BACKEND_NULL] = "null"};
-    int used = snprintf(figure->note, sizeof figure->note, "%ux%u at 1 px, %s", image_size[0], image_size[1],
-                        backends[strl_renderer_backend(self->target)]);
+    int used = snprintf(figure->note, sizeof figure->note, "%ux%u at 1 px%s, %s", image_size[0], image_size[1],
+                        cull == STRL_CULL_BACK ? " without back faces" : "", backends[strl_renderer_backend(self->target)]);
     if (self->target != self->null)
         used += snprintf(figure->note + used, sizeof figure->note - (size_t)used, ": %.80s",
                          strl_renderer_device(self->target));
@@ -149,7 +150,7 @@ static strl_status measure(const strl_bench *bench, walk_bench *self, bool selec
     for (unsigned run = 0; status == STRL_OK && run < bench->runs; run++)
         status = walk_once(bench, self, selecting, &figure->values[figure->count++], err);
     if (status == STRL_OK)
-        write_note(self, figure);
+        write_note(self, bench->cull, figure);
     return status;
 }
 

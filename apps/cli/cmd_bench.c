@@ -146,6 +146,7 @@ static int run(strl_cli_args *args)
     describe_entries(notes, sizeof notes);
     const char *temporary = getenv("TMPDIR"), *parent = temporary && *temporary ? temporary : "/tmp";
     uint64_t triangles = 1000000, runs = 3, jobs = strl_cpu_count();
+    int cull = STRL_CULL_NONE;
     bool json = false;
     unsigned wanted;
     strl_cli_list names;
@@ -170,6 +171,11 @@ static int run(strl_cli_args *args)
          .help = "threads of scene and build (all processors)",
          .least = 1,
          .most = 256},
+        {.name = "cull",
+         .kind = STRL_CLI_ENUM,
+         .value = &cull,
+         .argument = "none|back",
+         .help = "faces that select and draw leave out (none)"},
         {.name = "scratch",
          .kind = STRL_CLI_STRING,
          .value = &parent,
@@ -187,7 +193,7 @@ static int run(strl_cli_args *args)
         stop = choose(args, &names, &wanted);
     if (stop >= 0)
         return stop;
-    strl_bench bench = {.triangles = triangles, .runs = (unsigned)runs, .jobs = (unsigned)jobs};
+    strl_bench bench = {.triangles = triangles, .runs = (unsigned)runs, .jobs = (unsigned)jobs, .cull = (strl_cull)cull};
     return run_and_print(args, &bench, wanted, parent, json);
 }
 

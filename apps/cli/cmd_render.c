@@ -27,7 +27,7 @@ typedef struct render_options {
     uint32_t size[2];
     double error_px, splat_px, fps;
     bool full, realtime, depth, wireframe, flat, no_occlusion, frames_given, quiet;
-    int backend, debug;
+    int backend, debug, cull;
     strl_cli_remote remote;
 } render_options;
 
@@ -195,7 +195,7 @@ static strl_status render(render_options *o, strl_cli_progress *progress, bool *
     strl_renderer *renderer = NULL;
     strl_camera_path path = {0};
     strl_render_model_desc desc = {.full = o->full, .realtime = o->realtime, .error_px = o->error_px, .splat_px = o->splat_px,
-                                   .memory_bytes = o->memory_bytes, .progress = progress};
+                                   .cull = (strl_cull)o->cull, .memory_bytes = o->memory_bytes, .progress = progress};
     strl_cli_catch_interrupts();
     strl_status status = check_outputs(o, err);
     if (status == STRL_OK)
@@ -260,6 +260,8 @@ static int parse(strl_cli_args *args, render_options *o)
         {.name = "splat", .kind = STRL_CLI_REAL, .value = &o->splat_px, .argument = "PX",
          .help = "of sample trees: cells that cover no more than PX x PX pixels are drawn as splats of that size (as --error)",
          .least = 1, .most = 64},
+        {.name = "cull", .kind = STRL_CLI_ENUM, .value = &o->cull, .argument = "none|back",
+         .help = "faces not to be drawn: back = those whose corners come clockwise as seen; for closed models (none)"},
         {.name = "full", .kind = STRL_CLI_FLAG, .value = &o->full,
          .help = "the finest level of a container; the triangles of a mesh file as read, held in memory"},
         {.name = "realtime", .kind = STRL_CLI_REAL, .value = &o->fps, .argument = "FPS", .given = &o->realtime,

@@ -47,7 +47,7 @@ static void print_session(const session *all)
 static int parse(strl_cli_args *args, strl_viewer_desc *desc, strl_cli_remote *remote)
 {
     static const strl_backend backends[] = {STRL_BACKEND_DEFAULT, STRL_BACKEND_GL45, STRL_BACKEND_GL3};
-    int backend = 0;
+    int backend = 0, cull = STRL_CULL_NONE;
     const strl_cli_option options[] = {
         {.name = "size", .kind = STRL_CLI_SIZE, .value = desc->size,
          .help = "of the window (as it was last, at first 1280x720)"},
@@ -67,6 +67,8 @@ static int parse(strl_cli_args *args, strl_viewer_desc *desc, strl_cli_remote *r
          .help = "a camera path to replay at once, as render --path reads it"},
         {.name = "log", .kind = STRL_CLI_STRING, .value = &desc->journal, .argument = "FILE",
          .help = "write what is opened, picked and measured, one JSON object a line"},
+        {.name = "cull", .kind = STRL_CLI_ENUM, .value = &cull, .argument = "none|back",
+         .help = "faces not to be drawn: back = those whose corners come clockwise as seen; for closed models (none)"},
         {.name = "backend", .kind = STRL_CLI_ENUM, .value = &backend, .argument = "auto|gl45|gl3",
          .help = "what draws (auto)"},
         STRL_CLI_REMOTE_OPTIONS(remote),
@@ -80,6 +82,7 @@ static int parse(strl_cli_args *args, strl_viewer_desc *desc, strl_cli_remote *r
     if (stop < 0) {
         desc->location.name = inputs.items[0];
         desc->backend = backends[backend];
+        desc->cull = (strl_cull)cull;
     }
     return stop;
 }

@@ -21,6 +21,7 @@
 typedef struct full_model {
     strl_render_model base;
     strl_container *container;
+    strl_cull cull;
     strl_arena arena; /* of the batch under way */
     strl_draw_item items[BATCH_NODES];
     uint32_t item_count;
@@ -41,6 +42,7 @@ static strl_status flush(full_draw *draw, strl_error *err)
 {
     strl_draw_list list = {.items = draw->model->items,
                            .count = draw->model->item_count,
+                           .cull = draw->model->cull,
                            .near_distance = draw->near_distance,
                            .far_distance = draw->far_distance};
     strl_render_stats drawn;
@@ -180,6 +182,7 @@ strl_status strl_render_full_open(const strl_render_model_desc *desc, strl_rende
     if (!self)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a model");
     self->base.klass = &full_class;
+    self->cull = desc->cull;
     strl_arena_init(&self->arena, 0);
     strl_status status = strl_location_open_container(&desc->location, &self->container, err);
     if (status != STRL_OK) {

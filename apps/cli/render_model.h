@@ -18,7 +18,7 @@ typedef struct strl_image_stats {
     uint64_t elapsed_ns;                   /* from the command's begin to finished pixels, opening and images before included */
     uint64_t triangles, bytes_read, resident_bytes, gpu_bytes, uploaded_bytes;
     uint64_t splats;
-    uint32_t nodes, nodes_culled, draws, requests, missing_nodes, evictions;
+    uint32_t nodes, nodes_culled, nodes_backfacing, draws, requests, missing_nodes, evictions;
     uint32_t fronts; /* selected until the front was resident */
     float max_error_px;
     double allowed_error_px;
@@ -50,6 +50,7 @@ typedef struct strl_render_model_desc {
     bool full;             /* a container's finest level; an input file can be drawn in no other way */
     bool realtime;         /* a walk that never waits */
     double error_px, splat_px;
+    strl_cull cull;
     uint64_t memory_bytes; /* of the walk's decoded nodes */
     strl_cli_progress *progress;
 } strl_render_model_desc;

@@ -190,6 +190,7 @@ static strl_status write_stats(strl_render_output *output, size_t frame, const s
                   {"splats", s->splats},
                   {"nodes", s->nodes},
                   {"nodes_culled", s->nodes_culled},
+                  {"nodes_backfacing", s->nodes_backfacing},
                   {"draws", s->draws},
                   {"requests", s->requests},
                   {"bytes_read", s->bytes_read},

@@ -37,6 +37,7 @@ typedef struct soup_batch {
 
 typedef struct soup_model {
     strl_render_model base;
+    strl_cull cull;
     double origin[3]; /* the first corner of the file: positions are floats from there */
     soup_batch *batches;
     size_t batch_count, batch_capacity;
@@ -294,7 +295,7 @@ static strl_status soup_draw(strl_render_model *model, strl_renderer *renderer, 
         strl_view_depth_range(&view, &self->batches[b].box, &near_depth, &far_depth);
         least = fmin(least, near_depth), largest = fmax(largest, far_depth);
     }
-    strl_draw_list list = {.items = self->items, .count = (uint32_t)self->batch_count};
+    strl_draw_list list = {.items = self->items, .count = (uint32_t)self->batch_count, .cull = self->cull};
     strl_render_set_range(&list, least, largest);
     stats->select_ns = strl_clock_ns() - start;
     strl_render_stats drawn;
@@ -326,6 +327,7 @@ strl_status strl_render_soup_open(const strl_render_model_desc *desc, strl_rende
     if (!self)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a model");
     self->base.klass = &soup_class;
+    self->cull = desc->cull;
     strl_status status = load_soup(self, desc, err);
     if (status != STRL_OK) {
         soup_close(&self->base);

@@ -78,6 +78,7 @@ static strl_status settle(walk_model *self, const strl_camera *camera, strl_draw
 static void fill_stats(const strl_walk_stats *walk, strl_image_stats *stats)
 {
     stats->nodes_culled = walk->nodes_culled;
+    stats->nodes_backfacing = walk->nodes_backfacing;
     stats->resident_bytes = walk->resident_bytes;
     stats->missing_nodes = walk->missing_nodes;
     stats->splats = walk->splats;
@@ -137,7 +138,7 @@ static strl_status open_walk(walk_model *self, const strl_render_model_desc *des
         return status;
     self->executor = (strl_executor){self->pool, submit};
     const strl_walk_desc walk = {
-        .memory_bytes = desc->memory_bytes, .error_px = desc->error_px, .splat_px = desc->splat_px, .executor = &self->executor};
+        .memory_bytes = desc->memory_bytes, .error_px = desc->error_px, .splat_px = desc->splat_px, .cull = desc->cull, .executor = &self->executor};
     status = strl_walk_open(source, &walk, &self->walk, err);
     if (status == STRL_OK) /* up axis and unit are not the walk's business */
         strl_render_container_facts(strl_walk_container(self->walk), &self->base);

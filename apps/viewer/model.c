@@ -55,8 +55,7 @@ static strl_status submit(void *context, void (*run)(void *job), void *job, strl
     return strl_pool_submit(context, run, job, err);
 }
 
-strl_status strl_viewer_model_open(strl_viewer_model *model, const strl_location *location, uint64_t memory_bytes,
-                                   double error_px, strl_error *err)
+strl_status strl_viewer_model_open(strl_viewer_model *model, const strl_location *location, const strl_walk_desc *how, strl_error *err)
 {
     *model = (strl_viewer_model){0};
     strl_source *source = NULL;
@@ -68,8 +67,9 @@ strl_status strl_viewer_model_open(strl_viewer_model *model, const strl_location
         status = strl_location_open_source(location, READ_THREADS, &source, err);
     if (status == STRL_OK) {
         model->executor = (strl_executor){model->pool, submit};
-        const strl_walk_desc desc = {
-            .memory_bytes = memory_bytes, .error_px = error_px, .executor = &model->executor, .labels = true};
+        strl_walk_desc desc = *how;
+        desc.executor = &model->executor;
+        desc.labels = true;
         status = strl_walk_open(source, &desc, &model->walk, err);
     }
     if (status == STRL_OK)

@@ -153,7 +153,7 @@ static bool is_cut_off(const strl_pick_filter *filter, const strl_ray *ray, doub
 }
 
 static bool pick_item(const strl_draw_item *item, const strl_ray *world, const local_ray *ray,
-                      const strl_pick_filter *filter, hit *best)
+                      const strl_pick_filter *filter, strl_cull cull, hit *best)
 {
     bool found = false;
     for (uint32_t k = item->draw_first; k + 2 < item->draw_first + item->draw_count; k += 3) {
@@ -161,8 +161,8 @@ static bool pick_item(const strl_draw_item *item, const strl_ray *world, const l
         uint32_t vertex = item->indices[k];
         for (int c = 0; c < 3; c++)
             vertex_of(item, item->indices[k + (uint32_t)c], p[c]);
-        if (!meets_triangle(p, ray, &t, normal) || t >= best->t || is_hidden(filter, item, vertex) ||
-            is_cut_off(filter, world, t))
+        if (!meets_triangle(p, ray, &t, normal) || t >= best->t || is_hidden(filter, item, vertex) || is_cut_off(filter, world, t) ||
+            (cull == STRL_CULL_BACK && dot(normal, ray->way) > 0)) /* in the model's own space no placement mirrors */
             continue;
         *best = (hit){t, {normal[0], normal[1], normal[2]}, vertex};
         found = true;
@@ -212,7 +212,7 @@ bool strl_pick_list(const strl_draw_list *list, const strl_ray *ray, const strl_
         local_ray local;
         if (item->draw_count == 0 || item->point_px > 0 || is_item_hidden(filter ? filter : &none, item) || !to_local(item, ray, &local) || !meets_box(item, &local, best.t))
             continue;
-        if (pick_item(item, ray, &local, filter ? filter : &none, &best))
+        if (pick_item(item, ray, &local, filter ? filter : &none, list->cull, &best))
             nearest = item;
     }
     if (nearest)

@@ -37,6 +37,13 @@ typedef struct strl_vertex_label {
     uint16_t texcoord[2]; /* codes over the range of the material's image (stroll/container.h); 0 where it has none */
 } strl_vertex_label;
 
+/* Which faces are not to be seen. */
+typedef enum strl_cull {
+    STRL_CULL_NONE = 0, /* both sides of each face are drawn */
+    STRL_CULL_BACK      /* a face is drawn only where its corners come counter-clockwise as seen from the eye, as the input has them; a
+                           placement that mirrors does not turn faces round. For models whose backs nobody sees: closed ones */
+} strl_cull;
+
 /* What strl_vertex.position holds. A walk gives lattice positions only; floats are for triangles drawn as read. */
 typedef enum strl_positions {
     STRL_POSITIONS_LATTICE = 0,
@@ -74,6 +81,7 @@ typedef struct strl_draw_list {
     const strl_draw_item *items;
     uint32_t count;
     double near_distance, far_distance; /* of the visible boxes along the view direction; > 0 */
+    strl_cull cull; /* to be obeyed: what the list leaves out may show nothing but backs */
     uint64_t frame; /* counts the lists of one walk from 1; 0 = unknown: dirty ranges are then not used */
 } strl_draw_list;
 

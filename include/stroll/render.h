@@ -55,7 +55,7 @@ typedef enum strl_part_style {
 /* How to draw one list. Zero-initialise: every 0 takes its default. */
 typedef struct strl_draw_options {
     strl_debug_colour debug;
-    bool wireframe;
+    bool wireframe;         /* OpenGL ES draws the edges of backs too, whatever the list culls */
     bool flat;              /* normals of the triangles instead of those of the vertices */
     bool keep;              /* draw over the last image, which had the same camera, near and far */
     uint8_t background[3];  /* sRGB-encoded */

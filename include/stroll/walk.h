@@ -42,6 +42,7 @@ typedef struct strl_walk_desc {
     uint32_t requests_in_flight; /* 0 = 16, of a remote source 64; at most 256. Of a remote source fewer, as bandwidth and
                                     latency want it */
     const strl_executor *executor; /* copied */
+    strl_cull cull; /* STRL_CULL_BACK: the draw lists say so, and nodes that show nothing but backs are not in them, nor read */
     bool labels; /* keep part, material and texture coordinate of each vertex: 12 bytes a vertex more, within memory_bytes */
 } strl_walk_desc;
 
@@ -51,6 +52,8 @@ typedef struct strl_walk_stats {
     uint64_t splats;           /* beside them */
     uint32_t nodes;            /* visible items */
     uint32_t nodes_culled;     /* active, but outside the frustum */
+    uint32_t nodes_backfacing; /* left out, each with all that is below it: with STRL_CULL_BACK nothing of them would be seen. Of sample
+                                  trees; not in nodes_culled */
     uint32_t missing_nodes;    /* nodes of the wanted front that are not drawn yet; where the records of their parents' children are
                                   missing too, those parents */
     uint32_t requests;         /* reads submitted in this frame */

@@ -8,6 +8,7 @@
 #include <stdint.h>
 
 #include "base/memory.h"
+#include "geometry/cone.h"
 #include "geometry/progressive.h"
 #include "source/source.h"
 #include "stroll/container.h"
@@ -75,6 +76,7 @@ typedef struct strl_node {
     uint32_t payload_offset;  /* within the page */
     uint32_t payload_bytes;
     uint32_t decode_parent; /* STRL_NONE: the payload is self-contained; else the parent, whose mesh is needed to decode it */
+    strl_cone cone; /* of the normals of all triangles of the node and of those below it; sample trees alone have one */
 } strl_node;
 
 /* One tree. Lattice cell c is the point origin + step * c in model units. */

@@ -48,7 +48,9 @@ void strl__node_encode(const strl_node *node, uint8_t bytes[STRL__NODE_BYTES])
     strl_writer_u32(&out, node->page.bytes);
     strl_writer_u32(&out, node->page.decoded_bytes);
     strl_writer_u64(&out, node->page.checksum);
-    strl_writer_u64(&out, 0);
+    for (int axis = 0; axis < 3; axis++)
+        strl_writer_u16(&out, (uint16_t)node->cone.axis[axis]);
+    strl_writer_u16(&out, node->cone.cosine);
 }
 
 strl_status strl__node_decode(const uint8_t bytes[STRL__NODE_BYTES], uint32_t id, strl_node *node, strl_error *err)
@@ -81,7 +83,10 @@ strl_status strl__node_decode(const uint8_t bytes[STRL__NODE_BYTES], uint32_t id
     node->page.bytes = strl_cursor_u32(&in);
     node->page.decoded_bytes = strl_cursor_u32(&in);
     node->page.checksum = strl_cursor_u64(&in);
-    if (strl_cursor_u64(&in) || reserved)
+    for (int axis = 0; axis < 3; axis++)
+        node->cone.axis[axis] = (int16_t)strl_cursor_u16(&in);
+    node->cone.cosine = strl_cursor_u16(&in);
+    if (reserved)
         return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": a reserved field is not zero", id);
     return STRL_OK;
 }
@@ -197,6 +202,19 @@ static strl_status check_counts(const strl_node *node, uint32_t id, const strl_t
     return STRL_OK;
 }
 
+/* In a tree that replaces, states that have fewer triangles would need one too. */
+static strl_status check_cone(const strl_node *node, uint32_t id, const strl_tree *tree, strl_error *err)
+{
+    const strl_cone *cone = &node->cone;
+    bool has_axis = cone->axis[0] || cone->axis[1] || cone->axis[2], has_cosine = cone->cosine > 0;
+    if (has_axis == has_cosine && (!has_axis || tree->structure == STRL_STRUCTURE_SAMPLES))
+        return STRL_OK;
+    return strl__fail(err, STRL_ERR_FORMAT,
+                      "node %" PRIu32 ": its cone has the axis %d %d %d and the cosine %u, expected %s in a tree of structure %d", id,
+                      cone->axis[0], cone->axis[1], cone->axis[2], cone->cosine,
+                      tree->structure == STRL_STRUCTURE_SAMPLES ? "both or neither" : "none", (int)tree->structure);
+}
+
 strl_status strl__node_check(const strl_node *node, uint32_t id, const strl_tree *tree, strl_error *err)
 {
     strl_status status = check_kinship(node, id, tree, err);
@@ -204,6 +222,8 @@ strl_status strl__node_check(const strl_node *node, uint32_t id, const strl_tree
         status = check_counts(node, id, tree, err);
     if (status == STRL_OK)
         status = check_errors(node, id, err);
+    if (status == STRL_OK)
+        status = check_cone(node, id, tree, err);
     if (status != STRL_OK)
         return status;
     if (!box_is_legal(node->box_min, node->box_max) || !box_is_legal(node->group_box_min, node->group_box_max) ||

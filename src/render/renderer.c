@@ -102,7 +102,7 @@ strl_status strl_renderer_draw(strl_renderer *renderer, const strl_camera *camer
                                const strl_draw_options *options, strl_render_stats *stats, strl_error *err)
 {
     strl_draw_setup setup = {.camera = *camera, .near_distance = list->near_distance, .far_distance = list->far_distance,
-                             .supersample = renderer->desc.supersample};
+                             .cull_back = list->cull == STRL_CULL_BACK, .supersample = renderer->desc.supersample};
     strl_render_stats unwanted;
     if (!stats)
         stats = &unwanted;
@@ -115,6 +115,8 @@ strl_status strl_renderer_draw(strl_renderer *renderer, const strl_camera *camer
     if (camera->width != renderer->desc.width || camera->height != renderer->desc.height)
         return strl__fail(err, STRL_ERR_ARGUMENT, "the camera's image is %" PRIu32 "x%" PRIu32 ", the renderer's %" PRIu32 "x%" PRIu32,
                           camera->width, camera->height, renderer->desc.width, renderer->desc.height);
+    if (list->cull != STRL_CULL_NONE && list->cull != STRL_CULL_BACK)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "the draw list culls faces of a kind %d, which there is not", (int)list->cull);
     if (list->count == 0)
         setup.near_distance = setup.far_distance = 1;
     else if (!(setup.near_distance > 0) || !(setup.far_distance >= setup.near_distance) || !isfinite(setup.far_distance))

@@ -10,6 +10,7 @@ typedef struct strl_draw_setup {
     strl_camera camera;
     strl_view view;
     double near_distance, far_distance;
+    bool cull_back; /* of triangles, as the list says */
     strl_draw_options options;
     uint32_t supersample;
 } strl_draw_setup;

@@ -6,7 +6,7 @@
 
 static const char *const names[STRL_VERIFY_KINDS] = {
     "header", "references", "checksums", "tables", "records", "pages",  "payloads",       "counts",    "boxes",
-    "errors", "groups",     "root",      "unions", "closed",  "cracks", "leaf_triangles", "distances",
+    "cones",  "errors", "groups",     "root",      "unions", "closed",  "cracks", "leaf_triangles", "distances",
 };
 
 const char *strl_verify_name(strl_verify_kind kind)

@@ -120,6 +120,7 @@ static strl_status check_node(contents *self, uint32_t id, const uint8_t *bytes,
     }
     check_box(self, id, &mesh);
     check_claims(self, id, &mesh);
+    strl__v_check_cones(self->model, self->tree, id, &mesh);
     return take_hashes(self, id, &mesh, worker, err);
 }
 

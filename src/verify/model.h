@@ -27,6 +27,8 @@ typedef struct strl__vnode {
     int64_t anchor[3];
     int64_t box[2][3], group_box[2][3]; /* min, max */
     float geometric_min, geometric_max, appearance_min, appearance_max, group_geometric, group_appearance;
+    int16_t cone_axis[3];
+    uint16_t cone_cosine; /* times 65535; 0 = there is no cone */
     uint32_t vertex_count, base_vertex_count, triangle_count, base_triangle_count, step_count;
     uint32_t boundary_steps, shared_vertices;
     uint32_t payload_offset, payload_bytes, page_decoded;

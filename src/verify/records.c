@@ -78,7 +78,10 @@ static bool decode_record(strl_cursor *cursor, strl__vnode *node)
     node->page.bytes = strl_cursor_u32(cursor);
     node->page_decoded = strl_cursor_u32(cursor);
     node->page.checksum = strl_cursor_u64(cursor);
-    return strl_cursor_u64(cursor) == 0 && plain;
+    for (unsigned k = 0; k < 3; k++)
+        node->cone_axis[k] = (int16_t)strl_cursor_u16(cursor);
+    node->cone_cosine = strl_cursor_u16(cursor);
+    return plain;
 }
 
 static bool error_range(float least, float most)
@@ -95,6 +98,12 @@ static bool lattice_range(const strl__vnode *n)
                n->group_box[0][k] >= -LATTICE_LIMIT && n->group_box[1][k] <= LATTICE_LIMIT &&
                n->anchor[k] >= -LATTICE_LIMIT && n->anchor[k] <= LATTICE_LIMIT;
     return good;
+}
+
+static bool cone_range(const strl__vtree *tree, const strl__vnode *n)
+{
+    bool axis = n->cone_axis[0] != 0 || n->cone_axis[1] != 0 || n->cone_axis[2] != 0;
+    return axis == (n->cone_cosine != 0) && (!axis || tree->structure == 3);
 }
 
 static void check_ranges(treelets *self, uint32_t id, strl__vnode *n)
@@ -120,6 +129,8 @@ static void check_ranges(treelets *self, uint32_t id, strl__vnode *n)
                 id, "tree %u node %u: %u of %u vertices, %u of %u triangles, %u steps, %u shared vertices", tree->index,
                 id, n->base_vertex_count, n->vertex_count, n->base_triangle_count, n->triangle_count, n->step_count,
                 n->shared_vertices);
+    RECORD_RULE(self, cone_range(tree, n), id, "tree %u node %u: a cone about %d %d %d of the cosine %u", tree->index, id,
+                n->cone_axis[0], n->cone_axis[1], n->cone_axis[2], n->cone_cosine);
     RECORD_RULE(self,
                 n->page.bytes <= MOST_PAGE_BYTES && n->payload_bytes >= 1 && n->payload_offset <= n->page.bytes &&
                     n->payload_bytes <= n->page.bytes - n->payload_offset,

@@ -25,6 +25,7 @@ typedef enum strl_verify_kind {
     STRL_VERIFY_PAYLOADS,  /* each decodes to a progressive mesh as its record says */
     STRL_VERIFY_COUNTS,    /* triangles, vertices, groups, levels, drops */
     STRL_VERIFY_BOXES,     /* geometry in box, boxes nest */
+    STRL_VERIFY_CONES,     /* normals of the triangles of a node and all below it in its cone */
     STRL_VERIFY_ERRORS,    /* monotone from the leaves to the root */
     STRL_VERIFY_GROUPS,    /* membership and sizes */
     STRL_VERIFY_ROOT,      /* the root's base mesh is small enough */

@@ -96,6 +96,15 @@ static void note_foreign(strl_walk *walk, const strl__node *parent, strl__node *
     strl__note_fault(walk, &error);
 }
 
+/* Pages are the unit of reading: of one that is read now, what may be seen after the next step need not be read again. */
+static void leave_out(strl__descent *c, strl__node *child)
+{
+    bool may_come = c->cut->kind == STRL__CUT_FRONT && child->residency == STRL__ABSENT && child->retry.frame <= c->walk->frame;
+    c->turned_away++;
+    if (may_come) /* without memory it does not */
+        strl__add_candidate(&c->walk->along, child, STRL_NONE, 0);
+}
+
 /* The records of one child, or a candidate for the treelet that has them. Another node's child is
  * withheld: a node is then met at most once in a descent, whatever a file says. */
 static strl__outlook find_child(strl__descent *c, strl__node *parent, uint32_t id, double urgency, strl__candidates *to,
@@ -107,6 +116,13 @@ static strl__outlook find_child(strl__descent *c, strl__node *parent, uint32_t i
         note_foreign(walk, parent, *child);
         *child = NULL;
         return STRL__BACKING_OFF;
+    }
+    /* The place for occlusion too: what is known to be hidden is left out here in the same way, of trees that add alone, because of one
+     * that replaces a group needs all its children. */
+    if (*child && strl__faces_away(&c->facing, (*child)->record)) {
+        leave_out(c, *child);
+        *child = NULL;
+        return STRL__HERE;
     }
     if (*child) {
         bool waiting = (*child)->residency == STRL__ABSENT && (*child)->retry.frame > walk->frame;
@@ -130,6 +146,7 @@ strl_status strl__find_children(strl__descent *c, const strl__group *group, doub
 {
     strl_walk *walk = c->walk;
     walk->children.count = 0;
+    c->turned_away = 0;
     *worst = STRL__HERE;
     for (uint32_t i = group->first; i != STRL_NONE; i = walk->level.items[i].next) {
         strl__node *parent = walk->level.items[i].node;

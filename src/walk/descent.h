@@ -2,7 +2,7 @@
 #ifndef STRL_WALK_DESCENT_H
 #define STRL_WALK_DESCENT_H
 
-#include "walk/internal.h"
+#include "walk/facing.h"
 
 typedef struct strl__descent {
     strl_walk *walk;
@@ -10,6 +10,8 @@ typedef struct strl__descent {
     uint32_t index; /* of the placement */
     const strl__placement *placement;
     const strl_tree *tree;
+    strl__facing facing;
+    uint32_t turned_away; /* children that the last strl__find_children left out */
     strl_error *err;
 } strl__descent;
 
@@ -34,8 +36,8 @@ bool strl__add_run(strl__candidates *candidates, strl__run *run, double px);
 strl_status strl__gather_groups(strl_walk *walk, strl_error *err);
 /* All members are at this level, and none is a leaf. */
 bool strl__is_complete(const strl_walk *walk, const strl__group *group);
-/* Collects the children of all members whose records are here in walk->children; absent records become candidates in
- * `to`. *worst: the worst outlook of any. */
+/* Collects the children of all members whose records are here in walk->children, but those of which nothing can be seen; absent records
+ * become candidates in `to`. *worst: the worst outlook of any. */
 strl_status strl__find_children(strl__descent *c, const strl__group *group, double urgency, strl__candidates *to,
                                 strl__outlook *worst);
 

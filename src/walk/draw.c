@@ -75,6 +75,7 @@ strl_status strl__draw_list(strl_walk *walk, const strl_view *view, strl_draw_li
         largest = fmax(largest, far_depth);
     }
     list->frame = walk->frame;
+    list->cull = walk->cull;
     list->items = walk->items;
     list->count = (uint32_t)walk->front.count;
     list->far_distance = largest > 0 ? largest : 1;

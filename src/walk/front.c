@@ -129,6 +129,7 @@ static strl_status descend(strl__descent *c, const strl__group *group, double px
 {
     strl_walk *walk = c->walk;
     bool ready = is_ready(walk, group);
+    c->cut->backfacing += c->turned_away;
     for (size_t i = 0; i < walk->children.count; i++) {
         strl__node *child = walk->children.items[i];
         child->counted_pass = walk->pass;
@@ -196,6 +197,10 @@ static strl_status visit_placement(strl__descent *c)
 {
     strl_walk *walk = c->walk;
     strl__node *root = walk->trees[c->placement->tree].root;
+    if (strl__faces_away(&c->facing, root->record)) {
+        c->cut->backfacing++;
+        return STRL_OK;
+    }
     strl_status status = strl__find_demands(c, root);
     if (status != STRL_OK)
         return status;
@@ -224,7 +229,7 @@ strl_status strl__cut_run(strl_walk *walk, strl__cut *cut, strl_error *err)
     cut->bytes = walk->root_bytes;
     if (cut->kind == STRL__CUT_FRONT) {
         walk->wanted.count = walk->split.count = walk->ahead.count = 0;
-        walk->missing.count = walk->prefetch.count = walk->front.count = walk->wanted_runs.count = 0;
+        walk->missing.count = walk->prefetch.count = walk->along.count = walk->front.count = walk->wanted_runs.count = 0;
         for (unsigned size = 0; size < STRL__FAR_SIZES; size++)
             walk->far[size].count = 0, walk->far[size].px = 0;
         walk->far_far = 0;
@@ -237,7 +242,10 @@ strl_status strl__cut_run(strl_walk *walk, strl__cut *cut, strl_error *err)
             status = strl__placements_next(walk, cut, i, &i, &placement, err);
         if (status != STRL_OK || !placement || cut->overflow)
             break;
-        strl__descent c = {walk, cut, i, placement, walk->trees[placement->tree].tree, err};
+        const strl_tree *tree = walk->trees[placement->tree].tree;
+        strl__descent c = {.walk = walk, .cut = cut, .index = i, .placement = placement, .tree = tree, .err = err};
+        if (walk->cull == STRL_CULL_BACK)
+            c.facing = strl__facing_find(cut->view, tree, placement->transform);
         status = visit_placement(&c);
     }
     return status;

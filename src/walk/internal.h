@@ -301,6 +301,7 @@ typedef struct strl__cut {
     bool overflow;         /* result: more than capacity; the rest is undefined */
     bool records_missing;  /* result: the cut ends early for want of records that are on their way */
     bool waits;            /* result: something is missing that has not been given up */
+    uint32_t backfacing;   /* result: nodes left out with all below them, see facing.c */
     uint32_t missing;      /* result: nodes of the wanted front that are not in the front, or groups'
                              members cut short */
 } strl__cut;
@@ -313,6 +314,7 @@ struct strl_walk {
     double error_px;
     double splat_ratio; /* pixels of a splat for each of the allowed error */
     bool labels; /* kept for each vertex */
+    strl_cull cull;
     double bounds[6];
     strl__walk_tree *trees;
     uint32_t tree_count;
@@ -348,6 +350,7 @@ struct strl_walk {
     strl__runs wanted_runs;           /* of which the front has placements, or may have */
     strl__splits split, split_before; /* of this frame and the last */
     strl__candidates missing, prefetch;
+    strl__candidates along; /* left out of the cut: they come where their page is read for others */
     strl__front front;
     strl_draw_item *items;
     size_t item_capacity;

@@ -462,6 +462,7 @@ void strl__requests_submit(strl_walk *walk)
     walk->room = strl_source_room(walk->source);
     ask_for_all(walk, &walk->missing, walk->requests_in_flight, walk->frame + 1);
     uint64_t idle_since = walk->frame > SPARE_FRAMES ? walk->frame - SPARE_FRAMES : 0;
+    ask_for_all(walk, &walk->along, 0, idle_since); /* no slot is theirs */
     if (walk->missing.count == 0)
         ask_for_all(walk, &walk->prefetch, (walk->requests_in_flight + 1) / 2, idle_since);
     forget_stale(walk);

@@ -109,6 +109,7 @@ static void apply_desc(strl_walk *walk, const strl_walk_desc *desc, strl_source 
     if (desc->executor)
         walk->executor = *desc->executor;
     walk->labels = desc->labels;
+    walk->cull = desc->cull;
     strl_walk_set_error_px(walk, desc->error_px);
     walk->splat_ratio = isfinite(desc->splat_px) && desc->splat_px > 0 ? desc->splat_px / walk->error_px : 1;
     walk->stats.allowed_error_px = walk->error_px;
@@ -165,6 +166,7 @@ void strl_walk_close(strl_walk *walk)
                            walk->split_before.items,
                            walk->missing.items,
                            walk->prefetch.items,
+                           walk->along.items,
                            walk->front.items,
                            walk->items,
                            walk->points,
@@ -223,6 +225,7 @@ static strl_status select_front(strl_walk *walk, const strl_camera *camera, cons
         return status;
     }
     walk->stats.missing_nodes = cut.missing;
+    walk->stats.nodes_backfacing = cut.backfacing;
     walk->settled = !cut.waits;
     strl__cut_commit(walk);
     return STRL_OK;

@@ -226,6 +226,7 @@ static const damage damages[] = {
     {"bad-step-count.stroll", NODE_1, 184, 4, 100},
     {"bad-record-lies.stroll", NODE_1, 168, 4, 60},
     {"bad-payload-range.stroll", NODE_1, 200, 4, 100000},
+    {"bad-cone.stroll", NODE_1, 232, 8, 0xfffe7fff00000000u}, /* such trees have none */
     {"bad-page-range.stroll", NODE_1, 208, 8, 0x1000000},
     {"bad-page-alignment.stroll", NODE_1, 208, 8, 4097},
     {"bad-placement-tree.stroll", PLACEMENTS, 8, 4, 1},

@@ -4,6 +4,7 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <cmocka.h>
+#include <epoxy/gl.h>
 
 #include "render/glcommon/context.h"
 #include "render/patches.h"
@@ -111,6 +112,75 @@ static void wireframes_leave_holes_on_every_backend(void **state)
         shoot(renderer, &camera, &all.list, NULL, &filled);
         strl_renderer_destroy(renderer);
         assert_in_range(count_covered(&lines), PIXELS / 20, count_covered(&filled) * 9 / 10);
+    }
+    patches_deinit(&all);
+}
+
+/* From above and from below; as it is, mirrored, turned over by mirroring twice; lit, thinned out, as a wireframe; with splats, which have no
+ * back. */
+static void backs_are_not_drawn_where_the_list_says_so(void **state)
+{
+    (void)state;
+    static const strl_renderer_desc descs[] = {{.backend = STRL_BACKEND_GL45}, {.backend = STRL_BACKEND_GL3},
+                                               {.backend = STRL_BACKEND_GL3, .core_only = true}, {.backend = STRL_BACKEND_GL3, .gles = true}};
+    static const double scales[3][3] = {{1, 1, 1}, {-1, 1, 1}, {-1, 1, -1}};
+    static picture culled, both;
+    for (size_t d = 0; d < sizeof descs / sizeof *descs; d++)
+        for (int mode = 0; mode < 24; mode++) {
+            bool below = mode & 1, orthographic = mode & 2, translucent = mode & 4;
+            const double *scale = scales[mode / 8];
+            patches all;
+            patches_init(&all, (patches_desc){.side = 2, .flat = true, .alpha = translucent ? 128 : 255});
+            strl_camera camera = patches_camera(&all, WIDTH, HEIGHT, 0.6);
+            camera.up[0] = 0, camera.up[1] = 1, camera.up[2] = 0;
+            if (orthographic)
+                camera.fov_y_deg = 0, camera.ortho_height = 60;
+            for (int k = 0; k < 3; k++) {
+                camera.eye[k] *= scale[k], camera.target[k] *= scale[k];
+                for (uint32_t i = 0; i < all.count; i++)
+                    all.items[i].transform[5 * k] = scale[k];
+            }
+            camera.eye[2] = below != (scale[2] < 0) ? -fabs(camera.eye[2]) : fabs(camera.eye[2]);
+            strl_renderer *renderer = make(descs[d]);
+            shoot(renderer, &camera, &all.list, NULL, &both);
+            all.list.cull = STRL_CULL_BACK;
+            shoot(renderer, &camera, &all.list, NULL, &culled);
+            assert_true(count_covered(&both) > (int)PIXELS / 10);
+            assert_int_equal(count_covered(&culled), below ? 0 : count_covered(&both));
+            for (uint32_t i = 0; i < all.count; i++)
+                all.items[i].point_px = 9;
+            all.list.frame++;
+            shoot(renderer, &camera, &all.list, NULL, &culled);
+            assert_true(count_covered(&culled) > (int)PIXELS / 20);
+            for (uint32_t i = 0; i < all.count; i++) /* what was set is not left behind */
+                all.items[i].point_px = 0;
+            all.list.cull = STRL_CULL_NONE;
+            shoot(renderer, &camera, &all.list, NULL, &culled);
+            assert_int_equal(count_different(&culled, &both, 0), 0);
+            strl_renderer_destroy(renderer);
+            patches_deinit(&all);
+        }
+}
+
+/* The two stand side by side and share a batch. */
+static void mirrored_and_plain_placements_cull_in_one_list(void **state)
+{
+    (void)state;
+    static picture culled, both;
+    patches all;
+    patches_init(&all, (patches_desc){.side = 2, .flat = true});
+    strl_camera camera = patches_camera(&all, WIDTH, HEIGHT, 0.6);
+    camera.up[0] = 0, camera.up[1] = 1, camera.up[2] = 0;
+    for (uint32_t i = 0; i < all.count; i += 2) { /* mirrored in the plane that the patch itself lies in */
+        all.items[i].placement = 1;
+        all.items[i].transform[10] = -1;
+    }
+    for (strl_backend backend = STRL_BACKEND_GL45; backend <= STRL_BACKEND_GL3; backend++) {
+        all.list.cull = STRL_CULL_NONE;
+        shoot_once((strl_renderer_desc){.backend = backend}, &camera, &all.list, NULL, &both);
+        all.list.cull = STRL_CULL_BACK;
+        shoot_once((strl_renderer_desc){.backend = backend}, &camera, &all.list, NULL, &culled);
+        assert_in_range(count_covered(&culled), count_covered(&both) / 3, count_covered(&both) * 2 / 3); /* the mirrored ones look down */
     }
     patches_deinit(&all);
 }
@@ -550,6 +620,14 @@ static void a_renderer_draws_with_the_context_its_caller_made_and_resizes(void *
         assert_int_equal(strl_renderer_read_colour(renderer, borrowed.rgba[0], NULL), STRL_ERR_ARGUMENT);
         shoot(renderer, &camera, &all.list, NULL, &borrowed);
         assert_int_equal(count_different(&own, &borrowed, 2), 0);
+        GLint front;
+        all.list.cull = STRL_CULL_BACK;
+        all.items[all.count - 1].transform[0] = -1;
+        shoot(renderer, &camera, &all.list, NULL, &borrowed);
+        all.list.cull = STRL_CULL_NONE;
+        all.items[all.count - 1].transform[0] = 1;
+        glGetIntegerv(GL_FRONT_FACE, &front);
+        assert_true(front == GL_CCW && !glIsEnabled(GL_CULL_FACE)); /* as others expect to find it */
         strl_renderer_destroy(renderer);
         strl__gl_context_destroy(context);
     }
@@ -584,6 +662,8 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_backend_gives_the_same_picture),
         cmocka_unit_test(wireframes_leave_holes_on_every_backend),
+        cmocka_unit_test(backs_are_not_drawn_where_the_list_says_so),
+        cmocka_unit_test(mirrored_and_plain_placements_cull_in_one_list),
         cmocka_unit_test(nodes_with_different_anchors_meet_without_a_crack),
         cmocka_unit_test(cells_far_beyond_32_bits_draw_like_cells_near_zero),
         cmocka_unit_test(a_dirty_range_uploads_as_good_as_everything),

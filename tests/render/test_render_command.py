@@ -87,7 +87,7 @@ class Test:
             self.check("the orbit's elevation is 20 degrees", abs(rise - math.sin(math.radians(20))) < 1e-9, rise)
         with open(stats) as file:
             lines = [json.loads(line) for line in file]
-        needed = ("frame elapsed_ms frame_ms select_ms cull_ms draw_ms triangles splats nodes nodes_culled draws requests bytes_read "
+        needed = ("frame elapsed_ms frame_ms select_ms cull_ms draw_ms triangles splats nodes nodes_culled nodes_backfacing draws requests bytes_read "
                   "resident_bytes gpu_bytes covered_pixels max_error_px missing_nodes disk_waits").split()
         self.check("statistics have a line a frame with every field", len(lines) == 4 and all(n in l for l in lines for n in needed), lines)
         elapsed = [0] + [l["elapsed_ms"] for l in lines]

@@ -48,6 +48,16 @@ static void assert_refused(fixture *f, const char *words)
         fail_msg("expected \"%s\" in \"%s\"", words, f->err.message);
 }
 
+static void faces_are_culled_as_is_known(void **state)
+{
+    fixture *f = *state;
+    f->all.list.cull = STRL_CULL_BACK;
+    assert_int_equal(draw(f), STRL_OK);
+    assert_int_equal(f->stats.items, 4);
+    f->all.list.cull = (strl_cull)2;
+    assert_refused(f, "culls");
+}
+
 static void a_sound_list_is_counted(void **state)
 {
     fixture *f = *state;
@@ -195,6 +205,7 @@ int main(void)
 #define WITH(test) cmocka_unit_test_setup_teardown(test, setup, teardown)
     const struct CMUnitTest tests[] = {
         WITH(a_sound_list_is_counted),
+        WITH(faces_are_culled_as_is_known),
         WITH(an_index_past_the_vertices_is_found),
         WITH(a_vertex_outside_the_box_is_found),
         WITH(a_broken_count_or_number_is_found),

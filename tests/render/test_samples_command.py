@@ -3,6 +3,7 @@
 
 usage: test_samples_command.py PROGRAM"""
 import json
+import math
 import os
 import pathlib
 import struct
@@ -150,6 +151,55 @@ def splats_of_confetti_are_as_bright_as_it(folder):
             assert stats["splats"] > 100 and 0.88 < light[1] / light[0] < 1.12, (backend, eye, light)
 
 
+def ball(path, rings, inward):
+    """A closed sphere of radius 1, which a PLY tells counter-clockwise from outside, or from inside."""
+    corners, triangles = [], []
+    for ring in range(rings + 1):
+        for turn in range(2 * rings):
+            polar, angle = math.pi * ring / rings, math.pi * turn / rings
+            corners += math.sin(polar) * math.cos(angle), math.sin(polar) * math.sin(angle), math.cos(polar)
+    for ring in range(rings):
+        for turn in range(2 * rings):
+            a, b = ring * 2 * rings + turn, ring * 2 * rings + (turn + 1) % (2 * rings)
+            triangles += [(a, a + 2 * rings, b + 2 * rings)] * (ring < rings - 1) + [(a, b + 2 * rings, b)] * (ring > 0)
+    head = (f"ply\nformat binary_little_endian 1.0\nelement vertex {len(corners) // 3}\nproperty float x\nproperty float y\nproperty float z\n"
+            f"element face {len(triangles)}\nproperty list uchar uint vertex_indices\nend_header\n")
+    with open(path, "wb") as file:
+        file.write(head.encode() + struct.pack(f"<{len(corners)}f", *corners))
+        file.write(b"".join(struct.pack("<B3I", 3, *(face[::-1] if inward else face)) for face in triangles))
+
+
+def backs_are_left_out_on_request(folder):
+    """Of the file as read, of a container in full, and of walks through both structures. From outside a closed surface looks as ever, and of
+    one that is turned inside out its far half is seen."""
+    outside = ("--camera", "eye 3 1 2 target 0 0 0 up 0 0 1 fov 45")
+    for inward in (False, True):
+        source, samples, clusters = (os.path.join(folder, f"{name}{inward:d}") for name in ("in.ply", "samples.stroll", "clusters.stroll"))
+        ball(source, 180, inward)
+        build(source, samples, "--structure", "samples")
+        build(source, clusters)
+        checks = json.loads(must("verify", samples, "--json", "--against", source).output)["checks"]
+        assert checks["cones"]["done"] and checks["cones"]["failures"] == 0 and checks["cones"]["count"] > 20, checks["cones"]
+        depths = []
+        for model, words in ((source, ("--full",)), (samples, ("--full",)), (samples, ("--error", "1e-6")), (clusters, ("--error", "0.5"))):
+            for backend in BACKENDS if model == samples else BACKENDS[:1]:
+                both, all_of_it = render(model, folder, "--backend", backend, *outside, *words)
+                none, _ = render(model, folder, "--backend", backend, "--cull", "none", *outside, *words)
+                culled, stats = render(model, folder, "--backend", backend, "--cull", "back", "--depth", *outside, *words)
+                assert none == both and (culled != both or not inward), (model, words)
+                assert stats["triangles"] <= all_of_it["triangles"] and all_of_it["nodes_backfacing"] == 0, (stats, all_of_it)
+                walks = model == samples and "--full" not in words
+                assert (stats["nodes_backfacing"] > 0) == walks and (stats["triangles"] < 0.8 * all_of_it["triangles"]) == walks, stats
+                assert abs(stats["covered_pixels"] - all_of_it["covered_pixels"]) <= 40, (stats, all_of_it)
+                with open(os.path.join(folder, "image.pfm"), "rb") as file:
+                    depths.append(struct.unpack(f"<{240 * 180}f", file.read()[-4 * 240 * 180:])[90 * 240 + 120])
+        distance = math.sqrt(14) + (1 if inward else -1)
+        assert all(abs(depth - distance) < 0.01 for depth in depths), (depths, distance)
+    for command in ("render", "view", "bench"):
+        done = run(command, *(() if command == "bench" else (samples,)), "--cull", "front")
+        assert done.code == 2 and "none|back" in done.error, done
+
+
 def a_wireframe_shows_splats_as_they_are(folder):
     """ES draws its own lines."""
     _, out, _ = plant(folder)
@@ -196,7 +246,7 @@ def any_order_of_the_input_gives_the_same_triangles(folder):
     assert json.loads(must("verify", out, "--json", "--against", source).output)["ok"]
 
 
-run_tests(what_samples_cannot_do_is_refused, large_triangles_are_all_drawn_however_many_lie_in_a_cell, info_tells_what_it_is, verify_proves_it_and_not_against_another,
+run_tests(what_samples_cannot_do_is_refused, backs_are_left_out_on_request, large_triangles_are_all_drawn_however_many_lie_in_a_cell, info_tells_what_it_is, verify_proves_it_and_not_against_another,
           extract_gives_what_is_above_a_front, as_the_error_goes_to_nothing_the_image_is_the_full_one,
           a_wireframe_shows_splats_as_they_are, other_errors_draw_fewer_triangles_and_splats, within_little_memory_it_coarsens,
           splats_of_confetti_are_as_bright_as_it, any_order_of_the_input_gives_the_same_triangles)

@@ -44,7 +44,7 @@ static void test_a_closed_model_passes_every_check(void **state)
     strl_verify_report report = check(&torus, torus.good, true);
     assert_good(&report);
     for (unsigned kind = 0; kind < STRL_VERIFY_KINDS; kind++)
-        assert_true(report.checks[kind].done);
+        assert_true(report.checks[kind].done == (kind != STRL_VERIFY_CONES)); /* of sample trees alone */
     assert_true(report.closed);
     assert_int_equal(report.open_edges, 0);
     assert_int_equal(report.cuts, 200);

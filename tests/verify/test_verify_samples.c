@@ -514,6 +514,119 @@ static void a_rung_of_another_structure_is_refused_by_readers(void **state)
     free(bytes);
 }
 
+/* ---- lies of cones, of a sphere, whose bricks have some */
+
+#define ROUND "round.stroll"
+
+typedef struct cone_lie {
+    uint32_t node;
+    strl_cone cone;
+} cone_lie;
+
+static bool tell_cone(void *context, uint32_t id, strl_node *record, test_brick *brick, strl_pm *mesh)
+{
+    const cone_lie *lie = context;
+    (void)brick, (void)mesh;
+    if (id == lie->node)
+        record->cone = lie->cone;
+    return false;
+}
+
+/* The least cosine between the axis and a face of the node, in steps of the format, by floating numbers wide enough. */
+static long least_cosine(const built_model *sphere, uint32_t id, const int16_t axis[3])
+{
+    const strl_pm *mesh = &sphere->mesh[id];
+    double least = 1, size = sqrt((double)axis[0] * axis[0] + (double)axis[1] * axis[1] + (double)axis[2] * axis[2]);
+    for (uint32_t t = 0; t < mesh->triangle_count; t++) {
+        double side[2][3], length = 0, along = 0;
+        for (int s = 0; s < 2; s++)
+            for (int k = 0; k < 3; k++)
+                side[s][k] = (double)mesh->position[mesh->triangle[t][s + 1]][k] - mesh->position[mesh->triangle[t][0]][k];
+        for (int k = 0; k < 3; k++) {
+            double n = side[0][(k + 1) % 3] * side[1][(k + 2) % 3] - side[0][(k + 2) % 3] * side[1][(k + 1) % 3];
+            length += n * n;
+            along += n * axis[k];
+        }
+        if (length > 0)
+            least = fmin(least, along / (sqrt(length) * size));
+    }
+    return (long)floor(65535 * least);
+}
+
+static void make_sphere(built_model *sphere)
+{
+    mesh_file mesh = {0};
+    mesh_file_sphere(&mesh, 200, 400);
+    mesh_file_write_ply(&mesh, built_path("round.ply"));
+    mesh_file_free(&mesh);
+    sample_tree_build("round.ply", ROUND, (strl_build_desc){0});
+    sample_tree_verify(ROUND, "round.ply");
+    sample_tree_check(ROUND);
+    built_open(sphere, built_path(ROUND));
+}
+
+static void assert_cone_found(uint32_t node, strl_cone cone, const char *what)
+{
+    cone_lie lie = {node, cone};
+    plant_bricks(ROUND, BAD, tell_cone, &lie);
+    assert_found(false, STRL_VERIFY_CONES, what);
+}
+
+static void a_cone_that_is_too_narrow_or_turned_is_found(void **state)
+{
+    (void)state;
+    built_model sphere;
+    make_sphere(&sphere);
+    unsigned leaves = 0, inner = 0;
+    for (uint32_t id = 0; id < sphere.tree.node_count; id++) {
+        strl_cone cone = sphere.node[id].cone;
+        if (cone.cosine == 0)
+            continue;
+        long least = least_cosine(&sphere, id, cone.axis);
+        assert_true(cone.cosine <= least);
+        if (sphere.node[id].child_count == 0 && leaves < 3) {
+            assert_true(cone.cosine >= least - 1); /* no wider than it need be */
+            cone.cosine = (uint16_t)(least + 2);
+            assert_cone_found(id, cone, "a leaf's cone that is a hair too narrow");
+            cone.cosine = (uint16_t)least;
+            for (int k = 0; k < 3; k++)
+                cone.axis[k] = (int16_t)-cone.axis[k];
+            assert_cone_found(id, cone, "a leaf's cone that is turned round");
+            leaves++;
+        } else if (sphere.node[id].child_count > 0 && least > cone.cosine + 200 && inner < 3) {
+            cone.cosine = (uint16_t)(least - 100);
+            assert_cone_found(id, cone, "a cone that holds its own triangles and not those below");
+            inner++;
+        }
+    }
+    assert_true(leaves == 3 && inner > 0);
+    cone_lie none = {0, {{0}, 0}};
+    for (none.node = 1; sphere.node[none.node].cone.cosine == 0;)
+        none.node++;
+    plant_bricks(ROUND, BAD, tell_cone, &none);
+    sample_tree_verify(BAD, "round.ply"); /* no cone is no lie */
+    built_close(&sphere);
+}
+
+static void half_a_cone_is_found_and_refused(void **state)
+{
+    (void)state;
+    const uint64_t cones[] = {0x0000000000007fffu, 0x0000800000000000u, 0xffff000000000000u, 0x0001000000000000u};
+    size_t size;
+    uint8_t *bytes = built_read_file(built_path(GOOD), &size), *copy = malloc(size);
+    assert_non_null(copy);
+    uint64_t at = record_of_liar(bytes) + 232;
+    for (size_t i = 0; i < sizeof cones / sizeof *cones; i++) {
+        memcpy(copy, bytes, size);
+        strl__store_le(copy + at, 8, cones[i]);
+        store_resealed(copy, size);
+        assert_found(false, STRL_VERIFY_RECORDS, "half a cone");
+        assert_refused_by_readers(liar, "half a cone");
+    }
+    free(bytes);
+    free(copy);
+}
+
 /* ---- lies of triangles */
 
 static bool drop_a_triangle(void *context, uint32_t id, strl_node *record, test_brick *brick, strl_pm *mesh)
@@ -572,6 +685,8 @@ int main(void)
         cmocka_unit_test(a_flipped_bit_in_a_head_does_no_harm),
         cmocka_unit_test(a_lie_in_a_record_is_found),
         cmocka_unit_test(a_rung_of_another_structure_is_refused_by_readers),
+        cmocka_unit_test(a_cone_that_is_too_narrow_or_turned_is_found),
+        cmocka_unit_test(half_a_cone_is_found_and_refused),
         cmocka_unit_test(a_triangle_that_is_missing_twice_there_or_turned_is_found),
     };
     return cmocka_run_group_tests(tests, setup, built_teardown);

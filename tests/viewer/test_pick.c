@@ -85,6 +85,26 @@ static void a_placement_moves_what_is_picked(void **state)
     patches_deinit(&all);
 }
 
+/* From before as ever, from behind through it; the same where the placement mirrors. */
+static void a_back_that_is_not_drawn_is_not_picked(void **state)
+{
+    (void)state;
+    patches all;
+    strl_pick pick;
+    patches_init(&all, (patches_desc){.side = 1, .flat = true});
+    for (int mirrored = 0; mirrored < 2; mirrored++) {
+        double x = mirrored ? -3 : 3;
+        all.items[0].transform[0] = mirrored ? -1 : 1;
+        const strl_ray down = {{x, 3, 50}, {0, 0, -1}}, up = {{x, 3, -50}, {0, 0, 1}};
+        for (int cull = STRL_CULL_NONE; cull <= STRL_CULL_BACK; cull++) {
+            all.list.cull = (strl_cull)cull;
+            assert_true(strl_pick_list(&all.list, &down, NULL, &pick));
+            assert_true(strl_pick_list(&all.list, &up, NULL, &pick) == (cull == STRL_CULL_NONE));
+        }
+    }
+    patches_deinit(&all);
+}
+
 /* Two squares over each other, of parts 0 and 1. */
 static void hidden_parts_and_what_is_cut_off_are_not_picked(void **state)
 {
@@ -202,6 +222,7 @@ int main(void)
         cmocka_unit_test(a_ray_meets_the_surface_behind_its_pixel),
         cmocka_unit_test(coordinates_far_from_the_origin_keep_their_digits),
         cmocka_unit_test(a_placement_moves_what_is_picked),
+        cmocka_unit_test(a_back_that_is_not_drawn_is_not_picked),
         cmocka_unit_test(hidden_parts_and_what_is_cut_off_are_not_picked),
         cmocka_unit_test(two_picks_have_a_distance_and_the_oldest_goes),
         cmocka_unit_test(a_section_goes_where_it_is_put),

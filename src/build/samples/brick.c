@@ -336,6 +336,25 @@ static strl_brick start_brick(const strl_brick_set *set, uint32_t parent)
     return (strl_brick){.parent = parent, .depth = parent == STRL_NO_BRICK ? 0 : set->brick[parent].depth + 1, .chunk = STRL_NO_CHUNK};
 }
 
+/* Of the brick's own triangles. */
+static bool set_cone(const welding *weld, strl_arena *arena, strl_cone *cone)
+{
+    uint32_t count = 0;
+    double(*normal)[3] = strl_arena_alloc(arena, weld->content->count + 1, sizeof *normal);
+    for (uint32_t i = 0; normal && i < weld->content->count; i++) {
+        const strl_soup_corner *corner = weld->octree->triangle[weld->content->triangle[i]].corner;
+        double edge[3], next[3];
+        for (int k = 0; k < 3; k++) {
+            edge[k] = (double)corner[1].position[k] - corner[0].position[k];
+            next[k] = (double)corner[2].position[k] - corner[0].position[k];
+        }
+        count += strl_cone_normal(edge, next, normal[count]);
+    }
+    if (normal)
+        *cone = strl_cone_around((const double(*)[3])normal, count);
+    return normal != NULL;
+}
+
 /* Along the curve, whatever the level: what lies side by side is told by each other. */
 static bool sort_triangles(const strl_octree *octree, const brick_content *content, strl_arena *arena)
 {
@@ -368,7 +387,7 @@ static strl_status add_brick(strl_brick_set *set, const strl_octree *octree, con
         if (content->cell_count[0])
             find_centre(octree, &octree->octant[content->cell[0][0]], alone);
         set_box(&weld, alone, &brick.record);
-        if (!make_mesh(&weld, &brick.record, &pm, arena))
+        if (!make_mesh(&weld, &brick.record, &pm, arena) || !set_cone(&weld, arena, &brick.record.cone))
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a brick of %u triangles", content->count);
     }
     if (!status)
@@ -583,6 +602,7 @@ void strl_bricks_close(strl_brick_set *set)
             above->box_min[k] = record->box_min[k] < above->box_min[k] ? record->box_min[k] : above->box_min[k];
             above->box_max[k] = record->box_max[k] > above->box_max[k] ? record->box_max[k] : above->box_max[k];
         }
+        above->cone = strl_cone_join(&above->cone, &record->cone);
         above->group_geometric = fmaxf(above->group_geometric, record->group_geometric);
         above->geometric_min = above->geometric_max = above->group_geometric;
     }

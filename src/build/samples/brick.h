@@ -40,7 +40,7 @@ strl_status strl_bricks_add(strl_brick_set *set, const strl_octree *octree, uint
  * which a brick has room for all. They close the holes as long as what is below is not there. */
 strl_status strl_bricks_add_root(strl_brick_set *set, const strl_octree *octree, uint32_t octant, strl_arena *arena,
                                  strl_error *err);
-/* Boxes of parents around those of their children; sizes never less than theirs. */
+/* Boxes and cones of parents around those of their children; sizes never less than theirs. */
 void strl_bricks_close(strl_brick_set *set);
 void strl_bricks_deinit(strl_brick_set *set);
 

@@ -78,6 +78,8 @@ static strl_status add_node(writing *w, strl_node *record, uint32_t depth, const
 {
     record->level = w->ids->depths - 1 - depth;
     record->group = w->next++;
+    if (strl_cone_is_empty(&record->cone)) /* it has no face, and the format no word for that */
+        record->cone = (strl_cone){0};
     strl_status status = strl_container_writer_add_node(w->writer, record, payload, bytes, err);
     return status ? status : strl__build_report(w->stage->context, w->next, w->ids->nodes, err);
 }

@@ -227,6 +227,8 @@ static strl_status gl3_draw_list(strl_renderer *renderer, const strl_draw_setup 
             continue;
         strl_gl_item record;
         strl__gl_item_make(&placing, setup, item, &record);
+        if (setup->cull_back)
+            strl__gl_set_fronts(placing.mirrors);
         status = draw_item(&draw, item, &record, err);
     }
     stats->uploaded_bytes = stats->uploaded_vertices * sizeof(strl_vertex) + stats->uploaded_indices * sizeof(uint16_t);

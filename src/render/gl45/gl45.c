@@ -22,12 +22,12 @@ typedef struct gl45_command {
 typedef struct gl45_queued {
     gl45_command command;
     uint32_t slab;
-    bool translucent, points;
+    bool translucent, points, mirrors;
 } gl45_queued;
 
 /* What one multi-draw has in common, besides the slab. */
 typedef struct gl45_kind {
-    bool translucent, points;
+    bool translucent, points, mirrors;
 } gl45_kind;
 
 typedef struct gl45_renderer {
@@ -48,6 +48,7 @@ typedef struct gl45_draw {
     uint64_t frame;
     const strl_draw_options *options;
     strl_render_stats *stats;
+    bool mirrors; /* something queued does, and it matters */
 } gl45_draw;
 
 /* Where a batch lies in the ring: one piece, so that one fence guards all of it. */
@@ -64,7 +65,8 @@ static void draw_slab(gl45_draw *draw, gl45_piece *piece, uint32_t slab, gl45_ki
     uint32_t count = 0;
     for (uint32_t q = 0; q < self->batch_count; q++) {
         const gl45_queued *queued = &self->queued[q];
-        if (queued->slab != slab || queued->translucent != kind.translucent || queued->points != kind.points)
+        if (queued->slab != slab || queued->translucent != kind.translucent || queued->points != kind.points ||
+            queued->mirrors != kind.mirrors)
             continue;
         memcpy(piece->mapped + piece->used, &queued->command, sizeof queued->command);
         piece->used += sizeof queued->command;
@@ -89,13 +91,15 @@ static void flush(gl45_draw *draw)
     piece.mapped = strl__gl_ring_take(&self->ring, record_bytes + self->batch_count * sizeof(gl45_command), &piece.offset);
     memcpy(piece.mapped, self->records, record_bytes);
     glBindBuffer(GL_DRAW_INDIRECT_BUFFER, self->ring.buffer);
-    for (int kind = 0; kind < 4; kind++) {
+    for (int kind = 0; kind < (draw->mirrors ? 8 : 4); kind++) {
         glUseProgram(self->gl.programs[kind & 1 ? STRL_GL_NODE_ALPHA : STRL_GL_NODE].name);
+        strl__gl_set_fronts(kind & 4);
         for (uint32_t slab = 0; slab < self->store.slab_count; slab++)
-            draw_slab(draw, &piece, slab, (gl45_kind){kind & 1, kind & 2});
+            draw_slab(draw, &piece, slab, (gl45_kind){kind & 1, kind & 2, kind & 4});
     }
     self->batch_count = 0;
     self->batch++;
+    draw->mirrors = false;
 }
 
 static void release(gl45_renderer *self, strl_cache_entry *entry)
@@ -199,7 +203,7 @@ static strl_status make_resident(gl45_draw *draw, const strl_draw_item *item, st
     return STRL_OK;
 }
 
-static strl_status queue_item(gl45_draw *draw, const strl_draw_item *item, const strl_gl_item *record, strl_error *err)
+static strl_status queue_item(gl45_draw *draw, const strl_draw_item *item, const strl_gl_item *record, bool mirrors, strl_error *err)
 {
     gl45_renderer *self = draw->self;
     if (self->batch_count == self->batch_most)
@@ -215,7 +219,8 @@ static strl_status queue_item(gl45_draw *draw, const strl_draw_item *item, const
     int32_t first_vertex = (int32_t)(entry->place.range.vertex_at * (STRL_GRANULE_BYTES / (uint32_t)sizeof(strl_vertex)));
     self->records[at] = *record;
     self->queued[at] = (gl45_queued){{item->draw_count, 1, first_index, first_vertex, at}, entry->place.range.slab,
-                                     entry->translucent || entry->hides, item->point_px > 0};
+                                     entry->translucent || entry->hides, item->point_px > 0, mirrors};
+    draw->mirrors |= mirrors;
     entry->batch = self->batch;
     draw->stats->triangles += item->point_px > 0 ? 0 : item->draw_count / 3;
     draw->stats->items++;
@@ -231,7 +236,7 @@ static strl_status gl45_draw_list(strl_renderer *renderer, const strl_draw_setup
                                   strl_render_stats *stats, strl_error *err)
 {
     gl45_renderer *self = (gl45_renderer *)renderer;
-    gl45_draw draw = {self, list->frame, &setup->options, stats};
+    gl45_draw draw = {.self = self, .frame = list->frame, .options = &setup->options, .stats = stats};
     strl_gl_placing placing = {0};
     strl_status status = STRL_OK;
     strl__gl_make_current(&self->gl);
@@ -245,7 +250,7 @@ static strl_status gl45_draw_list(strl_renderer *renderer, const strl_draw_setup
             continue;
         strl_gl_item record;
         strl__gl_item_make(&placing, setup, item, &record);
-        status = queue_item(&draw, item, &record, err);
+        status = queue_item(&draw, item, &record, setup->cull_back && placing.mirrors, err);
     }
     flush(&draw);
     stats->uploaded_bytes = stats->uploaded_vertices * sizeof(strl_vertex) + stats->uploaded_indices * sizeof(uint16_t);

@@ -134,6 +134,11 @@ static void set_uniforms(strl_gl *gl, const strl_gl_program *program, const strl
     glUniform4fv(program->section, 1, section);
 }
 
+void strl__gl_set_fronts(bool mirrors)
+{
+    glFrontFace(mirrors ? GL_CW : GL_CCW);
+}
+
 void strl__gl_begin_draw(strl_gl *gl, const strl_draw_setup *setup)
 {
     set_projection(gl, setup);
@@ -141,6 +146,11 @@ void strl__gl_begin_draw(strl_gl *gl, const strl_draw_setup *setup)
     set_clip_control(&gl->dialect, true);
     set_uniforms(gl, &gl->programs[STRL_GL_NODE], setup);
     set_uniforms(gl, &gl->programs[STRL_GL_NODE_ALPHA], setup);
+    glCullFace(GL_BACK);
+    if (setup->cull_back)
+        glEnable(GL_CULL_FACE);
+    else
+        glDisable(GL_CULL_FACE);
     if (!gl->dialect.es) {
         glDisable(GL_FRAMEBUFFER_SRGB);
         glPolygonMode(GL_FRONT_AND_BACK, setup->options.wireframe ? GL_LINE : GL_FILL);
@@ -153,6 +163,8 @@ void strl__gl_begin_draw(strl_gl *gl, const strl_draw_setup *setup)
 strl_status strl__gl_end_draw(strl_gl *gl, strl_error *err)
 {
     set_clip_control(&gl->dialect, false);
+    glDisable(GL_CULL_FACE);
+    strl__gl_set_fronts(false);
     if (!gl->dialect.es) {
         glPolygonMode(GL_FRONT_AND_BACK, GL_FILL);
         glDisable(GL_CLIP_DISTANCE0);

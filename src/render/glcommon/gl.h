@@ -27,6 +27,8 @@ void strl__gl_make_current(strl_gl *gl);
 
 /* Whether the draw has a plane that cuts. */
 bool strl__gl_has_section(const strl_draw_setup *setup);
+/* The winding of the fronts of what is drawn next; of a draw that culls. */
+void strl__gl_set_fronts(bool mirrors);
 /* Everything but the items: state, target, uniforms of both node programs. */
 void strl__gl_begin_draw(strl_gl *gl, const strl_draw_setup *setup);
 /* Leaves the context as others expect to find it. Fails where GL has recorded an error. */

@@ -82,6 +82,7 @@ static void place(strl_gl_placing *placing, const strl_view *view, const strl_dr
     memcpy(placing->transform, item->transform, sizeof item->transform);
     double cofactor[3][3];
     cofactors(item->transform, cofactor);
+    placing->mirrors = item->transform[0] * cofactor[0][0] + item->transform[1] * cofactor[0][1] + item->transform[2] * cofactor[0][2] < 0;
     if (item->positions == STRL_POSITIONS_LATTICE)
         find_reference(placing, cofactor, view->eye);
     scale_cofactors(cofactor);

@@ -19,6 +19,7 @@ typedef struct strl_gl_placing {
     strl_positions positions;
     double origin[3], step, transform[12];
     int64_t reference[3]; /* the lattice cell next to the eye */
+    bool mirrors;         /* counter-clockwise becomes clockwise */
     strl_gl_item shared;  /* rows, without debug colour */
 } strl_gl_placing;
 
