@@ -60,6 +60,7 @@ enum strl__section_kind {
 #define STRL__INDEX_HEAD_BYTES 8u
 #define STRL__PLACEMENT_BYTES 104u
 #define STRL__RUN_BYTES 80u
+#define STRL__RUN_SPREAD_SHIFT 10 /* in the first number of a run's normal */
 #define STRL__MATERIAL_HEAD_BYTES 4u
 #define STRL__IMAGE_HEAD_BYTES 20u
 #define STRL__MAX_NAME_BYTES 32000u

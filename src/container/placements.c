@@ -76,8 +76,10 @@ static strl_status decode_run(const strl_container *container, uint32_t run, con
         facts->box_max[axis] = strl_cursor_f64(&in);
     facts->far.area = strl_cursor_f32(&in);
     facts->far.rgba = strl_cursor_u32(&in);
-    for (int k = 0; k < 2; k++)
-        facts->far.normal[k] = strl_cursor_u16(&in);
+    uint16_t spread_and_normal = strl_cursor_u16(&in);
+    facts->far.normal[0] = spread_and_normal & STRL_OCT_MAX;
+    facts->far.spread = (uint8_t)(spread_and_normal >> STRL__RUN_SPREAD_SHIFT);
+    facts->far.normal[1] = strl_cursor_u16(&in);
     facts->page.bytes = strl_cursor_u32(&in);
     facts->page.offset = strl_cursor_u64(&in);
     facts->page.checksum = strl_cursor_u64(&in);
@@ -86,10 +88,9 @@ static strl_status decode_run(const strl_container *container, uint32_t run, con
         return strl__fail(err, STRL_ERR_FORMAT, "run %" PRIu32 ": %" PRIu32 " bytes, expected %u", run, bytes, STRL__RUN_BYTES);
     if (!is_box(facts))
         return strl__fail(err, STRL_ERR_FORMAT, "run %" PRIu32 ": its box is not finite, or a min is above its max", run);
-    if (!(facts->far.area >= 0) || !isfinite(facts->far.area) || facts->far.normal[0] > STRL_OCT_MAX ||
-        facts->far.normal[1] > STRL_OCT_MAX)
-        return strl__fail(err, STRL_ERR_FORMAT, "run %" PRIu32 ": its area is %g, its normal %u %u, expected finite, >= 0, and at most %d",
-                          run, (double)facts->far.area, facts->far.normal[0], facts->far.normal[1], STRL_OCT_MAX);
+    if (!(facts->far.area >= 0) || !isfinite(facts->far.area) || facts->far.normal[1] > STRL_OCT_MAX)
+        return strl__fail(err, STRL_ERR_FORMAT, "run %" PRIu32 ": its area is %g, the second number of its normal %u, expected finite, >= 0, and at most %d",
+                          run, (double)facts->far.area, facts->far.normal[1], STRL_OCT_MAX);
     if (facts->page.bytes != expected)
         return strl__fail(err, STRL_ERR_FORMAT, "run %" PRIu32 ": its page has %" PRIu32 " bytes, expected %" PRIu32, run,
                           facts->page.bytes, expected);

@@ -76,8 +76,8 @@ strl_status strl__writing_end_run(strl_container_writer *writer, strl_error *err
         strl_writer_f64(&out, facts.box_max[axis]);
     strl_writer_f32(&out, facts.far.area);
     strl_writer_u32(&out, facts.far.rgba);
-    for (int k = 0; k < 2; k++)
-        strl_writer_u16(&out, facts.far.normal[k]);
+    strl_writer_u16(&out, (uint16_t)(facts.far.normal[0] | facts.far.spread << STRL__RUN_SPREAD_SHIFT));
+    strl_writer_u16(&out, facts.far.normal[1]);
     strl_writer_u32(&out, facts.page.bytes);
     strl_writer_u64(&out, facts.page.offset);
     strl_writer_u64(&out, facts.page.checksum);

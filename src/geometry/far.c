@@ -5,6 +5,7 @@
 #include "geometry/colour.h"
 #include "geometry/octahedral.h"
 
+/* normal: as long as the faces are parallel. */
 static void add_face(strl_far_sums *sums, double area, uint32_t rgba, const double normal[3])
 {
     sums->area += area;
@@ -20,7 +21,9 @@ void strl_far_add(strl_far_sums *sums, const strl_far *far)
 {
     float normal[3];
     strl_oct_decode(far->normal, normal);
-    add_face(sums, (double)far->area, far->rgba, (const double[3]){(double)normal[0], (double)normal[1], (double)normal[2]});
+    double length = 1 - 0.5 * far->spread / STRL_FAR_SPREAD_MOST;
+    add_face(sums, (double)far->area, far->rgba,
+             (const double[3]){length * (double)normal[0], length * (double)normal[1], length * (double)normal[2]});
 }
 
 strl_far strl_far_end(const strl_far_sums *sums)
@@ -29,8 +32,12 @@ strl_far strl_far_end(const strl_far_sums *sums)
     float normal[3];
     if (!(sums->area > 0))
         return (strl_far){0};
-    for (unsigned k = 0; k < 3; k++)
+    double square = 0;
+    for (unsigned k = 0; k < 3; k++) {
         normal[k] = (float)(sums->normal[k] / sums->area);
+        square += (double)normal[k] * (double)normal[k];
+    }
+    far.spread = (uint8_t)lrint(STRL_FAR_SPREAD_MOST * fmin(fmax(2 - 2 * sqrt(square), 0), 1));
     for (unsigned k = 0; k < 3; k++)
         far.rgba |= strl_srgb_encode((float)(sums->linear[k] / sums->area)) << 8 * k;
     far.rgba |= (uint32_t)lrint(255 * sums->linear[3] / sums->area) << 24;
@@ -53,21 +60,31 @@ static double triangle_area(const strl_pm *mesh, const uint16_t corner[3], doubl
     return length / 2;
 }
 
+/* The finest ones. What they hide tells how large the faces are: of parallel ones as much, of others half. */
+static void add_splats(strl_far_sums *sums, const strl_brick_head *head)
+{
+    for (uint32_t i = head->level_count > 1 ? head->splat_end[head->level_count - 2] : 0; i < strl_brick_splats(head); i++) {
+        const strl_splat *splat = &head->splat[i];
+        const uint16_t code[2] = {(uint16_t)(splat->normal[0] * STRL_OCT_MAX / 255u), (uint16_t)(splat->normal[1] * STRL_OCT_MAX / 255u)};
+        double length = fmax(splat->parallel / 255.0, 0.5), area = ldexp(splat->coverage / 255.0, 2 * splat->side) / length;
+        float line[3];
+        strl_oct_decode(code, line);
+        add_face(sums, area, splat->rgba, (const double[3]){length * (double)line[0], length * (double)line[1], length * (double)line[2]});
+    }
+}
+
+/* Samples of a brick are few; its splats are means of all that is below. */
 strl_far strl_far_of_mesh(const strl_pm *mesh, const strl_brick_head *head)
 {
-    strl_far_sums sums = {0};
+    strl_far_sums sums = {0}, splats = {0};
     for (uint32_t t = 0; t < mesh->triangle_count; t++) {
         double normal[3], area = triangle_area(mesh, mesh->triangle[t], normal);
         uint32_t v = mesh->triangle[t][0];
         uint32_t material = mesh->palette[mesh->palette_index ? mesh->palette_index[v] : 0].rgba;
         add_face(&sums, area, strl_rgba_multiply(mesh->colour ? mesh->colour[v] : UINT32_MAX, material), normal);
     }
-    strl_far far = strl_far_end(&sums);
-    double splats = 0;
-    for (uint32_t i = head->level_count > 1 ? head->splat_end[head->level_count - 2] : 0; i < strl_brick_splats(head); i++)
-        splats += ldexp(head->splat[i].coverage / 255.0, 2 * head->splat[i].side);
-    far.area = fmaxf(far.area, (float)splats);
-    return far;
+    add_splats(&splats, head);
+    return strl_far_end(splats.area > sums.area ? &splats : &sums);
 }
 
 strl_far strl_far_place(const strl_far *far, const double transform[12], double stretch)

@@ -44,14 +44,15 @@ void strl__v_run_read(strl__model *model, uint64_t number, const uint8_t *bytes,
         good = good && isfinite(run.box[0][k]) && isfinite(run.box[1][k]) && run.box[0][k] <= run.box[1][k];
     run.area = strl_cursor_f32(&cursor);
     strl_cursor_u32(&cursor);
-    uint32_t normal[2] = {strl_cursor_u16(&cursor), strl_cursor_u16(&cursor)};
+    strl_cursor_u16(&cursor); /* any number is a direction and a spread */
+    uint32_t normal = strl_cursor_u16(&cursor);
     run.page.bytes = strl_cursor_u32(&cursor);
     run.page.offset = strl_cursor_u64(&cursor);
     run.page.checksum = strl_cursor_u64(&cursor);
     RUN_RULE(model, size == RUN_BYTES, number, "run %" PRIu64 ": %zu bytes, expected %u", number, size, RUN_BYTES);
     RUN_RULE(model, good, number, "run %" PRIu64 ": its box is not finite or upside down", number);
-    RUN_RULE(model, isfinite(run.area) && run.area >= 0 && normal[0] <= MOST_NORMAL && normal[1] <= MOST_NORMAL, number,
-             "run %" PRIu64 ": area %g, normal %u %u", number, (double)run.area, normal[0], normal[1]);
+    RUN_RULE(model, isfinite(run.area) && run.area >= 0 && normal <= MOST_NORMAL, number,
+             "run %" PRIu64 ": area %g, second number %u of its normal", number, (double)run.area, normal);
     if (number < model->run_count)
         model->runs[number] = run;
 }

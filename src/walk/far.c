@@ -6,6 +6,8 @@
 
 #include <math.h>
 
+#include "geometry/octahedral.h"
+
 #define LATTICE 0x1p30 /* cells of the far points along the longest edge of the model's box */
 
 static double diagonal(const strl_box *box)
@@ -67,10 +69,31 @@ static double find_place(const strl_view *view, const strl_box *box, bool is_mis
     return depth_of(view, place);
 }
 
+/* How much of the point's square the faces hide: `walls` is their area in such squares. Parallel ones lie beside each other, and are seen
+ * as much as they face the eye; those of any direction are seen with half their area, at random places, so that they hide each other. */
+static double opacity_of(const strl_far *far, const double sight[3], double walls)
+{
+    double along = 1 - (double)far->spread / STRL_FAR_SPREAD_MOST, square = 0, facing = 0;
+    float normal[3];
+    strl_oct_decode(far->normal, normal);
+    for (int k = 0; k < 3; k++) {
+        facing += sight[k] * (double)normal[k];
+        square += sight[k] * sight[k];
+    }
+    facing = square > 0 ? fabs(facing) / sqrt(square) : 1;
+    return along * fmin(1, walls * facing) + (1 - along) * (1 - exp(-walls / 2));
+}
+
+static void find_sight(const strl_view *view, const double place[3], double sight[3])
+{
+    for (int k = 0; k < 3; k++)
+        sight[k] = view->orthographic ? view->forward[k] : place[k] - view->eye[k];
+}
+
 strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far, double px, bool is_missing,
                            strl_error *err)
 {
-    double least, largest, place[3], step = lattice_step(walk), depth = find_place(cut->view, box, is_missing, place);
+    double least, largest, place[3], sight[3], step = lattice_step(walk), depth = find_place(cut->view, box, is_missing, place);
     if (!(px > 0) || !(depth > 0) || !(far->area > 0)) /* not in the image, or nothing */
         return STRL_OK;
     double scale = cut->view->focal_px / (cut->view->orthographic ? 1 : depth);
@@ -80,11 +103,12 @@ strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box
     if (!strl__grow(&points->items, &points->capacity, points->count + 1, sizeof *points->items))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu splats", points->count);
     strl_vertex *point = &points->items[points->count++];
-    double opacity = fmin(1, (double)far->area / 2 * scale * scale / (side * side)); /* a face is seen with half its area on average */
+    find_sight(cut->view, place, sight);
+    double opacity = opacity_of(far, sight, (double)far->area * scale * scale / (side * side));
     for (int k = 0; k < 3; k++)
         point->position[k] = (int32_t)lrint(fmin(fmax((place[k] - walk->bounds[k]) / step, 0), LATTICE));
     for (int k = 0; k < 2; k++)
-        point->normal[k] = far->normal[k];
+        point->normal[k] = (uint16_t)(far->normal[k] | (k == 0 ? far->spread << STRL_SPREAD_SHIFT : 0));
     for (unsigned k = 0; k < 3; k++)
         point->rgba[k] = (uint8_t)(far->rgba >> 8 * k);
     point->rgba[3] = (uint8_t)lrint((far->rgba >> 24) * opacity);

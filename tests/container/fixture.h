@@ -329,6 +329,7 @@ static inline strl_status fixture_read_runs(strl_container *container, uint64_t 
         }
         free(page);
         *digest = strl__mix64(*digest ^ strl__checksum(facts.box_min, sizeof facts.box_min) ^ facts.far.rgba ^ facts.far.normal[0]);
+        *digest = strl__mix64(*digest ^ facts.far.spread);
         *digest = strl__mix64(*digest ^ strl__checksum(facts.box_max, sizeof facts.box_max) ^ (uint64_t)(facts.far.area * 4));
     }
     return status;

@@ -251,7 +251,7 @@ static const damage run_damages[] = {
     {"run with a box upside down", RUNS, 12 + 24, 8, 0xc130000000000000u},
     {"run with an area below nothing", RUNS, 12 + 48, 4, 0xbf800000},
     {"run with an area that is no number", RUNS, 12 + 48, 4, 0x7fc00000},
-    {"run with a normal off its square", RUNS, 12 + 56, 2, 1024},
+    {"run with a normal off its square", RUNS, 12 + 58, 2, 1024},
     {"run with a page of another size", RUNS, 12 + 60, 4, 55296},
     {"run with a page that is not there", RUNS, 12 + 64, 8, (uint64_t)1 << 40},
     {"run with a page between others", RUNS, 12 + 64, 8, 4160 + 32},

@@ -2,6 +2,7 @@
 """stroll on sample trees, from outside: what is refused, what is told of them, and images that end where `--full` is.
 
 usage: test_samples_command.py PROGRAM"""
+import base64
 import json
 import math
 import os
@@ -120,13 +121,13 @@ def other_errors_draw_fewer_triangles_and_splats(folder):
         assert (null["triangles"], null["splats"], null["nodes"]) == (stats["triangles"], stats["splats"], stats["nodes"]), null
 
 
-def confetti(path, count):
+def confetti(path, count, reach=0.012):
     """Small white triangles of any direction in a cube, without normals."""
     random = Random(7)
     corners = []
     for _ in range(count):
         at = [random.uniform(-1, 1) for _ in range(3)]
-        corners += (at[k] + random.gauss(0, 0.012) for _ in range(3) for k in range(3))
+        corners += (at[k] + random.gauss(0, reach) for _ in range(3) for k in range(3))
     head = (f"ply\nformat binary_little_endian 1.0\nelement vertex {3 * count}\nproperty float x\nproperty float y\nproperty float z\n"
             f"element face {count}\nproperty list uchar uint vertex_indices\nend_header\n")
     indices = b"".join(struct.pack("<B3I", 3, 3 * i, 3 * i + 1, 3 * i + 2) for i in range(count))
@@ -145,10 +146,47 @@ def splats_of_confetti_are_as_bright_as_it(folder):
             light = []
             for error in ("1e-6", "14"):
                 _, stats = render(out, folder, "--error", error, *words)
-                rows = read_png(pathlib.Path(folder) / "image.png")
-                middle = [value for row in rows[70:110] for value in row[3 * 100:3 * 140]]
-                light.append(sum((value / 255) ** 2.2 for value in middle) / len(middle))
+                light.append(light_of(folder))
             assert stats["splats"] > 100 and 0.88 < light[1] / light[0] < 1.12, (backend, eye, light)
+
+
+def light_of(folder):
+    """Of the middle of the image, linear."""
+    middle = [value for row in read_png(pathlib.Path(folder) / "image.png")[70:110] for value in row[3 * 100:3 * 140]]
+    return sum((value / 255) ** 2.2 for value in middle) / len(middle)
+
+
+def placed(path, mesh, places):
+    """A glTF of triangles placed many times over."""
+    corners = struct.unpack(f"<{len(mesh) // 4}f", mesh)
+    uri = "data:application/octet-stream;base64," + base64.b64encode(mesh).decode()
+    scene = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": list(range(len(places)))}],
+             "nodes": [{"mesh": 0, "translation": place} for place in places],
+             "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+             "buffers": [{"uri": uri, "byteLength": len(mesh)}], "bufferViews": [{"buffer": 0, "byteLength": len(mesh)}],
+             "accessors": [{"bufferView": 0, "componentType": 5126, "count": len(corners) // 3, "type": "VEC3",
+                            "min": [min(corners[k::3]) for k in range(3)], "max": [max(corners[k::3]) for k in range(3)]}]}
+    with open(path, "w", encoding="ascii") as file:
+        json.dump(scene, file)
+
+
+def far_copies_of_confetti_are_as_bright_as_near_ones(folder):
+    """From every side, as single ones and as runs of them, whichever way the mean of the faces happens to lie."""
+    source, mesh, side = os.path.join(folder, "in.gltf"), os.path.join(folder, "mesh.ply"), 12
+    confetti(mesh, 400, 0.05)
+    corners = read(mesh).split(b"end_header\n", 1)[1][:400 * 36]
+    placed(source, corners, [[2.0 * x - side + 1, 2.0 * y - side + 1, 2.0 * z - side + 1]
+                             for x in range(side) for y in range(side) for z in range(side)])
+    for structure in ("samples", "clusters"):
+        out = os.path.join(folder, structure + ".stroll")
+        assert build(source, out, "--structure", structure)["placements"] == side ** 3
+        must("verify", out, "--quiet")
+        for eye in ("0 0 250", "250 0 5", "5 250 5", "-140 140 -140", "140 -140 -30"):
+            light, words = [], ("--camera", f"eye {eye} target 0 0 0 up 0.1 1 0 fov 14")
+            for error in ("1e-6", "30"):
+                _, stats = render(out, folder, "--error", error, *words)
+                light.append(light_of(folder))
+            assert stats["splats"] > 1000 and stats["triangles"] == 0 and 0.85 < light[1] / light[0] < 1.18, (structure, eye, light)
 
 
 def ball(path, rings, inward):
@@ -249,4 +287,4 @@ def any_order_of_the_input_gives_the_same_triangles(folder):
 run_tests(what_samples_cannot_do_is_refused, backs_are_left_out_on_request, large_triangles_are_all_drawn_however_many_lie_in_a_cell, info_tells_what_it_is, verify_proves_it_and_not_against_another,
           extract_gives_what_is_above_a_front, as_the_error_goes_to_nothing_the_image_is_the_full_one,
           a_wireframe_shows_splats_as_they_are, other_errors_draw_fewer_triangles_and_splats, within_little_memory_it_coarsens,
-          splats_of_confetti_are_as_bright_as_it, any_order_of_the_input_gives_the_same_triangles)
+          splats_of_confetti_are_as_bright_as_it, far_copies_of_confetti_are_as_bright_as_near_ones, any_order_of_the_input_gives_the_same_triangles)

@@ -121,7 +121,7 @@ static void each_lie_about_a_run_is_found(void **state)
     expect(runs + 80 + 48, 4, bits_of_float(area * 1.001f), "its area is said to be");
     expect(runs + 80 + 48, 4, bits_of_float(area * 0.999f), "its area is said to be");
     expect(runs + 80 + 48, 4, bits_of_float(-1), "area -1");
-    expect(runs + 56, 2, 1024, "normal 1024");
+    expect(runs + 58, 2, 1024, "1024 of its normal");
     /* The second page's place where the first one's should be: both are sound pages of 512. */
     expect(runs + 64, 8, strl__load_le(good + runs + 80 + 64, 8), "its page is said to be");
     expect(STRL__AT_SECTIONS + 4 * STRL__SECTION_BYTES + 8, 8, 2, "runs of 1200 placements, expected 3");

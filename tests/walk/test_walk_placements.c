@@ -250,6 +250,8 @@ static void copies_below_a_pixel_are_drawn_as_points(void **state)
                 high[k] = fmax(high[k], at);
                 opacity += item->vertices[v].rgba[3] / 765.0;
                 assert_in_range(item->vertices[v].rgba[k], 100, 255); /* the scene is light grey */
+                assert_in_range(item->vertices[v].normal[0] >> STRL_SPREAD_SHIFT, 40, STRL_SPREAD_MOST); /* and faces all ways */
+                assert_in_range(item->vertices[v].normal[1], 0, 1023);
             }
     }
     assert_in_range(points, 100, COPIES / 2);
