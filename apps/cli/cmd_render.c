@@ -108,16 +108,42 @@ static strl_draw_options draw_options(const render_options *o, const strl_render
     return options;
 }
 
-/* What the images lack. The counts are in the lines of --stats, too. */
-static void warn(const render_options *o, const strl_image_stats *last, const strl_cli_coarse *coarse)
+/* Of the images drawn so far, those that lack something which could not be read. Zero-initialise. */
+typedef struct lacking_images {
+    uint64_t frames;
+    uint32_t most_nodes; /* that one of them lacks */
+} lacking_images;
+
+/* What failed and was there in the end is in the lines of --stats alone. Without waiting something is always on its way: there it is what
+ * the last image lacks after reads that failed. */
+static void count_lacking(const render_options *o, const strl_image_stats *stats, lacking_images *lacking)
 {
-    if (o->quiet)
+    if (o->realtime)
+        *lacking = (lacking_images){0};
+    if (stats->missing_nodes == 0 || (o->realtime && stats->faults == 0))
         return;
-    if (last->faults > 0)
-        fprintf(stderr,
-                "stroll: %s: %" PRIu64 " read%s failed and what they were for stayed coarse, the last because %s\n",
-                o->input, last->faults, strl_cli_plural(last->faults), last->last_fault);
-    strl_cli_coarse_report(coarse, o->memory_bytes);
+    lacking->frames++;
+    lacking->most_nodes = stats->missing_nodes > lacking->most_nodes ? stats->missing_nodes : lacking->most_nodes;
+}
+
+/* The images are written all the same. Whoever waits for them was promised all of it: a failure. */
+static strl_status judge(const render_options *o, size_t frames, const strl_image_stats *last, const lacking_images *lacking,
+                         const strl_cli_coarse *coarse, strl_error *err)
+{
+    if (!o->quiet)
+        strl_cli_coarse_report(coarse, o->memory_bytes);
+    if (lacking->frames == 0)
+        return STRL_OK;
+    if (!o->realtime)
+        return strl__fail(err, STRL_ERR_IO,
+                          "%s: %" PRIu64 " of %zu frame%s coarser than asked for, %" PRIu32 " node%s could not be read, the last fault: %.200s",
+                          o->input, lacking->frames, frames, frames == 1 ? " is" : "s are", lacking->most_nodes,
+                          strl_cli_plural(lacking->most_nodes), last->last_fault);
+    if (!o->quiet)
+        fprintf(stderr, "stroll: %s: the last frame is without %" PRIu32 " node%s after %" PRIu64 " read%s that failed, the last because %s\n",
+                o->input, lacking->most_nodes, strl_cli_plural(lacking->most_nodes), last->faults, strl_cli_plural(last->faults),
+                last->last_fault);
+    return STRL_OK;
 }
 
 /* Holds a realtime path to its rate; late frames follow at once. */
@@ -142,6 +168,7 @@ static strl_status render_frames(const render_options *o, strl_render_model *mod
     uint64_t start = strl_clock_ns();
     strl_image_stats stats = {0};
     strl_cli_coarse coarse = {0};
+    lacking_images lacking = {0};
     for (size_t f = 0; status == STRL_OK && f < path->count; f++) {
         strl_camera camera = strl_path_camera(path, f, o->size);
         stats = (strl_image_stats){0};
@@ -153,6 +180,7 @@ static strl_status render_frames(const render_options *o, strl_render_model *mod
         if (status == STRL_OK)
             status = strl_render_output_add(&output, f, renderer, &stats, err);
         strl_cli_coarse_add(&coarse, o->error_px, stats.allowed_error_px, stats.max_error_px);
+        count_lacking(o, &stats, &lacking);
         strl_cli_progress_update(progress, "render", f + 1, path->count, "frames");
         if (status == STRL_OK)
             status = strl_cli_check_interrupt(err);
@@ -162,7 +190,7 @@ static strl_status render_frames(const render_options *o, strl_render_model *mod
     strl_render_output_deinit(&output);
     strl_cli_progress_end(progress);
     if (status == STRL_OK)
-        warn(o, &stats, &coarse);
+        status = judge(o, path->count, &stats, &lacking, &coarse, err);
     return status;
 }
 

@@ -23,7 +23,7 @@ typedef struct strl_image_stats {
     float max_error_px;
     double allowed_error_px;
     uint64_t disk_waits;  /* of the drawing thread between camera and finished pixels, see strl_thread_disk_waits */
-    uint64_t faults;      /* reads and pages that failed so far: their nodes stay coarse */
+    uint64_t faults;      /* reads and pages that failed so far; they may have healed since */
     char last_fault[256]; /* the newest one's sentence; empty = none */
     bool remote;
     strl_network_stats network; /* since the model was opened */

@@ -124,6 +124,7 @@ class Test:
             out, lines, result = self.render(server.url("model.stroll"), "--no-cache")
             self.same(f"now and then {fault}: the images are whole", out, self.local, result)
             self.check(f"{fault}: it was noticed", lines[-1]["network"]["retries"] + lines[-1]["faults"] > 0, lines[-1])
+            self.check(f"{fault}: nothing is said of what healed", not result.stderr, result.stderr)
         server.fault = None
 
     def test_wrong_bytes_are_not_kept(self, server):
@@ -164,10 +165,12 @@ class Test:
                 shutil.copy(self.other, self.web / "new")
                 os.replace(self.web / "new", live)
         server.fault = swap
-        out, lines, result = self.render(server.url("live.stroll"), "--no-cache")
+        out, lines, result = self.render(server.url("live.stroll"), "--no-cache", "--quiet")
         server.fault = None
-        self.check("a swap under way is said", CHANGED in result.stderr and CHANGED in lines[-1]["last_fault"],
-                   (result.returncode, result.stderr))
+        self.check("a swap under way is said, whether or not to be quiet, and is a failure", result.returncode == 1 and
+                   "3 of 3 frames are coarser" in result.stderr and CHANGED in result.stderr and result.stderr.count("\n") == 1 and
+                   CHANGED in lines[-1]["last_fault"], (result.returncode, result.stderr))
+        self.check("its images are written", len(list(out.glob("*.png"))) == 4)
         self.check("what there is, is drawn", all(line["covered_pixels"] > 1000 for line in lines), lines)
         self.check("nobody goes on asking", len(server.asked) < 40, len(server.asked))
         out, lines, result = self.render(server.url("live.stroll"), "--no-cache")

@@ -52,8 +52,11 @@ class Test:
     def run(self, *words):
         return subprocess.run([self.program, *words], capture_output=True, text=True)
 
+    def render_any(self, model, out, *options):
+        return self.run("render", model, "--size", "160x120", "-o", self.root + "/" + out, *options)
+
     def render(self, model, out, *options):
-        result = self.run("render", model, "--size", "160x120", "-o", self.root + "/" + out, *options)
+        result = self.render_any(model, out, *options)
         if result.returncode:
             self.check("render %s %s" % (os.path.basename(model), " ".join(options)), False, result.stderr)
         return result
@@ -133,6 +136,29 @@ class Test:
         self.check("a realtime walk never waits for its front", realtime.returncode == 0 and
                    all(json.loads(line)["fronts"] == 1 for line in open(stats)), realtime.stderr)
 
+    def test_damage(self):
+        """Where it is seen the images are written, and it is a failure that --quiet does not silence; elsewhere nobody speaks of it."""
+        scene, model, stats = (self.root + "/" + name for name in ("plant.ply", "plant.stroll", "damage.jsonl"))
+        self.run("scene", "plant", "--triangles", "60K", "-o", scene, "--quiet")
+        self.run("build", scene, "-o", model, "--structure", "samples", "--quiet")
+        with open(model, "r+b") as file:
+            middle = os.path.getsize(model) // 2
+            file.seek(middle)
+            byte = file.read(1)[0]
+            file.seek(middle)
+            file.write(bytes([byte ^ 1]))
+        for camera, status in (("eye 9 -7 6 target 0 0 4 up 0 0 1 fov 90", 1), ("eye 9 -7 6 target 99 -77 66 up 0 0 1 fov 40", 0)):
+            for words, lines in (((), status), (("--quiet",), status), (("--realtime", "1000"), None)):
+                result = self.render_any(model, "damage.png", "--error", "1e-6", "--camera", camera, "--stats", stats, *words)
+                with open(stats) as file:
+                    missing = json.loads(file.read())["missing_nodes"]
+                os.remove(stats)
+                self.check("damage is told where it is seen", result.returncode == (status if lines is not None else 0) and
+                           (lines is None or result.stderr.count("\n") == lines and (missing > 0) == bool(status)) and
+                           ("coarser than asked for" in result.stderr) == bool(lines) and os.path.exists(self.root + "/damage.png"),
+                           (camera, words, result, missing))
+                os.remove(self.root + "/damage.png")
+
     def test_usage(self):
         for words, status, sentence in (
                 ((self.model, "--path", "orbit"), 2, "nothing to write"),
@@ -157,7 +183,7 @@ class Test:
 def main():
     with tempfile.TemporaryDirectory() as root:
         test = Test(os.path.abspath(sys.argv[1]), root)
-        for part in (test.test_files, test.test_repeat, test.test_container, test.test_usage):
+        for part in (test.test_files, test.test_repeat, test.test_container, test.test_damage, test.test_usage):
             part()
         return 1 if test.failures else 0
 
