@@ -286,7 +286,8 @@ static int parse(strl_cli_args *args, render_options *o)
         {.name = "error", .kind = STRL_CLI_REAL, .value = &o->error_px, .argument = "PX",
          .help = "allowed pixel error (1)", .least = 1e-6, .most = 1e6},
         {.name = "splat", .kind = STRL_CLI_REAL, .value = &o->splat_px, .argument = "PX",
-         .help = "of sample trees: cells that cover no more than PX x PX pixels are drawn as splats of that size (as --error)",
+         .help = "of sample trees: cells that cover no more than PX x PX pixels are drawn as splats of that size, which is the error that "
+                 "they are allowed then (as --error)",
          .least = 1, .most = 64},
         {.name = "cull", .kind = STRL_CLI_ENUM, .value = &o->cull, .argument = "none|back",
          .help = "faces not to be drawn: back = those whose corners come clockwise as seen; for closed models (none)"},
@@ -319,11 +320,9 @@ static int parse(strl_cli_args *args, render_options *o)
     const strl_cli_usage usage = {
         .positional = "MODEL", .least = 1, .most = 1, .options = options, .option_count = STRL_CLI_COUNT_OF(options),
         .notes = "MODEL is a container, as a file or behind http:// or https://, or with --full also a PLY, STL, OBJ or glTF\n"
-                 "file. In the lines of --stats "
-                 "max_error_px is the\n"
-                 "largest pixel error of what was drawn, and null where the eye is inside a node's box: no pixel "
-                 "error\n"
-                 "bounds what is that near."};
+                 "file. In the lines of --stats max_error_px is the largest pixel error of what was drawn, of splats their\n"
+                 "size, and null where the eye is inside a node's box: no pixel error bounds what is that near. allowed_error_px\n"
+                 "is --error, or more where --memory is short."};
     strl_cli_list inputs;
     int stop = strl_cli_parse(args, &usage, &inputs);
     if (stop >= 0)

@@ -37,8 +37,8 @@ typedef struct strl_walk_desc {
     uint64_t memory_bytes;     /* hard bound of decoded nodes and node records held; 0 = 512 MiB. Pages that wait for decoding
                                   come on top: requests_in_flight of them at most */
     double error_px;           /* allowed pixel error; 0 = 1 */
-    double splat_px;           /* of sample trees: cells that cover no more than a square of this side are drawn as splats of at most it;
-                                  0 = error_px. Where error_px is changed later, it changes in proportion */
+    double splat_px;           /* of sample trees: cells that cover no more than a square of this side are drawn as splats of at most it,
+                                  which is the pixel error that such trees are allowed; 0 = error_px. Where error_px is changed later, it changes in proportion */
     uint32_t requests_in_flight; /* 0 = 16, of a remote source 64; at most 256. Of a remote source fewer, as bandwidth and
                                     latency want it */
     const strl_executor *executor; /* copied */
@@ -64,8 +64,8 @@ typedef struct strl_walk_stats {
     uint64_t dependent_splits; /* those that only another member of the dependency group asked for */
     uint64_t dependent_collapses; /* those of nodes that had stayed split for another member alone */
     uint64_t vertex_splits, vertex_collapses;       /* progressive-mesh steps done in this frame */
-    double allowed_error_px;   /* error_px, or more where the budget is tight */
-    float max_error_px;        /* largest claimed among visible items; infinite where the eye is inside a node's box */
+    double allowed_error_px;   /* error_px, or more where the budget is tight; of sample trees splat_px / error_px times as much is allowed */
+    float max_error_px;        /* largest claimed among visible items, of splats their size; infinite where the eye is inside a node's box */
     uint64_t select_ns;        /* time in strl_walk_frame */
     bool remote;               /* the source is: then what it has done since it was opened is in `network` */
     strl_network_stats network;

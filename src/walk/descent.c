@@ -28,14 +28,14 @@ double strl__group_px(const strl__descent *c, const strl_node *record)
 {
     strl_box box = strl__world_box(c->tree, c->placement, record->group_box_min, record->group_box_max);
     double error = fmaxf(record->group_geometric, record->group_appearance);
-    return strl_view_error_px(c->cut->view, &box, error * c->placement->length_scale);
+    return strl_view_error_px(c->cut->view, &box, error * c->placement->length_scale) / strl__splat_ratio(c->walk, c->tree);
 }
 
 bool strl__asks_itself(const strl__descent *c, const strl_node *record)
 {
     strl_box box = strl__world_box(c->tree, c->placement, record->box_min, record->box_max);
     double error = fmaxf(record->geometric_min, record->appearance_min);
-    return strl_view_error_px(c->cut->view, &box, error * c->placement->length_scale) > c->cut->allowed_px;
+    return strl_view_error_px(c->cut->view, &box, error * c->placement->length_scale) / strl__splat_ratio(c->walk, c->tree) > c->cut->allowed_px;
 }
 
 /* ---- lists */

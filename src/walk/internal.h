@@ -103,8 +103,7 @@ typedef struct strl__treelets {
 typedef struct strl__placement {
     uint32_t tree, own_part;
     double transform[12];
-    double length_scale; /* world units per lattice unit, at most; of sample trees by the pixels that a splat may have for each of the
-                            allowed error, so that sizes and errors are compared alike */
+    double length_scale; /* world units per lattice unit, at most */
 } strl__placement;
 
 #define STRL__FAN 16u /* placements, runs or boxes under one box */
@@ -401,6 +400,8 @@ strl_status strl__run_page_place(const strl_walk *walk, strl__run_page *page, ui
 void strl__run_page_bound(const strl_walk *walk, strl__run_page *page);
 strl_box strl__placement_box(const strl_walk *walk, const strl__placement *placement);
 strl_far strl__placement_far(const strl_walk *walk, const strl__placement *placement);
+/* Pixels that the tree is allowed for each of the allowed error. */
+double strl__splat_ratio(const strl_walk *walk, const strl_tree *tree);
 void strl__run_reserve(strl_walk *walk, strl__run *run, strl__request *request); /* absent -> pending; room must be there */
 void strl__run_release(strl_walk *walk, strl__run *run);                         /* pending -> absent */
 /* Pending -> resident; a failure leaves it pending. */

@@ -7,12 +7,12 @@ typedef struct projector {
     const strl_sight *sight;
     const float *errors; /* by state, never increasing */
     double length_scale;
-    double allowed_px;
+    double splat_ratio, allowed_px;
 } projector;
 
 static bool suffices(const projector *p, uint32_t state)
 {
-    return strl_sight_error_px(p->sight, p->errors[state] * p->length_scale) <= p->allowed_px;
+    return strl_sight_error_px(p->sight, p->errors[state] * p->length_scale) / p->splat_ratio <= p->allowed_px;
 }
 
 /* The first state in (low, high] that suffices, where low does not and high does. */
@@ -52,7 +52,8 @@ static uint32_t coarsest_state(const projector *p, uint32_t begin, uint32_t fine
 static uint32_t choose_state(const strl_walk *walk, const strl__active *active)
 {
     const strl__mesh *mesh = &active->node->mesh;
-    const projector p = {&active->sight, mesh->errors, active->placed->length_scale, walk->stats.allowed_error_px};
+    const projector p = {&active->sight, mesh->errors, active->placed->length_scale,
+                         strl__splat_ratio(walk, walk->trees[active->placed->tree].tree), walk->stats.allowed_error_px};
     /* Beside what is below it a brick shows no splats: its record may open it before its own, smaller cells ask for that. */
     return active->open ? mesh->step_count : coarsest_state(&p, mesh->state, mesh->step_count);
 }

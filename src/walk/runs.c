@@ -35,6 +35,11 @@ static double stretch(const double transform[12])
     return most == 1 ? 1 : most * (1 + 1e-12);
 }
 
+double strl__splat_ratio(const strl_walk *walk, const strl_tree *tree)
+{
+    return tree->structure == STRL_STRUCTURE_SAMPLES ? walk->splat_ratio : 1;
+}
+
 strl_status strl__run_page_place(const strl_walk *walk, strl__run_page *page, uint32_t within, uint64_t index, const strl_placement *stored,
                                  strl_error *err)
 {
@@ -44,8 +49,6 @@ strl_status strl__run_page_place(const strl_walk *walk, strl__run_page *page, ui
     memcpy(placement->transform, stored->transform, sizeof placement->transform);
     placement->own_part = stored->own_part;
     placement->length_scale = stretch(stored->transform) * tree->step;
-    if (tree->structure == STRL_STRUCTURE_SAMPLES)
-        placement->length_scale /= walk->splat_ratio;
     return isfinite(placement->length_scale)
                ? STRL_OK
                : strl__fail(err, STRL_ERR_FORMAT, "placement %" PRIu64 ": its transform is not finite", index);
@@ -60,8 +63,7 @@ strl_box strl__placement_box(const strl_walk *walk, const strl__placement *place
 strl_far strl__placement_far(const strl_walk *walk, const strl__placement *placement)
 {
     const strl__walk_tree *tree = &walk->trees[placement->tree];
-    double scale = placement->length_scale * (tree->tree->structure == STRL_STRUCTURE_SAMPLES ? walk->splat_ratio : 1);
-    return strl_far_place(&tree->far, placement->transform, scale);
+    return strl_far_place(&tree->far, placement->transform, placement->length_scale);
 }
 
 void strl__run_page_bound(const strl_walk *walk, strl__run_page *page)

@@ -93,7 +93,7 @@ static unsigned share_of(const strl_walk *walk, const strl__active *active)
     if (!(walk->splat_ratio * allowed > 1))
         return SHARES - 1;
     double size = (double)mesh->errors[active->state] * active->placed->length_scale;
-    double parts = ceil(SHARES * strl_sight_error_px(&active->sight, size) / allowed);
+    double parts = ceil(SHARES * strl_sight_error_px(&active->sight, size) / walk->splat_ratio / allowed);
     return parts >= SHARES ? SHARES - 1 : parts >= 1 ? (unsigned)parts - 1 : 0;
 }
 
@@ -129,7 +129,7 @@ static void take_shown(sink *self, const strl__active *active)
     if (first == end)
         return;
     unsigned size = share_of(self->walk, active);
-    double unit = self->walk->splat_ratio * strl_sight_error_px(&active->sight, active->placed->length_scale) / fmax(1, px_of_size(self->walk, size));
+    double unit = strl_sight_error_px(&active->sight, active->placed->length_scale) / fmax(1, px_of_size(self->walk, size));
     self->unit_share = unit * unit;
     find_sight(self, active);
     take_splats(self, active->node->record, mesh->splats + first, end - first, size);
@@ -229,7 +229,7 @@ static void take_cell(sink *self, const strl__active *active, const strl_node *r
 {
     const strl_sight sight = sight_of(self, active, record, splat);
     const double size = ldexp(SQUARE_OF_CUBE, splat->side) * active->placed->length_scale;
-    const double px = self->walk->splat_ratio * strl_sight_error_px(&sight, size);
+    const double px = strl_sight_error_px(&sight, size);
     if (!sight.seen)
         return;
     if (px > STRL__MOST_POINT_PX)
@@ -327,6 +327,7 @@ static strl_status add_items(strl_walk *walk, const strl_draw_item *shape, const
         item->indices = walk->numbers;
         item->vertex_count = item->index_count = item->draw_count = item->dirty_count = part;
         walk->stats.splats += part;
+        walk->stats.max_error_px = fmaxf(walk->stats.max_error_px, item->error_px);
     }
     return STRL_OK;
 }

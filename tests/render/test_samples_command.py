@@ -121,6 +121,17 @@ def other_errors_draw_fewer_triangles_and_splats(folder):
         assert (null["triangles"], null["splats"], null["nodes"]) == (stats["triangles"], stats["splats"], stats["nodes"]), null
 
 
+def splats_are_errors_of_their_size(folder):
+    """--splat is what --error would be, of such trees; what is claimed is in pixels of the image."""
+    _, out, _ = plant(folder)
+    columns = "triangles", "splats", "nodes", "max_error_px"
+    for size in ("4", "64"):
+        image, splat = render(out, folder, "--camera", CAMERAS[2], "--splat", size)
+        other, error = render(out, folder, "--camera", CAMERAS[2], "--error", size)
+        assert image == other and all(abs(splat[name] - error[name]) <= 1e-5 * error[name] for name in columns), (splat, error)
+        assert 0.5 * float(size) < splat["max_error_px"] <= float(size) * 1.000001 and splat["allowed_error_px"] == 1, splat
+
+
 def confetti(path, count, reach=0.012):
     """Small white triangles of any direction in a cube, without normals."""
     random = Random(7)
@@ -287,4 +298,4 @@ def any_order_of_the_input_gives_the_same_triangles(folder):
 run_tests(what_samples_cannot_do_is_refused, backs_are_left_out_on_request, large_triangles_are_all_drawn_however_many_lie_in_a_cell, info_tells_what_it_is, verify_proves_it_and_not_against_another,
           extract_gives_what_is_above_a_front, as_the_error_goes_to_nothing_the_image_is_the_full_one,
           a_wireframe_shows_splats_as_they_are, other_errors_draw_fewer_triangles_and_splats, within_little_memory_it_coarsens,
-          splats_of_confetti_are_as_bright_as_it, far_copies_of_confetti_are_as_bright_as_near_ones, any_order_of_the_input_gives_the_same_triangles)
+          splats_are_errors_of_their_size, splats_of_confetti_are_as_bright_as_it, far_copies_of_confetti_are_as_bright_as_near_ones, any_order_of_the_input_gives_the_same_triangles)
