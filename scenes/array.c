@@ -15,6 +15,7 @@
 #include "scenes/parts/gltf_json.h"
 
 #define SPACING 1.25 /* of the model's sides */
+#define MOST_WRITTEN_OUT 10 /* times the triangles of a model that has copies itself */
 enum { ENDING = 5, AT_ONCE = 1024, CORNER_BYTES = 32, COPIES_DEFAULT = 100 };
 
 typedef struct array_corner {
@@ -202,16 +203,48 @@ static strl_status put_text(array_scene *scene, const char *bin, strl_error *err
 
 /* ---- the whole */
 
+/* Copies of copies would need a node for each: glTF's nodes have one parent, and its instances no children. What a model places is
+ * written out, which a forest is not made for. */
+static strl_status check_copies(const strl_scene_desc *desc, const strl_reader *reader, strl_error *err)
+{
+    uint64_t own = 0, placed = 0;
+    for (uint32_t i = 0; i < strl_reader_piece_count(reader); i++) {
+        strl_reader_piece piece;
+        strl_reader_piece_get(reader, i, &piece);
+        own += piece.triangles;
+        placed += piece.triangles * piece.placements;
+    }
+    return placed / MOST_WRITTEN_OUT <= own
+               ? STRL_OK
+               : strl__fail(err, STRL_ERR_LIMIT,
+                            "%s: it places its %" PRIu64 " triangles so often that they are %" PRIu64
+                            ", and an array has them written out: expected at most %d times as many", desc->of, own, placed, MOST_WRITTEN_OUT);
+}
+
+static strl_status open_model(array_scene *scene, strl_error *err)
+{
+    const strl_scene_desc *desc = scene->run->desc;
+    strl_reader_desc reading = {.path = desc->of, .memory_bytes = desc->memory_bytes, .child = {.importer = desc->importer},
+                                .most_pieces = STRL_READER_MOST_PIECES};
+    strl_status status = strl_reader_open(&reading, &scene->reader, err);
+    if (status != STRL_OK || strl_reader_piece_count(scene->reader) == 1)
+        return status;
+    status = check_copies(desc, scene->reader, err);
+    strl_reader_close(scene->reader);
+    scene->reader = NULL;
+    reading.most_pieces = 0;
+    return status == STRL_OK ? strl_reader_open(&reading, &scene->reader, err) : status;
+}
+
 static strl_status open_all(array_scene *scene, const char *bin, strl_error *err)
 {
     const strl_scene_desc *desc = scene->run->desc;
-    const strl_reader_desc reading = {.path = desc->of, .memory_bytes = desc->memory_bytes, .child = {.importer = desc->importer}};
     strl_reader_info info;
     scene->triangles = strl__alloc(AT_ONCE, sizeof *scene->triangles);
     scene->corners = strl__alloc((size_t)3 * AT_ONCE, sizeof *scene->corners);
     if (!scene->triangles || !scene->corners)
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory to copy triangles", desc->path);
-    strl_status status = strl_reader_open(&reading, &scene->reader, err);
+    strl_status status = open_model(scene, err);
     if (status == STRL_OK)
         status = strl_output_open(desc->path, NULL, &scene->gltf, err);
     if (status == STRL_OK)

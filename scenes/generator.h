@@ -24,6 +24,10 @@ strl_status strl__scene_painted_plane(strl__scene_run *run, strl_error *err);
 strl_status strl__scene_plain_plane(strl__scene_run *run, strl_error *err);
 strl_status strl__scene_boxes(strl__scene_run *run, strl_error *err);
 strl_status strl__scene_chessboard(strl__scene_run *run, strl_error *err);
+/* To run->parts, which is glTF. */
+enum { STRL__CHESSBOARD_MATERIALS = 2 };
+extern const strl__material strl__chessboard_materials[STRL__CHESSBOARD_MATERIALS];
+strl_status strl__scene_chessboard_copies(strl__scene_run *run, strl_error *err);
 strl_status strl__scene_landscape(strl__scene_run *run, strl_error *err);
 strl_status strl__scene_plant(strl__scene_run *run, strl_error *err);
 

@@ -15,6 +15,7 @@ typedef struct scene_entry {
     strl__scene_mesh_layout layout;
     const strl__material *materials; /* [material_count] of a scene in parts: it writes to run->parts, not to run->writer */
     unsigned material_count;
+    strl_status (*generate_gltf)(strl__scene_run *run, strl_error *err); /* it is in parts as glTF alone, where this writes it */
 } scene_entry;
 
 #define SCENE(scene, text, least, most) .info = {.name = (scene), .summary = (text), .triangles_min = (least), .triangles_max = (most)}
@@ -33,9 +34,11 @@ static const scene_entry scenes[] = {
     {SCENE("plant", "power plant of named parts, 12 to 100,000 triangles each: pipes, vessels, steel, bolts; also as glTF and OBJ",
            10000, 4000000000),
      .generate = strl__scene_plant, .materials = strl__plant_materials, .material_count = STRL__PLANT_MATERIALS},
-    {SCENE("chessboard", "square of fixed size whose fields are black and white pairs of triangles (whole rows of fields)", 2,
+    {SCENE("chessboard", "square of fixed size whose fields are black and white pairs of triangles (whole rows of fields); as glTF copies of 64 x 64 "
+           "fields", 2,
            1000000000),
-     .generate = strl__scene_chessboard, .layout = STRL__SCENE_MESH_POSITION_COLOUR},
+     .generate = strl__scene_chessboard, .layout = STRL__SCENE_MESH_POSITION_COLOUR, .materials = strl__chessboard_materials,
+     .material_count = STRL__CHESSBOARD_MATERIALS, .generate_gltf = strl__scene_chessboard_copies},
     {SCENE("landscape", "hills, houses, a forest of detailed trees; in glTF each kind is there once and has copies, other formats have "
            "the copies' triangles (count within 2 %)", 500000, 4000000000),
      .generate = strl__scene_landscape, .materials = strl__landscape_materials, .material_count = STRL__LANDSCAPE_MATERIALS},
@@ -82,6 +85,11 @@ static strl_status report_finish(void *context, uint64_t done, uint64_t total, s
     return strl__scene_report(context, "arranging", done, total, err);
 }
 
+static bool is_in_parts(const scene_entry *entry, const char *path)
+{
+    return entry->generate_gltf ? strl__path_ends_in(path, ".gltf") : entry->materials != NULL;
+}
+
 static strl_status generate_parts(const scene_entry *entry, strl__scene_run *run, strl_scene_result *result,
                                   strl_error *err)
 {
@@ -97,7 +105,7 @@ static strl_status generate_parts(const scene_entry *entry, strl__scene_run *run
     strl_status status = strl__parts_writer_create(&parts, &run->parts, err);
     if (status != STRL_OK)
         return status;
-    status = entry->generate(run, err);
+    status = (entry->generate_gltf ? entry->generate_gltf : entry->generate)(run, err);
     if (status == STRL_OK)
         status = run->parts->finish(run->parts, report_finish, run, err);
     if (status == STRL_OK && result)
@@ -154,7 +162,7 @@ strl_status strl_scene_write(const strl_scene_desc *desc, const strl_scene_progr
     if (status == STRL_OK && entry->info.copies)
         status = strl__scene_array(&run, result, err);
     else if (status == STRL_OK)
-        status = (entry->materials ? generate_parts : generate)(entry, &run, result, err);
+        status = (is_in_parts(entry, full.path) ? generate_parts : generate)(entry, &run, result, err);
     strl_pool_destroy(own_pool);
     return status;
 }

@@ -139,6 +139,32 @@ def a_chessboard_is_half_black(folder):
         assert abs(area) <= 2 / math.sqrt(triangles), area
 
 
+def a_chessboard_of_copies_is_the_same_board(folder):
+    """Each field of the other formats is there once, in its place and colour."""
+    for triangles, least_copies in ((2, 1), (800, 1), (60000, 2)):
+        scene("chessboard", "-n", str(triangles), "-o", f"{folder}/board.ply", "--quiet")
+        told = scene("chessboard", "-n", str(triangles), "-o", f"{folder}/board.gltf")
+        with open(f"{folder}/board.ply", "rb") as file:
+            head, body = file.read().split(b"end_header\n", 1)
+        faces = int(head.split(b"element face ")[1].split()[0])
+        model = Model(f"{folder}/board.gltf")
+        assert f": {faces} triangles" in told and faces == sum(model.triangles(n["mesh"]) * count for n, _, count in model.uses()), told
+        [fields] = [node for node in model.json["nodes"] if node["name"] == "FIELDS"]
+        wanted = sorted(struct.unpack_from("<3f3B", body, 15 * i)[:4] for i in range(2 * faces))
+        found, most = [], 0
+        for node, attributes, count in model.uses():
+            primitive = model.json["meshes"][node["mesh"]]["primitives"][0]
+            shade = 255 * model.json["materials"][primitive["material"]]["pbrMetallicRoughness"]["baseColorFactor"][0]
+            points = model.rows(primitive["attributes"]["POSITION"])
+            most = max(most, count)
+            for move in model.rows(attributes["TRANSLATION"]):
+                found += [tuple((p[k] + move[k]) * fields.get("scale", [1] * 3)[k] for k in range(3)) + (shade,) for p in points]
+        assert most >= least_copies and len(found) == len(wanted)
+        found.sort(key=lambda p: (round(p[0], 6), round(p[1], 6), p[3]))
+        wanted.sort(key=lambda p: (round(p[0], 6), round(p[1], 6), p[3]))
+        assert all(abs(a - b) < 1e-6 for p, q in zip(found, wanted) for a, b in zip(p, q))
+
+
 def what_does_not_fit_is_refused(folder):
     scene("boxes", "-n", "12", "-o", f"{folder}/one.ply", "--quiet")
     for words, part in ((("array", "-o", f"{folder}/a.gltf"), "needs --of FILE"),
@@ -148,11 +174,17 @@ def what_does_not_fit_is_refused(folder):
         done = subprocess.run([STROLL, "scene", *words], capture_output=True, text=True)
         assert done.returncode in (1, 2) and part in done.stderr, done
     assert sorted(os.listdir(folder)) == ["one.ply"], os.listdir(folder)
+    scene("boxes", "-n", "1200", "-o", f"{folder}/one.ply", "--quiet")
+    scene("array", "--of", f"{folder}/one.ply", "--copies", "1000", "-o", f"{folder}/many.gltf", "--quiet")
+    done = subprocess.run([STROLL, "scene", "array", "--of", f"{folder}/many.gltf", "-o", f"{folder}/more.gltf"], capture_output=True, text=True)
+    assert done.returncode == 1 and "1200 triangles" in done.stderr and "1200000" in done.stderr and done.stderr.count("\n") == 1, done
+    assert not [name for name in os.listdir(folder) if name.startswith("more")]
 
 
 failed = 0
 for test in (a_landscape_is_a_forest_of_copies, a_landscape_is_the_same_for_the_same_seed_and_written_out_elsewhere,
              an_array_has_one_mesh_and_its_copies_do_not_touch, an_array_of_any_model_keeps_its_colours, a_chessboard_is_half_black,
+             a_chessboard_of_copies_is_the_same_board,
              what_does_not_fit_is_refused):
     with tempfile.TemporaryDirectory() as made:
         try:
