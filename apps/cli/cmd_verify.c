@@ -12,6 +12,7 @@
 #include "platform/file.h"
 #include "progress.h"
 #include "shared/importer.h"
+#include "shared/location.h"
 #include "verify/verify.h"
 
 static bool show_progress(void *context, const char *stage, uint64_t done, uint64_t total)
@@ -27,11 +28,12 @@ static void print_checks(const strl_verify_report *report)
     for (unsigned kind = 0; kind < STRL_VERIFY_KINDS; kind++) {
         const strl_verify_check *check = &report->checks[kind];
         if (check->failures)
-            printf("%-16s %12" PRIu64 "  FAILED %" PRIu64 ": %s\n", strl_verify_name((strl_verify_kind)kind),
+            printf("%-16s %12" PRIu64 " looked at, FAILED %" PRIu64 ": %s\n", strl_verify_name((strl_verify_kind)kind),
                    check->count, check->failures, check->first);
+        else if (check->done)
+            printf("%-16s %12" PRIu64 " looked at, good\n", strl_verify_name((strl_verify_kind)kind), check->count);
         else
-            printf("%-16s %12" PRIu64 "  %s\n", strl_verify_name((strl_verify_kind)kind), check->count,
-                   check->done ? "good" : "not looked at");
+            printf("%-16s %12s not looked at\n", strl_verify_name((strl_verify_kind)kind), "");
     }
 }
 
@@ -150,6 +152,14 @@ static strl_status find_scratch(const char *model, const char *wanted, char **fo
     return wanted ? strl_path_make_directory(wanted, err) : STRL_OK;
 }
 
+/* Nothing of the address in the sentence: it may hold a password. */
+static strl_status check_place(const char *model, strl_error *err)
+{
+    return strl_location_is_remote(model)
+               ? strl__fail(err, STRL_ERR_ARGUMENT, "verify reads files, not addresses: save the model as one first")
+               : STRL_OK;
+}
+
 static strl_status verify(strl_cli_args *args, strl_verify_desc *desc, const char *scratch, strl_verify_report *report,
                           strl_error *err)
 {
@@ -175,7 +185,9 @@ static int verify_and_print(strl_cli_args *args, strl_verify_desc *desc, const c
 {
     strl_error err;
     strl_verify_report report = {0};
-    strl_status status = verify(args, desc, scratch, &report, &err);
+    strl_status status = check_place(desc->model, &err);
+    if (status == STRL_OK)
+        status = verify(args, desc, scratch, &report, &err);
     if (status == STRL_OK && json)
         status = print_json(&report, &err);
     else if (status == STRL_OK && (!args->quiet || !report.ok))

@@ -53,6 +53,10 @@ static int parse(strl_cli_args *args, strl_viewer_desc *desc, strl_cli_remote *r
          .help = "of the window (as it was last, at first 1280x720)"},
         {.name = "error", .kind = STRL_CLI_REAL, .value = &desc->error_px, .argument = "PX",
          .help = "allowed pixel error (as it was last, at first 1)", .least = 1e-6, .most = 1e6},
+        {.name = "splat", .kind = STRL_CLI_REAL, .value = &desc->splat_px, .argument = "PX",
+         .help = "of sample trees: cells that cover no more than PX x PX pixels are drawn as splats of that size, more or less as the "
+                 "allowed error is changed (as --error)",
+         .least = 1, .most = 64},
         {.name = "memory", .letter = 'm', .kind = STRL_CLI_BYTES, .value = &desc->memory_bytes,
          .help = "decoded nodes held (as it was last, at first 512M)", .least = 1 << 20, .most = 0x1p50},
         {.name = "gpu-memory", .kind = STRL_CLI_BYTES, .value = &desc->gpu_memory_bytes,

@@ -30,6 +30,7 @@ typedef struct strl_viewer_desc {
     strl_backend backend;    /* STRL_BACKEND_NULL is no window's */
     uint32_t size[2];        /* of the window in screen units; 0 = 1280x720 */
     double error_px;         /* 0 = 1 */
+    double splat_px;         /* of sample trees, as in strl_walk_desc; 0 = error_px */
     strl_cull cull;
     uint64_t memory_bytes;   /* of decoded nodes; 0 = 512 MiB */
     uint64_t gpu_memory_bytes; /* of buffers of nodes; 0 = 512 MiB */

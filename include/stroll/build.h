@@ -56,7 +56,7 @@ typedef struct strl_build_desc {
     bool keep;
     uint64_t keep_triangles; /* of models of fewer nothing is kept: they are built at once; 0 = 65,536 */
     bool resume; /* goes on with what an earlier build of the same request has left, if anything; keeps, too */
-    double probability; /* of sample trees: that a cell of a pixel shows one of its visible triangles; 0 = 1 - 1e-6 */
+    double probability; /* of sample trees: that a cell of a pixel shows one of its visible triangles; 0 = 1 - 1e-6. 0 of clusters */
     bool no_dependencies;   /* for measuring what dependencies bring: every group has one member */
     /* Called on the caller's thread, often; false cancels. May be NULL. */
     bool (*progress)(void *context, const strl_build_progress *progress);

@@ -269,6 +269,8 @@ static strl_status build_with(strl_status (*stages)(strl_build_context *, strl_e
 
 strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err)
 {
+    if (desc->probability > 0)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "--probability is of sample trees: clusters are simplified, and nothing of them is left to chance");
     return build_with(strl__clusters_run, desc, result, err);
 }
 

@@ -56,9 +56,9 @@ def check_window(stroll, display, model, folder, *options):
         viewer.end()
 
 
-def check_frames(stroll, display, model):
+def check_frames(stroll, display, model, samples):
     """A window that closes by itself: for scripts."""
-    def view(*options):
+    def view(*options, model=model):
         done = subprocess.run([stroll, "view", model, "--size", f"{SIZE[0]}x{SIZE[1]}", *options],
                               env=display.environment, text=True, stdout=subprocess.PIPE,
                               stderr=subprocess.PIPE, timeout=PATIENCE_S)
@@ -70,6 +70,10 @@ def check_frames(stroll, display, model):
     assert len(lines) == 2 and lines[0].startswith("40 frames: mean ") and " triangles, " in lines[1], done.stdout
     assert "--memory" not in done.stderr, done.stderr
     assert view("--frames", "1", "--quiet").stdout == ""
+    # the last frame's triangles: splats stand for those of cells of so many pixels
+    few, many = (view("--frames", "200", "--splat", splat, model=samples).stdout.splitlines()[1] for splat in ("64", "1"))
+    few, many = (int(line.split(": ")[1].split()[0]) for line in (few, many))
+    assert 0 < few < many / 2, (few, many)
     tight = view("--frames", "200", "--error", "0.01", "--memory", "1M")
     assert "--memory 1M holds too little for a pixel error of 0.01: " in tight.stderr, tight.stderr
     silent = view("--frames", "200", "--error", "0.01", "--memory", "1M", "--quiet")
@@ -93,16 +97,17 @@ def main():
     missing = [tool for tool in ("Xvfb", "xdotool") if not shutil.which(tool)]
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
-        scene, model = folder / "scene.ply", folder / "scene.stroll"
+        scene, model, samples = folder / "scene.ply", folder / "scene.stroll", folder / "samples.stroll"
         subprocess.run([stroll, "scene", "isosurface", "--triangles", "40K", "--seed", "2", "-o", scene, "--quiet"],
                        check=True)
         subprocess.run([stroll, "build", scene, "-o", model, "--quiet"], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([stroll, "build", scene, "-o", samples, "--structure", "samples", "--quiet"], check=True, stdout=subprocess.DEVNULL)
         check_refusals(stroll, scene, model)
         if missing:
             print("skipped: there is no " + " and no ".join(missing))
             return SKIPPED
         with Display() as display:
-            check_frames(stroll, display, model)
+            check_frames(stroll, display, model, samples)
             check_window(stroll, display, model, folder / "auto")
             check_window(stroll, display, model, folder / "gl3", "--backend", "gl3", "--error", "2")
     print("view: window, mouse, keys and pictures work")

@@ -184,6 +184,7 @@ class Test:
         self.refused("the server failed (500)", "info", url)
         server.fault = None
         self.refused("there is nothing at this address (404)", "info", server.url("none.stroll"))
+        self.refused("verify reads files, not addresses", "verify", url)
         self.refused("redirected too often", "render", server.url("loop"), "-o", "x.png")
         self.refused("models are read from files, http:// and https:// alone", "info", "ftp://host/x")
         self.refused("the server cannot be reached", "render", "http://127.0.0.1:1/x", "-o", "x.png")

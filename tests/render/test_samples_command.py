@@ -51,6 +51,8 @@ def what_samples_cannot_do_is_refused(folder):
         done = run("build", source, "-o", out, "--structure", "samples", *words)
         assert done.code != 0 and done.error.count("\n") == 1 and len(done.error) > 20 and part in done.error, done
         assert os.listdir(folder) == ["in.ply"], done
+    done = run("build", source, "-o", out, "--probability", "0.5")
+    assert done.code == 1 and done.error.count("\n") == 1 and "--probability" in done.error and os.listdir(folder) == ["in.ply"], done
     assert_refused(run("build", os.path.join(folder, "absent.ply"), "-o", out, "--structure", "samples"), "absent.ply")
     for probability in ("0.01", "0.5", "0.999999999999"):
         assert build(source, out, "--structure", "samples", "--probability", probability)["triangles_leaf"] > 900
