@@ -76,7 +76,7 @@ static strl_status load_path(const char *file, strl_camera_path *path, strl_erro
     return status;
 }
 
-/* A named path shows the model's surface to the probe: any size the renderer had is restored. */
+/* A path along the surface shows that to the probe: any size the renderer had is restored. */
 static strl_status make_path(const render_options *o, strl_render_model *model, strl_renderer *renderer,
                              strl_camera_path *path, strl_error *err)
 {
@@ -205,15 +205,38 @@ static strl_status check_outputs(const render_options *o, strl_error *err)
     return status;
 }
 
-static strl_status open_renderer(const render_options *o, strl_renderer **renderer, strl_error *err)
+static strl_status open_renderer(const render_options *o, uint64_t supersample, strl_renderer **renderer, strl_error *err)
 {
     static const strl_backend backends[] = {STRL_BACKEND_DEFAULT, STRL_BACKEND_GL45, STRL_BACKEND_GL3,
                                             STRL_BACKEND_NULL, STRL_BACKEND_GL3};
     const strl_renderer_desc desc = {.backend = backends[o->backend], .gles = o->backend == BACKEND_GLES,
                                      .width = o->size[0], .height = o->size[1],
-                                     .supersample = (uint32_t)o->supersample,
+                                     .supersample = (uint32_t)supersample,
                                      .gpu_memory_bytes = o->gpu_memory_bytes};
     return strl_renderer_create(&desc, renderer, err);
+}
+
+/* A path along the surface of a container is one for all that render it, however they draw it: it is made in a walk of its own, with
+ * the defaults, that waits for all it wants. Others are made round the model that is drawn. */
+static strl_status survey_path(const render_options *o, const strl_render_model_desc *drawn, strl_camera_path *path, strl_error *err)
+{
+    const strl_render_model_desc desc = {.location = drawn->location, .error_px = 1, .splat_px = 1, .memory_bytes = drawn->memory_bytes};
+    strl_render_model *model = NULL;
+    strl_renderer *renderer = NULL;
+    bool is_container = false;
+    if (!o->path || (strcmp(o->path, "walk") != 0 && strcmp(o->path, "flythrough") != 0))
+        return STRL_OK;
+    strl_status status = strl_location_is_container(&desc.location, &is_container, err);
+    if (status == STRL_OK && is_container)
+        status = open_renderer(o, 1, &renderer, err);
+    if (status == STRL_OK && is_container)
+        status = strl_render_walk_open(&desc, &model, err);
+    if (status == STRL_OK && is_container)
+        status = make_path(o, model, renderer, path, err);
+    if (model)
+        model->klass->close(model);
+    strl_renderer_destroy(renderer);
+    return status;
 }
 
 /* *camera_wrong: it is the specification of the camera that fails. */
@@ -229,10 +252,12 @@ static strl_status render(render_options *o, strl_cli_progress *progress, bool *
     if (status == STRL_OK)
         status = strl_cli_locate(&o->remote, o->input, &desc.location, err);
     if (status == STRL_OK)
-        status = open_renderer(o, &renderer, err);
+        status = survey_path(o, &desc, &path, err);
+    if (status == STRL_OK)
+        status = open_renderer(o, o->supersample, &renderer, err);
     if (status == STRL_OK)
         status = strl_render_model_open(&desc, &model, err);
-    if (status == STRL_OK) {
+    if (status == STRL_OK && path.count == 0) {
         status = make_path(o, model, renderer, &path, err);
         *camera_wrong = o->camera && status == STRL_ERR_ARGUMENT;
     }
@@ -276,7 +301,7 @@ static int parse(strl_cli_args *args, render_options *o)
         {.name = "camera", .kind = STRL_CLI_STRING, .value = &o->camera, .argument = "SPEC",
          .help = "one image: \"eye x y z target x y z up x y z fov DEG\" (the orbit's first frame)"},
         {.name = "path", .kind = STRL_CLI_STRING, .value = &o->path, .argument = "FILE|orbit|walk|flythrough",
-         .help = "many images"},
+         .help = "many images; walk and flythrough go along the surface, of a container in the same places however it is drawn"},
         {.name = "frames", .kind = STRL_CLI_COUNT, .value = &o->frames, .given = &o->frames_given,
          .help = "of a named path (60)", .least = 1, .most = 1e6},
         {.name = "seed", .kind = STRL_CLI_COUNT, .value = &o->seed, .help = "of a named path (1)"},

@@ -134,6 +134,20 @@ def splats_are_errors_of_their_size(folder):
         assert 0.5 * float(size) < splat["max_error_px"] <= float(size) * 1.000001 and splat["allowed_error_px"] == 1, splat
 
 
+def paths_along_the_surface_are_the_same_however_it_is_drawn(folder):
+    _, samples, _ = plant(folder)
+    clusters, saved = os.path.join(folder, "clusters.stroll"), os.path.join(folder, "path.json")
+    build(os.path.join(folder, "in.ply"), clusters)
+    for path in ("walk", "flythrough"):
+        for model, ways in ((samples, (("--splat", "1"), ("--splat", "8"), ("--full",), ("--realtime", "1000"), ("--cull", "back"))),
+                            (clusters, ((), ("--error", "20"), ("--full",), ("--supersample", "2")))):
+            found = set()
+            for words in ways:
+                must("render", model, "--path", path, "--frames", "3", "--size", "64x48", "--save-path", saved, "--quiet", *words)
+                found.add(read(saved))
+            assert len(found) == 1, (path, model)
+
+
 def confetti(path, count, reach=0.012):
     """Small white triangles of any direction in a cube, without normals."""
     random = Random(7)
@@ -300,4 +314,4 @@ def any_order_of_the_input_gives_the_same_triangles(folder):
 run_tests(what_samples_cannot_do_is_refused, backs_are_left_out_on_request, large_triangles_are_all_drawn_however_many_lie_in_a_cell, info_tells_what_it_is, verify_proves_it_and_not_against_another,
           extract_gives_what_is_above_a_front, as_the_error_goes_to_nothing_the_image_is_the_full_one,
           a_wireframe_shows_splats_as_they_are, other_errors_draw_fewer_triangles_and_splats, within_little_memory_it_coarsens,
-          splats_are_errors_of_their_size, splats_of_confetti_are_as_bright_as_it, far_copies_of_confetti_are_as_bright_as_near_ones, any_order_of_the_input_gives_the_same_triangles)
+          splats_are_errors_of_their_size, paths_along_the_surface_are_the_same_however_it_is_drawn, splats_of_confetti_are_as_bright_as_it, far_copies_of_confetti_are_as_bright_as_near_ones, any_order_of_the_input_gives_the_same_triangles)
