@@ -148,10 +148,16 @@ typedef struct strl__walk_tree {
 /* Points of one size, for what is not drawn itself. */
 typedef struct strl__far_points {
     strl_vertex *items;
-    size_t count, capacity;
+    strl_vertex_label *labels; /* [count], of the placements' own parts; NULL where the walk keeps none */
+    size_t count, capacity, label_capacity;
     double px; /* the largest box that one of them stands for, in pixels */
 } strl__far_points;
 
+/* Of splats: shares of the allowed size, a cell being as a rule half as large as the one above; then those that close holes,
+ * STRL__MOST_POINT_PX and halves of it, two for each. */
+#define STRL__POINT_SHARES 4u
+#define STRL__MISSING_SIZES 8u
+#define STRL__POINT_SIZES (STRL__POINT_SHARES + STRL__MISSING_SIZES)
 #define STRL__FAR_SIZES 7u /* 0: the size of the allowed error; k: 2^k pixels, for runs that are not there yet */
 
 /* A page's bytes, shared by the decode jobs of its nodes. */
@@ -358,6 +364,7 @@ struct strl_walk {
     size_t point_count, point_capacity;
     float scattered[256]; /* of a splat's coverage: 0 = the faces are a wall, 1 = there is nearly none */
     strl__far_points far[STRL__FAR_SIZES]; /* of the frame */
+    strl__far_points merged[STRL__POINT_SIZES]; /* splats of placements that show few, of the frame */
     double far_near, far_far;              /* depths of their boxes; far_far 0: there is none */
     uint16_t *numbers; /* 0, 1, 2, ...; NULL where there was no splat yet */
     strl_camera camera; /* of the last frame */
@@ -411,10 +418,18 @@ void strl__run_evict(strl_walk *walk, strl__run *run);
 /* far.c */
 /* Whether the box projects to at most the allowed error. *px: to how much. */
 bool strl__is_far(const strl__cut *cut, const strl_box *box, double *px);
-/* A point for what the box holds, which projects to px; as large as the box where it is not there yet. */
+/* A point for what the box holds, which projects to px; as large as the box where it is not there yet. own_part: of the placement that it
+ * is, as of strl_draw_item; 0 = none or several. */
 strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far, double px, bool is_missing,
-                           strl_error *err);
-strl_draw_item strl__far_item(const strl_walk *walk, unsigned size); /* what all items of far points of a size have in common */
+                           uint32_t own_part, strl_error *err);
+/* Room for one more, its label set; NULL: no memory. */
+strl_vertex *strl__far_points_add(strl__far_points *points, bool labels, uint32_t own_part);
+void strl__far_points_deinit(strl__far_points *points);
+/* A place in the world on the lattice of these points. */
+void strl__far_place(const strl_walk *walk, const double world[3], int32_t position[3]);
+double strl__far_px(double allowed_px, unsigned size);
+/* All of an item of such points but themselves; what they stand for is at most box_px large. */
+strl_draw_item strl__far_item(const strl_walk *walk, double point_px, double box_px);
 
 /* treelets.c */
 strl__treelet *strl__treelets_find(const strl__treelets *treelets, uint32_t tree, uint32_t index);
@@ -466,7 +481,7 @@ void strl__refine_front(strl_walk *walk);
 strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const strl_brick_head *head, bool labels,
                                strl__mesh *mesh, strl_error *err);
 
-/* splats.c: behind the other items of the list. */
+/* points.c: behind the other items of the list. */
 strl_status strl__draw_splats(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err);
 
 /* draw.c */

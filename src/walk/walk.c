@@ -174,7 +174,9 @@ void strl_walk_close(strl_walk *walk)
                            walk->numbers,
                            walk};
     for (unsigned size = 0; size < STRL__FAR_SIZES; size++)
-        strl__free(walk->far[size].items);
+        strl__far_points_deinit(&walk->far[size]);
+    for (unsigned size = 0; size < STRL__POINT_SIZES; size++)
+        strl__far_points_deinit(&walk->merged[size]);
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         strl__free(owned[i]);
 }
