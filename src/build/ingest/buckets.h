@@ -7,12 +7,16 @@
 typedef struct strl_buckets {
     uint32_t count;
     uint64_t *splitter; /* [count - 1] first key of bucket i + 1 */
+    bool shares_keys;   /* what has the key of equal splitters lies in all buckets between them, and in no other */
     strl_spill **spill; /* [count] packed triangles, in the order of the input; a builder deletes those that it has used up */
 } strl_buckets;
 
-/* From the inputs to buckets: the stages survey and read. octree: splitters are borders of cells of the octree, the largest near by.
+/* From the inputs to buckets: the stages survey and read. octree: splitters are borders of cells of the octree, the largest near by,
+ * and where more than a bucket's triangles have one key, several buckets share them.
  * Where there is no triangle, no bucket is made either. */
 strl_status strl_ingest_begin(strl_build_context *context, bool octree, strl_ingest *ingest, strl_buckets *buckets, strl_error *err);
+/* First and last key of what may be in a bucket, where keys are shared. */
+void strl__bucket_range(const strl_buckets *buckets, uint32_t index, uint64_t *low, uint64_t *high);
 void strl__buckets_deinit(strl_buckets *buckets);
 
 /* Position on the curve of a lattice point: 21 bits of each axis, three bits a level of an octree, x lowest. */

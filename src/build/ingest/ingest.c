@@ -90,7 +90,7 @@ strl_status strl_ingest_begin(strl_build_context *context, bool octree, strl_ing
     ingest->up = model->up;
     memcpy(ingest->unit, model->unit, sizeof ingest->unit);
     if (!status)
-        status = strl__survey_run(context, model->readers, &survey, err);
+        status = strl__survey_run(context, model->readers, octree, &survey, err);
     if (status)
         goto done;
     context->result->triangles_in += survey.triangles;

@@ -6,18 +6,26 @@
 
 #define MAX_BUCKETS 384u
 
+typedef struct survey_sample {
+    double position[3][3];
+    uint64_t index; /* of all triangles */
+} survey_sample;
+
 /* First pass: what must be known before a single position can be put on the lattice. */
 typedef struct model_survey {
     double min[3], max[3];
     uint64_t triangles;            /* as the readers gave them */
     bool any_normal, any_colour, any_texcoord;
     uint64_t *edge_histogram;      /* [EDGE_BINS] of squared edge lengths */
-    double (*sample)[3];           /* [SAMPLE_CAPACITY] centroids, one of sample_stride triangles */
+    survey_sample *sample;         /* [SAMPLE_CAPACITY] one of sample_stride triangles */
     uint32_t sample_count;
+    bool is_scattered;             /* no pattern in the order of the input hides anything from the sample */
     uint64_t sample_stride;
 } model_survey;
 
-strl_status strl__survey_run(strl_build_context *context, strl_reader *const *readers, model_survey *survey, strl_error *err);
+/* octree: buckets will be made as strl_ingest_begin says. */
+strl_status strl__survey_run(strl_build_context *context, strl_reader *const *readers, bool octree, model_survey *survey,
+                             strl_error *err);
 void strl__survey_deinit(model_survey *survey);
 /* Sets origin, step and what is said about it, curve_shift, leaf_error. */
 strl_status strl__survey_choose_lattice(const strl_build_context *context, const model_survey *survey, strl_ingest *ingest,

@@ -42,7 +42,7 @@ typedef struct fan_table {
     uint32_t *head; /* first corner of the slot's position; NO_INDEX = free */
     uint32_t *next; /* [3 * count] next corner at the same position */
     uint32_t *slot; /* [3 * count] of the corner's position */
-    uint32_t *tail;
+    uint32_t *tail; /* its last corner; as soon as a normal is made there, the corner that got it */
     uint32_t mask;
 } fan_table;
 
@@ -86,8 +86,14 @@ static void fill_corner(const fan_table *table, const face_facts *faces, strl_so
 {
     strl_soup_corner *own = &triangles[corner / 3].corner[corner % 3];
     const float *axis = faces[corner / 3].normal;
+    uint32_t *last = &table->tail[table->slot[corner]];
     float sum[3] = {0};
     uint32_t seen = 0;
+    if (*last < corner && memcmp(faces[*last / 3].normal, axis, sizeof faces->normal) == 0) {
+        memcpy(own->normal, triangles[*last / 3].corner[*last % 3].normal, sizeof own->normal);
+        return; /* faces in one plane: what many equal triangles are */
+    }
+    *last = corner;
     for (uint32_t c = table->head[table->slot[corner]]; c != NO_INDEX && seen < MOST_FACES;
          c = table->next[c], seen++) {
         const float *n = faces[c / 3].normal;

@@ -246,7 +246,6 @@ static void bound_what_rises(const strl_sample_stage *stage, made_bucket *made)
 static strl_status work(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
 {
     const chunk_job *job = context;
-    const strl_buckets *buckets = job->stage->buckets;
     strl_octree octree = {0};
     strl_arena arena = {0};
     (void)worker;
@@ -258,8 +257,8 @@ static strl_status work(void *context, uint64_t index, unsigned slot, unsigned w
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory to sample %u triangles", octree.triangle_count);
     for (uint32_t i = 0; i < octree.triangle_count && !status; i++)
         order[i] = i;
-    cutting c = {&job->slots[slot], &octree, order, index ? buckets->splitter[index - 1] : 0,
-                 index + 1 < buckets->count ? buckets->splitter[index] - 1 : UINT64_MAX, &arena};
+    cutting c = {.made = &job->slots[slot], .octree = &octree, .order = order, .arena = &arena};
+    strl__bucket_range(job->stage->buckets, (uint32_t)index, &c.low, &c.high);
     if (!status)
         status = cut(&c, 0, octree.triangle_count, 0, 0, err);
     strl__free(order);
