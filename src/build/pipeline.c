@@ -274,12 +274,10 @@ strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *
 
 strl_status strl_build_samples(const strl_build_desc *desc, strl_build_result *result, strl_error *err)
 {
-    strl_build_desc own = *desc;
-    if (desc->certify || desc->no_dependencies || desc->resume)
+    if (desc->certify || desc->no_dependencies)
         return strl__fail(err, STRL_ERR_ARGUMENT, "a sample tree takes no %s",
-                          desc->certify ? "--certify: it claims no error" : desc->resume ? "--resume" : "--no-dependencies: it has none");
+                          desc->certify ? "--certify: it claims no error" : "--no-dependencies: it has none");
     if (!(desc->probability >= 0 && desc->probability < 1))
         return strl__fail(err, STRL_ERR_ARGUMENT, "the probability of a sample is %g, expected one between 0 and 1", desc->probability);
-    own.keep = false;
-    return build_with(strl__samples_run, &own, result, err);
+    return build_with(strl__samples_run, desc, result, err);
 }

@@ -437,7 +437,6 @@ static void what_samples_cannot_be_asked_for_is_refused(void **state)
     mesh_file_free(&mesh);
     assert_refused((strl_build_desc){.certify = true}, "certif");
     assert_refused((strl_build_desc){.no_dependencies = true}, "dependenc");
-    assert_refused((strl_build_desc){.resume = true}, "resume");
     assert_refused((strl_build_desc){.probability = 1}, "probability");
     assert_refused((strl_build_desc){.probability = 1.5}, "probability");
     assert_refused((strl_build_desc){.probability = -0.5}, "probability");

@@ -16,6 +16,8 @@
  * some three times a bucket: with this share up to 32 threads may sort at once (strl__ingest_window). */
 #define SHARES_OF_MEMORY 96u
 
+#define BUFFER_BYTES ((size_t)64 << 10) /* of a bucket */
+
 uint64_t strl__bucket_bytes(const strl_build_context *context)
 {
     return context->memory_bytes / SHARES_OF_MEMORY;
@@ -82,6 +84,11 @@ static void choose_splitters(const uint64_t *keys, uint32_t count, bool octree, 
     }
 }
 
+void strl__bucket_name(uint32_t index, char name[24])
+{
+    snprintf(name, 24, "bucket-%03u", index);
+}
+
 static strl_status open_buckets(strl_build_context *context, const model_survey *survey, const strl_ingest *ingest, bool octree,
                                 strl_buckets *buckets, strl_error *err)
 {
@@ -102,9 +109,10 @@ static strl_status open_buckets(strl_build_context *context, const model_survey 
     qsort(keys, survey->sample_count, sizeof *keys, compare_keys);
     choose_splitters(keys, survey->sample_count, octree, buckets);
     for (uint32_t i = 0; i < buckets->count && !status; i++) {
-        char name[32];
-        snprintf(name, sizeof name, "bucket-%03u", i);
-        status = strl_spill_open(context->spills, name, 64u << 10, &buckets->spill[i], err);
+        char name[24];
+        strl__bucket_name(i, name);
+        status = octree && context->keep ? strl_spill_open_kept(context->spills, name, BUFFER_BYTES, &buckets->spill[i], err)
+                                         : strl_spill_open(context->spills, name, BUFFER_BYTES, &buckets->spill[i], err);
     }
 done:
     strl__free(keys);

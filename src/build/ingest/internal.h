@@ -52,8 +52,6 @@ bool strl__ingest_add_image(strl_names *materials, size_t material, const strl_m
 bool strl__ingest_fill_images(strl_names *materials);
 
 void strl__soup_pack(const strl_ingest *ingest, const strl_soup_triangle *triangle, uint8_t *bytes);
-/* Two corners in one lattice cell. */
-bool strl__soup_has_collapsed(const strl_soup_triangle *triangle);
 void strl__soup_set_palette(const strl_ingest *ingest, uint32_t palette, uint8_t *bytes);
 
 /* Parts, materials and images of all inputs, whichever the tree is made of. They are known after the first survey. */
@@ -98,6 +96,10 @@ strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest,
                                strl_error *err);
 /* Pairs to edges and shared positions. */
 strl_status strl__connect_cells(strl_build_context *context, strl_ingest *ingest, pair_spills *pairs, strl_error *err);
+
+/* The stream "ingest" of a checkpoint: all that is neither graph nor triangles. with_cells: they have been cut. */
+strl_status strl__ingest_save_facts(strl_build_context *context, const strl_ingest *ingest, strl_error *err);
+strl_status strl__ingest_restore_facts(strl_build_context *context, bool with_cells, strl_ingest *ingest, strl_error *err);
 
 /* Bytes that one bucket or pair spill may take, so that every worker can hold one and its sort; the same for any number of workers. */
 uint64_t strl__bucket_bytes(const strl_build_context *context);
