@@ -54,8 +54,8 @@ void strl__build_stage(strl_build_context *context, const char *stage)
 void strl__build_expect(strl_build_context *context, uint64_t triangles)
 {
     context->progress.triangles_in = triangles;
-    strl__estimate_guess(&context->estimate, strl__estimate_seconds(triangles, strl_pool_workers(context->pool),
-                                                                   context->desc->certify));
+    strl__estimate_guess(&context->estimate,
+                         strl__estimate_seconds(context->estimate.kind, triangles, strl_pool_workers(context->pool)));
 }
 
 strl_status strl__build_open_stream(strl_build_context *context, const char *name, strl_spill **spill, strl_error *err)
@@ -254,7 +254,8 @@ static strl_status build_with(strl_status (*stages)(strl_build_context *, strl_e
     strl_build_context context = {.desc = desc, .result = result, .run = stages, .keep = desc->keep || desc->resume,
                                   .memory_bytes = desc->memory_bytes ? desc->memory_bytes : 1ull << 30};
     *result = (strl_build_result){.inputs = desc->input_count};
-    strl__estimate_start(&context.estimate, started);
+    strl__estimate_start(&context.estimate,
+                         stages == strl__samples_run ? STRL_BUILD_SAMPLES : desc->certify ? STRL_BUILD_CERTIFIED : STRL_BUILD_CLUSTERS, started);
     context.progress.memory_bytes = context.memory_bytes;
     strl_status status = check_request(desc, &target, err);
     if (!status)
