@@ -16,7 +16,8 @@
  * some three times a bucket: with this share up to 32 threads may sort at once (strl__ingest_window). */
 #define SHARES_OF_MEMORY 96u
 
-#define BUFFER_BYTES ((size_t)64 << 10) /* of a bucket */
+#define BUFFER_BYTES ((size_t)64 << 10)      /* of a bucket */
+#define KEPT_BUFFER_BYTES ((size_t)48 << 10) /* and a step of 16 KiB, of which a checksum is made */
 
 uint64_t strl__bucket_bytes(const strl_build_context *context)
 {
@@ -89,7 +90,8 @@ void strl__bucket_name(uint32_t index, char name[24])
     snprintf(name, 24, "bucket-%03u", index);
 }
 
-static strl_status open_buckets(strl_build_context *context, const model_survey *survey, const strl_ingest *ingest, bool octree,
+/* Uses up the sample. */
+static strl_status open_buckets(strl_build_context *context, model_survey *survey, const strl_ingest *ingest, bool octree,
                                 strl_buckets *buckets, strl_error *err)
 {
     uint64_t bytes = survey->triangles * strl__soup_bucket_bytes(ingest), each = strl__bucket_bytes(context) * 2 / 3;
@@ -106,12 +108,14 @@ static strl_status open_buckets(strl_build_context *context, const model_survey 
     }
     for (uint32_t i = 0; i < survey->sample_count; i++)
         keys[i] = octree ? key_of_triangle(ingest, &survey->sample[i]) : key_of_centroid(ingest, &survey->sample[i]);
+    strl__free(survey->sample); /* it is as large as some bucket buffers */
+    survey->sample = NULL;
     qsort(keys, survey->sample_count, sizeof *keys, compare_keys);
     choose_splitters(keys, survey->sample_count, octree, buckets);
     for (uint32_t i = 0; i < buckets->count && !status; i++) {
         char name[24];
         strl__bucket_name(i, name);
-        status = octree && context->keep ? strl_spill_open_kept(context->spills, name, BUFFER_BYTES, &buckets->spill[i], err)
+        status = octree && context->keep ? strl_spill_open_kept(context->spills, name, KEPT_BUFFER_BYTES, &buckets->spill[i], err)
                                          : strl_spill_open(context->spills, name, BUFFER_BYTES, &buckets->spill[i], err);
     }
 done:
@@ -452,7 +456,7 @@ static strl_status distribute_inputs(distribution *d, strl_reader *const *reader
     return status;
 }
 
-strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, const model_survey *survey, bool octree,
+strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, model_survey *survey, bool octree,
                              strl_ingest *ingest, strl_buckets *buckets, strl_error *err)
 {
     distribution d = {.context = context, .ingest = ingest, .buckets = buckets};

@@ -61,7 +61,7 @@ static strl_status check_room(strl_build_context *context, const model_survey *s
     return status ? status : strl__ingest_check_memory(context, survey->triangles, err);
 }
 
-static strl_status read_tree(strl_build_context *context, const model_survey *survey, bool octree, strl_ingest *ingest,
+static strl_status read_tree(strl_build_context *context, model_survey *survey, bool octree, strl_ingest *ingest,
                              strl_buckets *buckets, strl_error *err)
 {
     ingest->has_normals = survey->any_normal;

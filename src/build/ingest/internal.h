@@ -56,8 +56,8 @@ void strl__soup_set_palette(const strl_ingest *ingest, uint32_t palette, uint8_t
 
 /* Parts, materials and images of all inputs, whichever the tree is made of. They are known after the first survey. */
 strl_status strl__ingest_add_names(strl_build_context *context, strl_ingest *ingest, strl_error *err);
-/* Triangles to buckets by curve range. */
-strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, const model_survey *survey, bool octree,
+/* Triangles to buckets by curve range. Uses up the survey's sample. */
+strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, model_survey *survey, bool octree,
                              strl_ingest *ingest, strl_buckets *buckets, strl_error *err);
 
 /* A lattice position and the cell that has it. */
