@@ -53,7 +53,8 @@ typedef struct strl_http_desc {
     uint32_t connections; /* at a time, at most; 0 = 6; at most 32 */
     uint32_t attempts;    /* at a read, the first included, before it has failed; 0 = 4 */
     uint32_t connect_ms;  /* until a connection is given up; 0 = 10000 */
-    uint32_t stall_ms;    /* a transfer that brings less than 1 KiB in this time is given up; 0 = 15000 */
+    uint32_t stall_ms;    /* a transfer that brings less than 1 KiB in this time is given up; sooner where a later request was
+                             answered and this is not its last attempt; 0 = 15000 */
     uint32_t backoff_ms;  /* about the wait before the second attempt; it doubles with each; 0 = 250 */
 } strl_http_desc;
 
@@ -68,7 +69,7 @@ STRL_API strl_status strl_source_open_http(const char *url, const strl_http_desc
 
 /* What a remote source has done since it was opened. */
 typedef struct strl_network_stats {
-    uint64_t requests;       /* sent, the repeated ones included */
+    uint64_t requests;       /* sent, the repeated ones included, and those that look whether the server answers again */
     uint64_t reads;          /* answered with bytes from the network */
     uint64_t merged_reads;   /* of them: shared a request with others */
     uint64_t retries;        /* requests whose failure was tried again */

@@ -271,7 +271,7 @@ static void http_close(strl_source *source)
         curl_multi_wakeup(http->multi);
     strl_mutex_unlock(&http->mutex);
     strl_thread_join(http->network);
-    for (uint32_t i = 0; i < http->desc.connections; i++)
+    for (uint32_t i = 0; i <= http->desc.connections; i++)
         curl_easy_cleanup(http->transfers[i].easy);
     if (http->multi)
         curl_multi_cleanup(http->multi);
@@ -325,7 +325,7 @@ static strl_status make_handles(strl__http *http, strl_error *err)
 {
     http->multi = curl_ready == CURLE_OK ? curl_multi_init() : NULL;
     bool good = http->multi != NULL;
-    for (uint32_t i = 0; good && i < http->desc.connections; i++) {
+    for (uint32_t i = 0; good && i <= http->desc.connections; i++) {
         http->transfers[i].http = http;
         http->transfers[i].easy = curl_easy_init();
         good = http->transfers[i].easy != NULL;
@@ -333,8 +333,8 @@ static strl_status make_handles(strl__http *http, strl_error *err)
     http->headers = good ? curl_slist_append(NULL, "Accept-Encoding: identity") : NULL;
     if (!http->headers)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for connections");
-    curl_multi_setopt(http->multi, CURLMOPT_MAX_HOST_CONNECTIONS, (long)http->desc.connections);
-    curl_multi_setopt(http->multi, CURLMOPT_MAXCONNECTS, (long)http->desc.connections);
+    curl_multi_setopt(http->multi, CURLMOPT_MAX_HOST_CONNECTIONS, (long)http->desc.connections + 1);
+    curl_multi_setopt(http->multi, CURLMOPT_MAXCONNECTS, (long)http->desc.connections + 1);
     return STRL_OK;
 }
 

@@ -2,6 +2,7 @@
  * may be wrong. Times are as short as they can be, and nothing depends on how fast the machine is. */
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdatomic.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -447,6 +448,75 @@ static void a_stall_is_counted_from_the_last_bytes_that_came(void **state)
     check_read_fails(source, 100000, 100000, "the server stalled");
     uint64_t took_ns = strl_clock_ns() - begin_ns;
     assert_true(took_ns >= 3000 * MS && took_ns < 5500 * MS);
+    strl_source_close(source);
+    fault_server_destroy(server);
+}
+
+/* Stalls as long as it is told to. */
+typedef struct stalling {
+    atomic_bool now;
+    uint64_t slow_from; /* answers of ranges from here on come after SLOW_MS */
+} stalling;
+
+#define SLOW_MS 3000u
+
+static fault_rule while_stalling(void *context, unsigned number, const fault_asked *asked)
+{
+    const stalling *self = context;
+    (void)number;
+    if (self->slow_from && asked->first >= self->slow_from)
+        return (fault_rule){.delay_ms = SLOW_MS};
+    return (fault_rule){.stall = atomic_load(&self->now), .after = 0};
+}
+
+/* All connections are lost. Without a look at the server each of them would be waited for, a minute long. */
+static void once_a_stalled_server_answers_all_is_asked_for_again(void **state)
+{
+    (void)state;
+    enum { READS = 12, CONNECTIONS = 6 };
+    const strl_http_desc desc = {.connections = CONNECTIONS, .stall_ms = 60000, .attempts = 2, .backoff_ms = 100};
+    stalling stalls = {.now = false};
+    fault_server *server = fault_server_create(&good, while_stalling, &stalls);
+    strl_source *source = must_open(fault_server_url(server, "/model"), &desc);
+    atomic_store(&stalls.now, true);
+    for (uint64_t i = 0; i < READS; i++)
+        submit(source, i, 50000 + 80000 * i, 20000, 0);
+    strl_sleep_ns(4500 * MS);
+    unsigned asked = fault_server_asked(server, NULL, 0);
+    assert_true(asked > 1 + CONNECTIONS && asked <= 1 + CONNECTIONS + 4); /* it is looked at once a second */
+    atomic_store(&stalls.now, false);
+    uint64_t begin_ns = strl_clock_ns();
+    for (unsigned n = 0; n < READS; n++) {
+        strl_source_result result = next_answer(source);
+        if (result.status != STRL_OK)
+            fail_msg("%s", result.error.message);
+        assert_memory_equal(result.data, content + 50000 + 80000 * result.token, 20000);
+        strl__free(result.data);
+    }
+    assert_true(strl_clock_ns() - begin_ns < 20000 * MS); /* some 1.3 s, of the 60 without it */
+    assert_int_equal(stats_of(source).failures, 0);
+    strl_source_close(source);
+    fault_server_destroy(server);
+}
+
+/* Others are answered before it: at its last attempt it has all the time. */
+static void a_server_that_is_slow_with_some_bytes_gives_them_in_the_end(void **state)
+{
+    (void)state;
+    const strl_http_desc desc = {.connections = 2, .stall_ms = 60000, .attempts = 2, .backoff_ms = 1};
+    stalling slow = {.slow_from = 900000};
+    fault_server *server = fault_server_create(&good, while_stalling, &slow);
+    strl_source *source = must_open(fault_server_url(server, "/model"), &desc);
+    submit(source, 0, 900000, 1000, 1);
+    wait_until_asked(server, 2);
+    submit(source, 1, 100000, 1000, 0);
+    for (unsigned n = 0; n < 2; n++) {
+        strl_source_result result = next_answer(source);
+        assert_int_equal(result.token, 1 - n);
+        assert_int_equal(result.status, STRL_OK);
+        strl__free(result.data);
+    }
+    assert_int_equal(stats_of(source).retries, 1);
     strl_source_close(source);
     fault_server_destroy(server);
 }
@@ -953,6 +1023,8 @@ int main(void)
         cmocka_unit_test(an_answer_cut_short_is_continued_not_begun_anew),
         cmocka_unit_test(attempts_are_bounded_and_their_failure_says_why),
         cmocka_unit_test(a_stall_is_counted_from_the_last_bytes_that_came),
+        cmocka_unit_test(once_a_stalled_server_answers_all_is_asked_for_again),
+        cmocka_unit_test(a_server_that_is_slow_with_some_bytes_gives_them_in_the_end),
         cmocka_unit_test(a_server_that_says_when_is_not_asked_before),
         cmocka_unit_test(a_server_that_was_killed_and_comes_back_is_read_on),
         cmocka_unit_test(reads_wait_for_a_server_that_restarts_soon),
