@@ -932,6 +932,26 @@ static void wrong_bytes_that_somebody_doubts_do_not_come_out_of_the_cache(void *
     strl_path_remove_directory(desc.cache, NULL);
 }
 
+/* While the cache makes room for what was read nobody watches for what comes in. */
+static void a_doubt_at_any_moment_leaves_no_read_behind(void **state)
+{
+    (void)state;
+    const strl_http_desc desc = cached("doubts");
+    fault_server *server = fault_server_create(&good, NULL, NULL);
+    strl_source *source = must_open(fault_server_url(server, "/model"), &desc);
+    for (uint64_t i = 0; i < 1000; i++) {
+        uint64_t offset = i * 7919 % (BYTES - 2000);
+        check_read(source, offset, 1000);
+        if (i % 3 == 0)
+            strl_sleep_ns(i * 250 % 50000);
+        strl_source_doubt(source, offset, 1000);
+        check_read(source, offset, 1000);
+    }
+    strl_source_close(source);
+    fault_server_destroy(server);
+    strl_path_remove_directory(desc.cache, NULL);
+}
+
 static void a_cache_that_cannot_be_used_is_done_without(void **state)
 {
     (void)state;
@@ -1042,6 +1062,7 @@ int main(void)
         cmocka_unit_test(a_second_run_reads_nothing_but_the_header),
         cmocka_unit_test(damaged_entries_heal),
         cmocka_unit_test(wrong_bytes_that_somebody_doubts_do_not_come_out_of_the_cache),
+        cmocka_unit_test(a_doubt_at_any_moment_leaves_no_read_behind),
         cmocka_unit_test(a_cache_that_cannot_be_used_is_done_without),
         cmocka_unit_test(every_failed_allocation_is_a_clean_failure),
         cmocka_unit_test(a_local_source_is_not_remote),
