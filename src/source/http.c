@@ -132,6 +132,64 @@ static strl_status http_read(strl_source *source, uint64_t offset, void *data, s
     return status;
 }
 
+/* Mutex held. The bytes of a range that are here already are copied; else *read is on its way to them. */
+static strl_status begin_read(strl__http *http, const strl_source_span *span, strl__http_read **read, strl_error *err)
+{
+    const strl__http_read like = {.offset = span->offset,
+                                  .size = span->size,
+                                  .begin = span->offset,
+                                  .end = span->offset + span->size,
+                                  .urgency = INFINITY,
+                                  .waited = true};
+    const uint8_t *known = find_known(http, span->offset, span->size);
+    *read = NULL;
+    if (known)
+        copy_known(http, known, span->offset, span->data, span->size);
+    if (known || span->size == 0)
+        return STRL_OK;
+    strl_status status = strl__http_read_add(http, &like, read, err);
+    if (status == STRL_OK)
+        wake(http, *read);
+    return status;
+}
+
+/* Mutex held. */
+static strl_status end_read(strl__http *http, strl__http_read *read, void *data, strl_error *err)
+{
+    while (read->state != STRL__HTTP_DONE)
+        strl_condition_wait(&http->answered, &http->mutex);
+    strl_status status = read->result.status;
+    if (status == STRL_OK)
+        memcpy(data, read->result.data, read->size);
+    else if (err)
+        *err = read->result.error;
+    strl__free(read->result.data);
+    strl__free(read);
+    return status;
+}
+
+/* The network thread sees all of them at once: what is near to each other shares a request. */
+static strl_status http_read_many(strl_source *source, const strl_source_span *spans, size_t count, strl_error *err)
+{
+    strl__http *http = (strl__http *)source;
+    strl_status status = STRL_OK;
+    strl__http_read **reads = strl__alloc_zero(count ? count : 1, sizeof *reads);
+    if (!reads)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu reads", count);
+    strl_mutex_lock(&http->mutex);
+    if (http->changed.status != STRL_OK)
+        status = fail_changed(http, err);
+    for (size_t i = 0; status == STRL_OK && i < count; i++)
+        status = begin_read(http, &spans[i], &reads[i], err);
+    for (size_t i = 0; i < count; i++) { /* whatever has failed: they are on their way */
+        strl_status own = reads[i] ? end_read(http, reads[i], spans[i].data, status == STRL_OK ? err : NULL) : STRL_OK;
+        status = status == STRL_OK ? own : status;
+    }
+    strl_mutex_unlock(&http->mutex);
+    strl__free(reads);
+    return status;
+}
+
 /* ---- reads that are polled for */
 
 /* Mutex held. Whether the read could be answered without a request. */
@@ -356,6 +414,7 @@ strl_status strl_source_open_http(const char *url, const strl_http_desc *desc, s
         .poll = http_poll,
         .cancel = http_cancel,
         .read = http_read,
+        .read_many = http_read_many,
         .close = http_close,
         .room = http_room,
         .get_network_stats = http_network_stats,

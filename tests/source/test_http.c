@@ -181,6 +181,87 @@ static void a_waiting_read_gives_its_bytes_and_brings_what_is_near(void **state)
     fault_server_destroy(server);
 }
 
+enum { MANY = 60, MANY_BYTES = 3000 };
+
+static void many_spans(strl_source_span *spans, uint8_t *data)
+{
+    for (size_t i = 0; i < MANY; i++)
+        spans[i] = (strl_source_span){.offset = i * 7 % MANY * 17000, .size = i == 9 ? 0 : MANY_BYTES, .data = data + i * MANY_BYTES};
+}
+
+static void reads_together_give_what_each_would_alone(void **state)
+{
+    (void)state;
+    static uint8_t data[MANY * MANY_BYTES];
+    strl_source_span spans[MANY];
+    strl_error err = {0};
+    fault_asked asked[MANY];
+    const fault_rule cut = {.cut = true, .after = 1000};
+    fault_server *server = fault_server_create(&good, by_number, LISTED(well, well, cut, well));
+    strl_source *source = must_open(fault_server_url(server, "/model"), &quick);
+    many_spans(spans, data);
+    assert_int_equal(strl_source_read_many(source, spans, MANY, &err), STRL_OK);
+    for (size_t i = 0; i < MANY; i++)
+        assert_memory_equal(data + i * MANY_BYTES, content + spans[i].offset, spans[i].size);
+    unsigned requests = fault_server_asked(server, asked, MANY);
+    assert_true(requests <= 1 + MANY);
+    spans[20].offset = BYTES - 10;
+    assert_int_equal(strl_source_read_many(source, spans, MANY, &err), STRL_ERR_FORMAT);
+    assert_int_equal(fault_server_asked(server, NULL, 0), requests);
+    assert_int_equal(strl_source_read_many(source, spans, 0, &err), STRL_OK);
+    strl_source_close(source);
+    fault_server_destroy(server);
+}
+
+static fault_rule refuse_the_end(void *context, unsigned number, const fault_asked *asked)
+{
+    (void)context, (void)number;
+    return (fault_rule){.status = asked->last >= BYTES / 2 ? 403 : 0};
+}
+
+static void of_reads_together_the_first_that_failed_is_told(void **state)
+{
+    (void)state;
+    static uint8_t data[MANY * MANY_BYTES];
+    strl_source_span spans[MANY];
+    strl_error err = {0};
+    fault_server *server = fault_server_create(&good, refuse_the_end, NULL);
+    strl_source *source = must_open(fault_server_url(server, "/model"), &quick);
+    many_spans(spans, data);
+    assert_int_equal(strl_source_read_many(source, spans, MANY, &err), STRL_ERR_NETWORK);
+    assert_non_null(strstr(err.message, "refuses access (403)"));
+    assert_int_equal(strl_source_read_many(source, spans, 4, &err), STRL_OK); /* of the first half of the file */
+    assert_memory_equal(data + MANY_BYTES, content + spans[1].offset, MANY_BYTES);
+    strl_source_close(source);
+    fault_server_destroy(server);
+}
+
+static void read_many_of(void *context)
+{
+    static uint8_t data[MANY * MANY_BYTES];
+    strl_source_span spans[MANY];
+    many_spans(spans, data);
+    assert_int_equal(strl_source_read_many(context, spans, MANY, NULL), STRL_ERR_NETWORK);
+}
+
+/* No request is answered, and yet there is one on each connection. */
+static void reads_together_are_asked_for_together(void **state)
+{
+    (void)state;
+    enum { CONNECTIONS = 5 };
+    const fault_rule silent = {.delay_ms = 120000};
+    const strl_http_desc desc = {.connections = CONNECTIONS, .backoff_ms = 1, .stall_ms = 60000};
+    fault_server *server = fault_server_create(&good, by_number, LISTED(well, silent));
+    strl_source *source = must_open(fault_server_url(server, "/model"), &desc);
+    strl_thread *reader;
+    assert_int_equal(strl_thread_start(&reader, read_many_of, source, NULL), STRL_OK);
+    wait_until_asked(server, 1 + CONNECTIONS);
+    fault_server_kill(server);
+    strl_thread_join(reader);
+    strl_source_close(source);
+    fault_server_destroy(server);
+}
+
 static void ranges_outside_are_not_accepted_and_small_files_open(void **state)
 {
     (void)state;
@@ -992,6 +1073,12 @@ static strl_status use_source(const char *url, const strl_http_desc *desc)
             assert_memory_equal(result.data, content + 10000 + 5000 * result.token, 4000);
         strl__free(result.data);
     }
+    uint8_t together[4][1000];
+    strl_source_span spans[4];
+    for (size_t i = 0; i < 4; i++)
+        spans[i] = (strl_source_span){200000 + 100000 * i, sizeof together[i], together[i]};
+    if (source && first == STRL_OK)
+        first = strl_source_read_many(source, spans, 4, &err);
     strl_source_close(source);
     return first;
 }
@@ -1032,6 +1119,9 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_read_is_answered_once_with_its_bytes),
         cmocka_unit_test(a_waiting_read_gives_its_bytes_and_brings_what_is_near),
+        cmocka_unit_test(reads_together_give_what_each_would_alone),
+        cmocka_unit_test(of_reads_together_the_first_that_failed_is_told),
+        cmocka_unit_test(reads_together_are_asked_for_together),
         cmocka_unit_test(ranges_outside_are_not_accepted_and_small_files_open),
         cmocka_unit_test(later_requests_are_for_what_was_opened_alone),
         cmocka_unit_test(the_most_urgent_goes_first),
