@@ -50,6 +50,7 @@ typedef struct strl_http_desc {
     const char *cache;    /* a folder that keeps what was read, for another time and for other processes; made where it is
                              missing, but not the folders above it; copied; NULL = nothing is kept */
     uint64_t cache_bytes; /* that our files in it take at most; 0 = 1 GiB */
+    const char *certificates; /* a file of PEM: who may vouch for a server of https; copied; NULL = whom libcurl was built to trust */
     uint32_t connections; /* at a time, at most; 0 = 6; at most 32 */
     uint32_t attempts;    /* at a read, the first included, before it has failed; 0 = 4 */
     uint32_t connect_ms;  /* until a connection is given up; 0 = 10000 */
@@ -63,7 +64,7 @@ typedef struct strl_http_desc {
  * near to each other as one request; what fails is tried again, then answered with STRL_ERR_NETWORK. Waits for the
  * server's first answer. The model must not change while it is open: from the answer on that tells of it, each read fails
  * with a sentence that says so. A cache that cannot be used is done without. Proxies are libcurl's, which reads
- * http_proxy, https_proxy and no_proxy from the environment. Fails with STRL_ERR_ARGUMENT where it is no such
+ * http_proxy, https_proxy and no_proxy from the environment; HTTP/2 is spoken over https where the server does. Fails with STRL_ERR_ARGUMENT where it is no such
  * address, with STRL_ERR_NETWORK where the server is not reached or does not give ranges of the file. */
 STRL_API strl_status strl_source_open_http(const char *url, const strl_http_desc *desc, strl_source **source, strl_error *err);
 

@@ -341,6 +341,7 @@ static void http_close(strl_source *source)
     strl__free(http->target);
     strl__free(http->url);
     strl__free(http->shown);
+    strl__free(http->certificates);
     strl_condition_deinit(&http->answered);
     strl_condition_deinit(&http->disk_work);
     strl_mutex_deinit(&http->mutex);
@@ -435,6 +436,8 @@ strl_status strl_source_open_http(const char *url, const strl_http_desc *desc, s
         apply_desc(http, desc);
         status = make_handles(http, err);
     }
+    if (status == STRL_OK && desc && desc->certificates && !(http->certificates = strl__strdup(desc->certificates)))
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory to open an address");
     if (status == STRL_OK)
         status = strl_thread_start(&http->network, strl__http_network_run, http, err);
     if (status == STRL_OK)

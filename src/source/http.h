@@ -88,6 +88,7 @@ typedef struct strl__http {
     char *url;   /* as libcurl has normalised it */
     char *shown; /* for sentences: without what may be secret in it */
     strl_http_desc desc;
+    char *certificates; /* NULL = libcurl's */
     bool secure; /* https */
     strl_thread *network, *disk;
     CURLM *multi;       /* the network thread's, once it runs */
