@@ -30,6 +30,8 @@
 #define STRL__HTTP_HEAD_BYTES 4096u /* what opening reads: a container's header, which says what model it is */
 #define STRL__HTTP_MOST_CONNECTIONS 32u
 #define STRL__HTTP_MOST_REDIRECTS 5
+#define STRL__HTTP_AHEAD 64u /* reads whose surroundings are kept, */
+#define STRL__HTTP_AHEAD_BYTES ((uint64_t)8 << 20) /* so much of them at most */
 #define STRL__HTTP_MOST_MERGED ((uint64_t)2 << 20) /* bytes of a request for several reads */
 
 typedef enum strl__http_state {
@@ -74,6 +76,12 @@ typedef struct strl__http_transfer {
     char reason[CURL_ERROR_SIZE];
 } strl__http_transfer;
 
+/* What a blocking read has fetched. */
+typedef struct strl__http_ahead {
+    uint64_t begin, end;
+    uint8_t *data; /* owned; NULL = nothing beyond what was asked for, which has been taken away */
+} strl__http_ahead;
+
 /* Bytes to be kept in the cache, or (without data) an entry to be dropped from it. */
 typedef struct strl__http_kept {
     struct strl__http_kept *next;
@@ -115,8 +123,8 @@ typedef struct strl__http {
     uint8_t model[16]; /* for the cache's keys */
     uint8_t head[STRL__HTTP_HEAD_BYTES];
     size_t head_bytes;
-    uint8_t *ahead;                  /* what a blocking read fetched beyond itself; owned; NULL = nothing */
-    uint64_t ahead_begin, ahead_end; /* of what the last blocking read fetched, in `ahead` or not */
+    strl__http_ahead ahead[STRL__HTTP_AHEAD]; /* the oldest is `ahead_next`: it goes first */
+    unsigned ahead_next;
     uint64_t ahead_window;
     strl__http_kept *kept, **kept_end; /* to be written; owned */
     strl__http_kept *doubted;          /* to be dropped, before anything is looked up; owned */

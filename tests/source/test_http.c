@@ -181,6 +181,27 @@ static void a_waiting_read_gives_its_bytes_and_brings_what_is_near(void **state)
     fault_server_destroy(server);
 }
 
+/* As tools read a model of many trees, whose order is not that of the file. */
+static void a_waiting_read_that_comes_back_finds_what_was_near(void **state)
+{
+    (void)state;
+    enum { PLACES = 5, STEPS = 60, APART = 200000, STEP = 1700 };
+    fault_server *server = fault_server_create(&good, NULL, NULL);
+    strl_source *source = must_open(fault_server_url(server, "/model"), &quick);
+    for (uint64_t i = 0; i < STEPS; i++)
+        for (uint64_t place = 0; place < PLACES; place++) /* the last ones lie across what two requests brought */
+            check_read(source, place * APART + i * STEP, STEP + 300);
+    assert_true(fault_server_asked(server, NULL, 0) <= 1 + 3 * PLACES);
+    strl_source_doubt(source, APART + 5 * STEP, 10);
+    unsigned before = fault_server_asked(server, NULL, 0);
+    check_read(source, 2 * APART + 5 * STEP, 10);
+    assert_int_equal(fault_server_asked(server, NULL, 0), before);
+    check_read(source, APART + 5 * STEP, 10);
+    assert_int_equal(fault_server_asked(server, NULL, 0), before + 1); /* what is doubted comes anew */
+    strl_source_close(source);
+    fault_server_destroy(server);
+}
+
 enum { MANY = 60, MANY_BYTES = 3000 };
 
 static void many_spans(strl_source_span *spans, uint8_t *data)
@@ -1119,6 +1140,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_read_is_answered_once_with_its_bytes),
         cmocka_unit_test(a_waiting_read_gives_its_bytes_and_brings_what_is_near),
+        cmocka_unit_test(a_waiting_read_that_comes_back_finds_what_was_near),
         cmocka_unit_test(reads_together_give_what_each_would_alone),
         cmocka_unit_test(of_reads_together_the_first_that_failed_is_told),
         cmocka_unit_test(reads_together_are_asked_for_together),
