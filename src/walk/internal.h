@@ -33,7 +33,10 @@ typedef enum strl__residency { STRL__ABSENT, STRL__PENDING, STRL__RESIDENT } str
 /* When something that failed may be asked for again. */
 typedef struct strl__retry {
     uint32_t failures; /* in a row */
-    uint64_t frame;    /* not before this frame */
+    uint64_t frame;    /* not before this frame, */
+    bool is_unread;    /* unless it was the source that failed, and it has come back: */
+    uint64_t returns;  /* the walk's, when it failed */
+    bool was_early;    /* it was asked for before that frame; once for each wait */
 } strl__retry;
 
 /* A decoded node: one block of at most strl__node_bytes, which `vertices` begins. indices[k]
@@ -343,6 +346,9 @@ struct strl_walk {
 
     strl__request requests[STRL__MAX_REQUESTS];
     uint32_t requests_in_flight, requests_pending;
+    bool is_away, is_looking; /* the source's last answer was a failure; in this frame one thing that waits may be asked for */
+    uint64_t away_ns, look_ns; /* since when; when to look next */
+    uint64_t returns;          /* how often it came back */
     uint64_t room; /* bytes that the source still has room for in this frame */
     strl__job **jobs; /* owned, in order of submission */
     size_t job_count, job_capacity;
@@ -455,8 +461,15 @@ void strl__node_reserve(strl_walk *walk, strl__node *node); /* absent -> pending
 void strl__node_release(strl_walk *walk, strl__node *node); /* pending -> absent */
 void strl__node_install(strl_walk *walk, strl__node *node, const strl__mesh *mesh); /* pending -> resident */
 void strl__node_touch(strl_walk *walk, strl__node *node);                           /* now the youngest */
-void strl__back_off(const strl_walk *walk, strl__retry *retry);
+
+/* faults.c */
 void strl__note_fault(strl_walk *walk, const strl_error *error);
+void strl__back_off(const strl_walk *walk, strl__retry *retry, bool is_unread);
+bool strl__is_waiting(const strl_walk *walk, const strl__retry *retry); /* it has failed and is not to be asked for yet */
+void strl__retry_asked(const strl_walk *walk, strl__retry *retry);
+void strl__source_answers(strl_walk *walk);
+void strl__source_fails(strl_walk *walk);
+void strl__begin_look(strl_walk *walk); /* once a frame, after the answers */
 
 /* requests.c */
 void strl__requests_receive(strl_walk *walk);

@@ -213,7 +213,7 @@ static void want_run(looking *self, strl__run *run, double px)
     strl__cut *cut = self->cut;
     bool is_front = cut->kind == STRL__CUT_FRONT;
     cut->missing++;
-    if (run->residency == STRL__ABSENT && run->retry.frame > walk->frame) {
+    if (run->residency == STRL__ABSENT && strl__is_waiting(walk, &run->retry)) {
         cut->waits |= run->retry.failures < STRL__GIVE_UP_FAILURES;
         return;
     }
