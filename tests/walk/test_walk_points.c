@@ -194,11 +194,47 @@ static void labels_are_those_of_the_copies(void **state)
     }
 }
 
+/* What is read first over a slow link: roots without what is below them, and the ground under the trees with the first placements. */
+static void roots_and_large_placements_are_read_first(void **state)
+{
+    (void)state;
+    strl_error err = {0};
+    strl_container *container;
+    double largest = 0;
+    uint32_t first = 0;
+    const strl_scene_desc scene = {.name = "landscape", .path = built_path("land.gltf"), .triangles = 6000000};
+    assert_int_equal(strl_scene_write(&scene, NULL, NULL, &err), STRL_OK);
+    const uint64_t placements = sample_tree_build("land.gltf", "land.stroll", (strl_build_desc){0}).placements;
+    assert_true(placements > 512); /* more than a run */
+    assert_int_equal(strl_container_open_path(built_path("land.stroll"), &container, &err), STRL_OK);
+    for (uint64_t i = 0; i < placements; i++) {
+        strl_placement at;
+        assert_int_equal(strl_container_placement(container, i, &at, &err), STRL_OK);
+        const strl_tree *tree = strl_container_tree(container, at.tree);
+        double size = tree->step * (double)(tree->box_max[0] - tree->box_min[0]) *
+                      sqrt(at.transform[0] * at.transform[0] + at.transform[4] * at.transform[4] + at.transform[8] * at.transform[8]);
+        if (size > largest)
+            largest = size, first = (uint32_t)i;
+    }
+    assert_int_equal(first, 0);
+    for (uint32_t i = 0; i < strl_container_get_info(container)->tree_count; i++) {
+        strl_node root, below;
+        assert_int_equal(strl_container_node(container, i, 0, &root, &err), STRL_OK);
+        assert_int_equal(root.page.bytes, root.payload_bytes);
+        if (root.child_count) {
+            assert_int_equal(strl_container_node(container, i, 1, &below, &err), STRL_OK);
+            assert_true(below.page.offset != root.page.offset);
+        }
+    }
+    strl_container_close(container);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(copies_that_show_few_splats_are_drawn_together),
         cmocka_unit_test(labels_are_those_of_the_copies),
+        cmocka_unit_test(roots_and_large_placements_are_read_first),
     };
     return cmocka_run_group_tests(tests, create_array, drop_array);
 }

@@ -273,8 +273,10 @@ strl_status strl__survey_choose_lattice(const strl_build_context *context, const
         status = choose_step(context, survey, extent, ingest, err);
     if (status)
         return status;
-    for (int k = 0; k < 3; k++)
+    for (int k = 0; k < 3; k++) {
         ingest->centre[k] = survey->min[k] / 2 + survey->max[k] / 2;
+        ingest->longest = fmax(ingest->longest, survey->max[k] - survey->min[k]);
+    }
     for (int k = 0; k < 3; k++)
         ingest->origin[k] = floor(survey->min[k] / ingest->step) * ingest->step;
     while (extent / ingest->step + 2 >= ldexp(1, 21 + (int)ingest->curve_shift))
