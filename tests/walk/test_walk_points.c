@@ -200,7 +200,7 @@ static void roots_and_large_placements_are_read_first(void **state)
     (void)state;
     strl_error err = {0};
     strl_container *container;
-    double largest = 0;
+    double widest = 0;
     uint32_t first = 0;
     const strl_scene_desc scene = {.name = "landscape", .path = built_path("land.gltf"), .triangles = 6000000};
     assert_int_equal(strl_scene_write(&scene, NULL, NULL, &err), STRL_OK);
@@ -211,10 +211,10 @@ static void roots_and_large_placements_are_read_first(void **state)
         strl_placement at;
         assert_int_equal(strl_container_placement(container, i, &at, &err), STRL_OK);
         const strl_tree *tree = strl_container_tree(container, at.tree);
-        double size = tree->step * (double)(tree->box_max[0] - tree->box_min[0]) *
+        double width = tree->step * (double)(tree->box_max[0] - tree->box_min[0]) *
                       sqrt(at.transform[0] * at.transform[0] + at.transform[4] * at.transform[4] + at.transform[8] * at.transform[8]);
-        if (size > largest)
-            largest = size, first = (uint32_t)i;
+        if (width > widest)
+            widest = width, first = (uint32_t)i;
     }
     assert_int_equal(first, 0);
     for (uint32_t i = 0; i < strl_container_get_info(container)->tree_count; i++) {
