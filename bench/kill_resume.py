@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Kills builds at random moments, resumes them, and compares the bytes with those of a build that nothing stopped.
 
-    bench/kill_resume.py STROLL --scratch DIR [--triangles 10M] [--kills 50] [--seed S] [--memory 1G] [--jobs N]
+    bench/kill_resume.py STROLL --scratch DIR [--triangles 10M] [--kills 50] [--seed S] [--memory 1G] [--jobs N] [--structure S]
 
 A build is killed (SIGKILL) after a random share of the time that the unstopped one took, resumed, killed again ... until it
 comes to its end; then the next begins. Prints a JSON line for each kill and one for all; exits with 1 where bytes differ
@@ -26,6 +26,7 @@ def options():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--memory", default="1G")
     parser.add_argument("--jobs")
+    parser.add_argument("--structure", default="clusters")
     return parser.parse_args()
 
 
@@ -36,7 +37,8 @@ class Kills:
         self.lost, self.resumed = 0.0, 0
 
     def command(self, *more):
-        words = [self.args.stroll, "build", self.source, "-o", self.out, "--json", "--quiet", "--memory", self.args.memory]
+        words = [self.args.stroll, "build", self.source, "-o", self.out, "--json", "--quiet", "--memory", self.args.memory,
+                 "--structure", self.args.structure]
         return [*words, *(["--jobs", self.args.jobs] if self.args.jobs else []), *more]
 
     def unstopped(self):

@@ -1,5 +1,6 @@
 #include "shared/location.h"
 
+#include <stdlib.h>
 #include <string.h>
 #include <strings.h>
 
@@ -13,11 +14,24 @@ bool strl_location_is_remote(const char *name)
     return strstr(name, "://") != NULL;
 }
 
+/* As curl has it. The library reads no environment, nor does libcurl for this. */
+static const char *certificates(void)
+{
+    static const char *const variables[] = {"CURL_CA_BUNDLE", "SSL_CERT_FILE"};
+    for (size_t i = 0; i < sizeof variables / sizeof *variables; i++) {
+        const char *path = getenv(variables[i]);
+        if (path && *path)
+            return path;
+    }
+    return NULL;
+}
+
 strl_status strl_location_open_source(const strl_location *location, unsigned threads, strl_source **source,
                                       strl_error *err)
 {
     const char *name = location->name;
-    const strl_http_desc desc = {.cache = location->cache, .cache_bytes = location->cache_bytes};
+    const strl_http_desc desc = {
+        .cache = location->cache, .cache_bytes = location->cache_bytes, .certificates = certificates()};
     *source = NULL;
     if (!strl_location_is_remote(name))
         return strl_source_open_file(name, threads, source, err);

@@ -112,7 +112,7 @@ typedef struct strl_build_result {
  * resumed, however often, or not. */
 STRL_API strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err);
 /* The same of a sample tree, for what cannot be simplified: every triangle is stored once, and what is far away is drawn by a
- * random part of its triangles and by splats. desc->certify, no_dependencies and resume are refused; keep is not heeded. */
+ * random part of its triangles and by splats. desc->certify and no_dependencies are refused. */
 STRL_API strl_status strl_build_samples(const strl_build_desc *desc, strl_build_result *result, strl_error *err);
 
 #ifdef __cplusplus

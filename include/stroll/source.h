@@ -50,10 +50,12 @@ typedef struct strl_http_desc {
     const char *cache;    /* a folder that keeps what was read, for another time and for other processes; made where it is
                              missing, but not the folders above it; copied; NULL = nothing is kept */
     uint64_t cache_bytes; /* that our files in it take at most; 0 = 1 GiB */
+    const char *certificates; /* a file of PEM: who may vouch for a server of https; copied; NULL = whom libcurl was built to trust */
     uint32_t connections; /* at a time, at most; 0 = 6; at most 32 */
     uint32_t attempts;    /* at a read, the first included, before it has failed; 0 = 4 */
     uint32_t connect_ms;  /* until a connection is given up; 0 = 10000 */
-    uint32_t stall_ms;    /* a transfer that brings less than 1 KiB in this time is given up; 0 = 15000 */
+    uint32_t stall_ms;    /* a transfer that brings less than 1 KiB in this time is given up; sooner where a later request was
+                             answered and this is not its last attempt; 0 = 15000 */
     uint32_t backoff_ms;  /* about the wait before the second attempt; it doubles with each; 0 = 250 */
 } strl_http_desc;
 
@@ -62,13 +64,13 @@ typedef struct strl_http_desc {
  * near to each other as one request; what fails is tried again, then answered with STRL_ERR_NETWORK. Waits for the
  * server's first answer. The model must not change while it is open: from the answer on that tells of it, each read fails
  * with a sentence that says so. A cache that cannot be used is done without. Proxies are libcurl's, which reads
- * http_proxy, https_proxy and no_proxy from the environment. Fails with STRL_ERR_ARGUMENT where it is no such
+ * http_proxy, https_proxy and no_proxy from the environment; HTTP/2 is spoken over https where the server does. Fails with STRL_ERR_ARGUMENT where it is no such
  * address, with STRL_ERR_NETWORK where the server is not reached or does not give ranges of the file. */
 STRL_API strl_status strl_source_open_http(const char *url, const strl_http_desc *desc, strl_source **source, strl_error *err);
 
 /* What a remote source has done since it was opened. */
 typedef struct strl_network_stats {
-    uint64_t requests;       /* sent, the repeated ones included */
+    uint64_t requests;       /* sent, the repeated ones included, and those that look whether the server answers again */
     uint64_t reads;          /* answered with bytes from the network */
     uint64_t merged_reads;   /* of them: shared a request with others */
     uint64_t retries;        /* requests whose failure was tried again */

@@ -87,6 +87,7 @@ strl_status strl__model_end_tree(strl_build_context *context, const strl_ingest 
     if (model->trees) {
         model->trees[model->tree].triangles = ingest->triangle_count;
         memcpy(model->trees[model->tree].centre, ingest->centre, sizeof ingest->centre);
+        model->trees[model->tree].size = ingest->longest;
     }
     note_lattice(context, ingest);
     strl_status status = strl_check_counts(context->result, err);

@@ -23,6 +23,7 @@ typedef struct strl_model_tree {
     uint64_t placements; /* that are finite */
     double scale;       /* the most by which a placement stretches */
     double centre[3];   /* of its triangles' box, once it is built */
+    double size;        /* of the same, its longest side */
 } strl_model_tree;
 
 typedef struct strl_build_model {

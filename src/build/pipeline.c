@@ -54,8 +54,8 @@ void strl__build_stage(strl_build_context *context, const char *stage)
 void strl__build_expect(strl_build_context *context, uint64_t triangles)
 {
     context->progress.triangles_in = triangles;
-    strl__estimate_guess(&context->estimate, strl__estimate_seconds(triangles, strl_pool_workers(context->pool),
-                                                                   context->desc->certify));
+    strl__estimate_guess(&context->estimate,
+                         strl__estimate_seconds(context->estimate.kind, triangles, strl_pool_workers(context->pool)));
 }
 
 strl_status strl__build_open_stream(strl_build_context *context, const char *name, strl_spill **spill, strl_error *err)
@@ -254,7 +254,8 @@ static strl_status build_with(strl_status (*stages)(strl_build_context *, strl_e
     strl_build_context context = {.desc = desc, .result = result, .run = stages, .keep = desc->keep || desc->resume,
                                   .memory_bytes = desc->memory_bytes ? desc->memory_bytes : 1ull << 30};
     *result = (strl_build_result){.inputs = desc->input_count};
-    strl__estimate_start(&context.estimate, started);
+    strl__estimate_start(&context.estimate,
+                         stages == strl__samples_run ? STRL_BUILD_SAMPLES : desc->certify ? STRL_BUILD_CERTIFIED : STRL_BUILD_CLUSTERS, started);
     context.progress.memory_bytes = context.memory_bytes;
     strl_status status = check_request(desc, &target, err);
     if (!status)
@@ -276,12 +277,10 @@ strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *
 
 strl_status strl_build_samples(const strl_build_desc *desc, strl_build_result *result, strl_error *err)
 {
-    strl_build_desc own = *desc;
-    if (desc->certify || desc->no_dependencies || desc->resume)
+    if (desc->certify || desc->no_dependencies)
         return strl__fail(err, STRL_ERR_ARGUMENT, "a sample tree takes no %s",
-                          desc->certify ? "--certify: it claims no error" : desc->resume ? "--resume" : "--no-dependencies: it has none");
+                          desc->certify ? "--certify: it claims no error" : "--no-dependencies: it has none");
     if (!(desc->probability >= 0 && desc->probability < 1))
         return strl__fail(err, STRL_ERR_ARGUMENT, "the probability of a sample is %g, expected one between 0 and 1", desc->probability);
-    own.keep = false;
-    return build_with(strl__samples_run, &own, result, err);
+    return build_with(strl__samples_run, desc, result, err);
 }

@@ -1,4 +1,5 @@
-/* Placements into the container: those that are near each other lie together, so that what bounds a run of them is small. */
+/* Placements into the container: those that are near each other lie together, so that what bounds a run of them is small. Where some are
+ * large beside the rest (the ground under a forest), these come first of all: who reads over a slow link sees them with the first page. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -7,15 +8,19 @@
 #include "base/hash.h"
 #include "base/memory.h"
 #include "build/model.h"
+#include "container/cut.h"
+#include "container/treelet.h"
 
 /* As many as fit are put into order at once; where there are more, one such window follows the other. */
 #define SHARES_OF_MEMORY 8u
 #define LEAST_AT_ONCE 4096u
 #define LEAST_BOX 16u /* what a walk has boxes over */
+#define LARGE_SHARE 0.125 /* of the extent of all centres */
 
 /* Where a placement is. */
 typedef struct spot {
     double centre[3]; /* of the tree's box, in the world */
+    double size;      /* of that box, its longest side, in the world */
     uint64_t index;   /* in the window, as the inputs have it, so that equal places have an order */
 } spot;
 
@@ -68,7 +73,7 @@ static void part(spot *items, size_t count, size_t left, unsigned axis)
     }
 }
 
-static unsigned longest_axis(const spot *items, size_t count)
+static unsigned longest_axis(const spot *items, size_t count, double *length)
 {
     double extent[3];
     for (unsigned k = 0; k < 3; k++) {
@@ -79,7 +84,9 @@ static unsigned longest_axis(const spot *items, size_t count)
         }
         extent[k] = high - low;
     }
-    return extent[0] >= extent[1] && extent[0] >= extent[2] ? 0 : extent[1] >= extent[2] ? 1 : 2;
+    unsigned axis = extent[0] >= extent[1] && extent[0] >= extent[2] ? 0 : extent[1] >= extent[2] ? 1 : 2;
+    *length = extent[axis];
+    return axis;
 }
 
 static int by_index(const void *left, const void *right)
@@ -96,7 +103,8 @@ static void put_in_order(spot *items, size_t count)
         size_t left = LEAST_BOX;
         while (2 * left < count)
             left *= 2;
-        part(items, count, left, longest_axis(items, count));
+        double length;
+        part(items, count, left, longest_axis(items, count, &length));
         put_in_order(items, left);
         items += left;
         count -= left;
@@ -105,10 +113,36 @@ static void put_in_order(spot *items, size_t count)
         qsort(items, count, sizeof *items, by_index);
 }
 
+static int by_size(const void *left, const void *right)
+{
+    const spot *a = left, *b = right;
+    return a->size != b->size ? (a->size > b->size ? -1 : 1) : by_index(left, right);
+}
+
+/* The largest ones as the first box, where one is large; then what fills its run, and the others run by run. */
+static void put_large_first(spot *items, size_t count)
+{
+    double length, largest = 0;
+    size_t run = STRL_RUN_PLACEMENTS - LEAST_BOX;
+    unsigned axis = longest_axis(items, count, &length);
+    for (size_t i = 0; i < count; i++)
+        largest = fmax(largest, items[i].size);
+    if (count <= STRL_RUN_PLACEMENTS || !(largest > LARGE_SHARE * length)) {
+        put_in_order(items, count);
+        return;
+    }
+    qsort(items, count, sizeof *items, by_size);
+    items += LEAST_BOX;
+    count -= LEAST_BOX;
+    part(items, count, run, axis);
+    put_in_order(items, run);
+    put_in_order(items + run, count - run);
+}
+
 static strl_status write_window(placing *p, strl_error *err)
 {
     strl_status status = STRL_OK;
-    put_in_order(p->spots, p->count);
+    put_large_first(p->spots, p->count);
     for (size_t i = 0; i < p->count && !status; i++)
         status = strl_container_writer_add_placement(p->context->model->writer, &p->items[p->spots[i].index], err);
     p->count = 0;
@@ -132,6 +166,8 @@ static strl_status add(placing *p, uint32_t tree, uint32_t own_part, const doubl
                         transform[4 * k + 2] * facts->centre[2] + transform[4 * k + 3];
         at->centre[k] = isfinite(centre) ? centre : 0;
     }
+    at->size = facts->size * strl_transform_stretch(transform);
+    at->size = isfinite(at->size) ? at->size : 0;
     context->result->placements++;
     if (__builtin_add_overflow(context->result->triangles_placed, facts->triangles, &context->result->triangles_placed))
         context->result->triangles_placed = UINT64_MAX;

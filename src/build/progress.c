@@ -8,6 +8,7 @@
 /* Isosurfaces, scans and terrain on two cores. */
 #define TRIANGLES_PER_CORE_SECOND 1.4e5
 #define TIMES_CERTIFIED 1.3
+#define SAMPLED_PER_CORE_SECOND 1.3e6 /* isosurfaces, boxes, chessboards */
 
 #define MEMORY_OF_WORK 0.1 /* share of the build after which what was counts 1/e */
 #define WORK_OF_GUESS 0.03 /* a guess counts as much as this share measured */
@@ -19,7 +20,7 @@ typedef struct stage_share {
 } stage_share;
 
 /* Measured on isosurfaces, in order, shuffled and as STL. They sum to 1. */
-static const stage_share stages[] = {{"survey", 1, 0.013},
+static const stage_share cluster_stages[] = {{"survey", 1, 0.013},
                                      {"read", 2, 0.043},
                                      {"sort", 3, 0.052},
                                      {"connect", 4, 0.07},
@@ -37,6 +38,8 @@ static const stage_share stages[] = {{"survey", 1, 0.013},
                                      {"higher levels", 6, 0.003},
                                      {"write", STRL_BUILD_STAGES, 0.135}};
 
+static const stage_share sample_stages[] = {{"survey", 1, 0.11}, {"read", 2, 0.17}, {"sort", 3, 0.7}, {"write", STRL_BUILD_STAGES, 0.02}};
+
 const char *strl_build_stage_name(uint32_t stage)
 {
     static const char *const names[STRL_BUILD_STAGES] = {"survey",    "read",   "sort", "connect",
@@ -44,15 +47,16 @@ const char *strl_build_stage_name(uint32_t stage)
     return names[stage];
 }
 
-double strl__estimate_seconds(uint64_t triangles, unsigned workers, bool certifies)
+double strl__estimate_seconds(strl_build_kind kind, uint64_t triangles, unsigned workers)
 {
-    double seconds = (double)triangles / (TRIANGLES_PER_CORE_SECOND * (workers ? workers : 1));
-    return certifies ? seconds * TIMES_CERTIFIED : seconds;
+    double rate = kind == STRL_BUILD_SAMPLES ? SAMPLED_PER_CORE_SECOND : TRIANGLES_PER_CORE_SECOND;
+    double seconds = (double)triangles / (rate * (workers ? workers : 1));
+    return kind == STRL_BUILD_CERTIFIED ? seconds * TIMES_CERTIFIED : seconds;
 }
 
-void strl__estimate_start(strl_estimate *estimate, uint64_t now_ns)
+void strl__estimate_start(strl_estimate *estimate, strl_build_kind kind, uint64_t now_ns)
 {
-    *estimate = (strl_estimate){.started_ns = now_ns, .updated_ns = now_ns, .tree_share = 1};
+    *estimate = (strl_estimate){.kind = kind, .started_ns = now_ns, .updated_ns = now_ns, .tree_share = 1};
 }
 
 void strl__estimate_tree(strl_estimate *estimate, double first, double share)
@@ -77,8 +81,11 @@ void strl__estimate_guess(strl_estimate *estimate, double seconds)
 
 void strl__estimate_stage(strl_estimate *estimate, const char *stage)
 {
+    bool is_sampled = estimate->kind == STRL_BUILD_SAMPLES;
+    const stage_share *stages = is_sampled ? sample_stages : cluster_stages;
+    size_t count = is_sampled ? sizeof sample_stages / sizeof *sample_stages : sizeof cluster_stages / sizeof *cluster_stages;
     double before = 0;
-    for (size_t i = 0; i < sizeof stages / sizeof stages[0]; before += stages[i++].share) {
+    for (size_t i = 0; i < count; before += stages[i++].share) {
         if (strcmp(stages[i].name, stage) != 0)
             continue;
         if (estimate->stage_index == 0)

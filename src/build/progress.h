@@ -11,7 +11,10 @@
 
 #include "stroll/build.h"
 
+typedef enum strl_build_kind { STRL_BUILD_CLUSTERS, STRL_BUILD_CERTIFIED, STRL_BUILD_SAMPLES } strl_build_kind;
+
 typedef struct strl_estimate {
+    strl_build_kind kind;
     double share; /* of the whole build, 0 to 1; never shrinks */
     double seconds_left;
     double seconds, work;            /* of late: the older, the less they count */
@@ -23,8 +26,8 @@ typedef struct strl_estimate {
 } strl_estimate;
 
 /* A rough time for this many triangles; no machine is known beforehand. */
-double strl__estimate_seconds(uint64_t triangles, unsigned workers, bool certifies);
-void strl__estimate_start(strl_estimate *estimate, uint64_t now_ns);
+double strl__estimate_seconds(strl_build_kind kind, uint64_t triangles, unsigned workers);
+void strl__estimate_start(strl_estimate *estimate, strl_build_kind kind, uint64_t now_ns);
 /* seconds: guessed for the whole build. Before the first update it is all that is known, later it counts little. */
 void strl__estimate_guess(strl_estimate *estimate, double seconds);
 /* An unknown name leaves share and index as they are. */

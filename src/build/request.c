@@ -32,6 +32,8 @@ strl_status strl__request_write(const strl_build_context *context, strl_writer *
     write_text(writer, desc->unit ? desc->unit : "");
     strl_writer_u8(writer, desc->no_dependencies);
     strl_writer_u8(writer, desc->certify);
+    strl_writer_u8(writer, context->run == strl__samples_run);
+    strl_writer_f64(writer, desc->probability);
     strl_writer_u32(writer, desc->input_count);
     for (uint32_t i = 0; i < desc->input_count; i++) {
         strl_file_info info;
@@ -94,8 +96,22 @@ static strl_status compare_flag(const char *name, bool now, bool saved, strl_err
                                      now ? "given" : "left out");
 }
 
-static strl_status compare_options(const strl_build_desc *desc, strl_cursor *saved, strl_error *err)
+static strl_status compare_structure(const strl_build_context *context, strl_cursor *saved, strl_error *err)
 {
+    static const char *const names[] = {"clusters", "samples"};
+    bool now = context->run == strl__samples_run, before = strl_cursor_u8(saved);
+    double probability = strl_cursor_f64(saved);
+    if (now != before)
+        return strl__fail(err, STRL_ERR_ARGUMENT, "--structure is %s, in the build to be resumed it was %s", names[now], names[before]);
+    return !now || probability == context->desc->probability
+               ? STRL_OK
+               : strl__fail(err, STRL_ERR_ARGUMENT, "--probability is %.17g, in the build to be resumed it was %.17g (0 = the default)",
+                            context->desc->probability, probability);
+}
+
+static strl_status compare_options(const strl_build_context *context, strl_cursor *saved, strl_error *err)
+{
+    const strl_build_desc *desc = context->desc;
     static const char *const axes[] = {"auto", "x", "y", "z"};
     double grid = strl_cursor_f64(saved);
     bool compact = strl_cursor_u8(saved);
@@ -118,7 +134,7 @@ static strl_status compare_options(const strl_build_desc *desc, strl_cursor *sav
         status = compare_flag("--no-dependencies", desc->no_dependencies, no_dependencies, err);
     if (!status)
         status = compare_flag("--certify", desc->certify, certify, err);
-    return status;
+    return status ? status : compare_structure(context, saved, err);
 }
 
 /* A file's facts, against those that are saved next. */
@@ -184,7 +200,7 @@ strl_status strl__request_compare(strl_build_context *context, strl_cursor *save
     if (!is_same(version, STRL_VERSION))
         return strl__fail(err, STRL_ERR_FORMAT, "this is version %s, the build to be resumed was made by version %.*s",
                           STRL_VERSION, shown(version), version.text);
-    strl_status status = compare_options(desc, saved, err);
+    strl_status status = compare_options(context, saved, err);
     uint32_t count = strl_cursor_u32(saved);
     if (!status && count != desc->input_count)
         return strl__fail(err, STRL_ERR_ARGUMENT, "the inputs are %u, in the build to be resumed they were %u",

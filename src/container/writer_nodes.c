@@ -217,7 +217,8 @@ static strl_status add_node(strl_container_writer *writer, const strl_node *reco
     writer->last_level = node->level;
     writer->last_parent = node->parent;
     writer->pending_count++;
-    if (writer->page.size >= STRL_PAGE_BYTES || writer->pending_count == STRL__MAX_PAGE_NODES ||
+    bool is_root = writer->next_id == 1; /* alone in its page: opening reads nothing else */
+    if (is_root || writer->page.size >= STRL_PAGE_BYTES || writer->pending_count == STRL__MAX_PAGE_NODES ||
         writer->pending_decoded_bytes >= STRL__PAGE_DECODED_BYTES)
         return strl__writing_close_page(writer, err);
     return STRL_OK;

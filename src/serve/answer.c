@@ -109,7 +109,7 @@ static bool redirect_to_folder(strl__site *site, const char *path, strl__answer 
     return fits;
 }
 
-static void answer_path(strl__site *site, const strl__request *request, const strl__target *target, strl__query *query,
+static void answer_path(strl__site *site, strl__request *request, const strl__target *target, strl__query *query,
                         strl__answer *answer)
 {
     const char *slash = strrchr(target->path, '/'), *name = slash ? slash + 1 : target->path;
@@ -133,7 +133,7 @@ static void answer_path(strl__site *site, const strl__request *request, const st
     } else if (query->format != STRL__FORMAT_ANY)
         strl__answer_sentence(answer, 400, "a file has no format, only a listing has");
     else if (query->kind != STRL__QUERY_NONE)
-        strl__answer_query(site, query, target->path, answer);
+        strl__answer_query(site, query, target->path, &request->pending, answer);
     else
         strl__answer_file(site, request, target->path, answer);
 }

@@ -10,6 +10,9 @@
 #include "serve/parse.h"
 #include "serve/connections.h"
 
+typedef struct strl__pending strl__pending; /* a query that has had a turn and needs more; it has a place of most_queries */
+void strl__pending_destroy(strl__pending *pending); /* NULL is legal */
+
 typedef struct strl__request {
     const char *method;
     char *target; /* as it came; is written to */
@@ -17,6 +20,7 @@ typedef struct strl__request {
     const char *accept;    /* NULL = not there */
     strl__refusal refusal; /* what is wrong with its head */
     bool has_body;
+    strl__pending *pending; /* owned; NULL = none */
 } strl__request;
 
 typedef struct strl__answer {
@@ -27,7 +31,8 @@ typedef struct strl__answer {
     bool close;       /* the connection, afterwards */
     bool is_page;
     unsigned retry_s; /* 0 = not said */
-    bool is_later;    /* there is none yet: ask again when others have ended */
+    bool is_later;    /* there is none yet: ask again when others have ended, */
+    bool goes_on;     /* or have had their turn */
     double work;      /* what it cost beyond a plain request, in requests */
     char etag[STRL__ETAG_BYTES], modified[STRL__DATE_BYTES], range[72]; /* "" = not said */
     char location[3 * STRL__PATH_BYTES + 8];
@@ -42,7 +47,7 @@ typedef struct strl__site {
     uint64_t answer_bytes;
     uint64_t held_most;          /* bytes of memory of all answers that are under way */
     _Atomic uint64_t held_bytes;
-    uint32_t most_queries;       /* at work at once */
+    uint32_t most_queries;       /* at work at once, those between two turns included */
     _Atomic uint32_t queries;
     void (*complain)(void *context, const char *sentence); /* NULL = nobody wants to know */
     void *context;
@@ -60,7 +65,8 @@ void strl__answer_text(strl__answer *answer, const char *type, strl_writer *out)
 
 /* ---- the kinds of answers, one a file ---- */
 void strl__answer_file(strl__site *site, const strl__request *request, const char *path, strl__answer *answer);
-void strl__answer_query(strl__site *site, const strl__query *query, const char *path, strl__answer *answer);
+void strl__answer_query(strl__site *site, const strl__query *query, const char *path, strl__pending **pending,
+                        strl__answer *answer);
 void strl__answer_listing(strl__site *site, const char *path, bool json, strl__answer *answer);
 /* A regular file of the folder, with what the open file is. False: the answer says why there is none. The caller closes. */
 bool strl__open_served(strl__site *site, const char *path, strl_file **file, strl_file_info *info, strl__answer *answer);

@@ -69,6 +69,7 @@ static void end(strl__exchange *self, unsigned library_status, bool aborted)
     strl__connection_progress(self->connection);
     log_exchange(self, duration_ns);
     atomic_fetch_sub(&self->server->under_way, 1);
+    strl__pending_destroy(self->request.pending);
     strl__free(self->shown);
     strl__free(self->target);
     strl__free(self);
@@ -132,6 +133,13 @@ static void wait_a_while(strl__exchange *exchange, struct MHD_Connection *handle
     MHD_suspend_connection(handle);
     if (!strl__connections_pause(&exchange->server->site.connections, exchange->connection))
         MHD_resume_connection(handle);
+}
+
+/* The library asks again as soon as it has looked after the other connections of its thread. */
+static void let_others_go_first(struct MHD_Connection *handle)
+{
+    MHD_suspend_connection(handle);
+    MHD_resume_connection(handle);
 }
 
 static ssize_t read_chunk(void *cls, uint64_t at, char *data, size_t size)
@@ -307,7 +315,10 @@ enum MHD_Result strl__exchange_answer(void *cls, struct MHD_Connection *connecti
         strcpy(self->target, self->shown); /* an earlier try has taken it apart */
         strl__answer_request(&self->server->site, &self->request, &answer);
         if (answer.is_later) {
-            wait_a_while(self, connection);
+            if (answer.goes_on)
+                let_others_go_first(connection);
+            else
+                wait_a_while(self, connection);
             return MHD_YES;
         }
         strl__rates_charge(&self->server->rates, &self->connection->peer, answer.work, strl_clock_ns());

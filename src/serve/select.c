@@ -18,16 +18,18 @@ typedef struct run {
     uint32_t child_first, child_end; /* equal: no child so far */
 } run;
 
-typedef struct choice {
-    strl_container *container;
+struct strl__selecting {
+    strl_container *container; /* of the step */
     uint32_t tree;
     uint64_t most_bytes;
-    strl__selection *out;
-    run *runs; /* [count], a heap: the lowest next first */
+    strl__selection out;
+    run *runs; /* [count], owned; a heap: the lowest next first */
     uint32_t count;
     uint64_t last_treelet, last_page; /* offsets of the pieces that were added last; 0 = none, for there is the header */
     uint32_t last_node;               /* answered last; STRL_NONE = none */
-} choice;
+};
+
+typedef struct strl__selecting choice;
 
 /* ---- the heap ---- */
 
@@ -85,7 +87,7 @@ static uint64_t cost_of(uint64_t last, uint64_t offset, uint32_t bytes)
 
 static strl_status add_piece(choice *self, uint64_t *last, uint64_t offset, uint32_t bytes, strl_error *err)
 {
-    strl__selection *out = self->out;
+    strl__selection *out = &self->out;
     if (offset == *last)
         return STRL_OK;
     if (!strl__grow(&out->pieces, &out->capacity, out->count + 1, sizeof *out->pieces))
@@ -98,13 +100,13 @@ static strl_status add_piece(choice *self, uint64_t *last, uint64_t offset, uint
 
 static void cut_before(choice *self, uint32_t node)
 {
-    self->out->cut = true;
-    self->out->next_node = node;
+    self->out.cut = true;
+    self->out.next_node = node;
 }
 
 static strl_status answer_node(choice *self, uint32_t id, const strl_node *node, strl_error *err)
 {
-    strl__selection *out = self->out;
+    strl__selection *out = &self->out;
     strl_treelet_place place;
     strl_status status = strl_container_treelet_of(self->container, self->tree, id, &place, err);
     if (status != STRL_OK)
@@ -132,22 +134,38 @@ static strl_status visit_lowest(choice *self, strl_error *err)
     strl_status status = strl_container_node(self->container, self->tree, id, &node, err);
     if (status == STRL_OK && is_new)
         status = answer_node(self, id, &node, err);
-    if (status == STRL_OK && !self->out->cut)
+    if (status == STRL_OK && !self->out.cut)
         status = note_children(self, &node, err);
-    if (status == STRL_OK && !self->out->cut)
+    if (status == STRL_OK && !self->out.cut)
         advance(self);
     return status;
 }
 
-/* What is too much work is cut like what is too many bytes, but for the first node: that would be no answer. */
-static strl_status visit_bounded(choice *self, strl_error *err)
+bool strl__selecting_cut(strl__selecting *self)
 {
-    strl_status status = ++self->out->visited > STRL__VISITED_NODES ? STRL_ERR_LIMIT : visit_lowest(self, err);
-    if (status != STRL_ERR_LIMIT || self->out->node_count == 0)
-        return status;
+    if (self->out.node_count == 0)
+        return false;
     uint32_t id = self->runs[0].next;
     cut_before(self, id > self->last_node ? id : self->last_node + 1);
-    return STRL_OK;
+    return true;
+}
+
+/* What is too much work is cut like what is too many bytes. */
+strl_status strl__selecting_step(strl__selecting *self, strl_container *container, uint32_t most_visits, bool *is_done,
+                                 strl_error *err)
+{
+    strl_status status = STRL_OK;
+    self->container = container;
+    for (uint32_t i = 0; status == STRL_OK && i < most_visits && self->count > 0 && !self->out.cut; i++) {
+        if (self->out.visited == STRL__VISITED_NODES) {
+            strl__selecting_cut(self); /* the first node is answered by then */
+            break;
+        }
+        status = visit_lowest(self, err);
+        self->out.visited += status == STRL_OK;
+    }
+    *is_done = status == STRL_OK && (self->count == 0 || self->out.cut);
+    return status;
 }
 
 /* ---- all of it ---- */
@@ -195,29 +213,70 @@ static strl_status check_query(const strl_container *container, const strl__quer
     return STRL_OK;
 }
 
-strl_status strl__select(strl_container *container, const strl__query *query, uint64_t most_bytes,
-                         strl__selection *selection, strl_error *err)
+strl_status strl__selecting_create(const strl_container *container, const strl__query *query, uint64_t most_bytes,
+                                   strl__selecting **selecting, strl_error *err)
 {
-    *selection = (strl__selection){.next_node = STRL_NONE};
+    *selecting = NULL;
     strl_status status = check_query(container, query, err);
     if (status != STRL_OK)
         return status;
-    choice self = {.container = container, .tree = query->tree, .most_bytes = most_bytes, .out = selection,
-                   .count = query->count, .last_node = STRL_NONE};
-    self.runs = strl__alloc(query->count, sizeof *self.runs);
-    if (!self.runs)
+    strl__selecting *made = strl__alloc_zero(1, sizeof *made);
+    if (made)
+        made->runs = strl__alloc(query->count, sizeof *made->runs);
+    if (!made || !made->runs) {
+        strl__free(made);
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %" PRIu32 " subtrees", query->count);
+    }
+    made->tree = query->tree;
+    made->most_bytes = most_bytes;
+    made->out.next_node = made->last_node = STRL_NONE;
+    made->count = query->count;
     for (uint32_t i = 0; i < query->count; i++) { /* in increasing order, so a heap already */
         const strl__query_item *item = &query->items[i];
-        self.runs[i] = (run){.next = item->node, .end = item->node + 1, .depth = item->depth};
+        made->runs[i] = (run){.next = item->node, .end = item->node + 1, .depth = item->depth};
     }
-    while (status == STRL_OK && self.count > 0 && !selection->cut)
-        status = visit_bounded(&self, err);
-    strl__free(self.runs);
+    *selecting = made;
+    return STRL_OK;
+}
+
+void strl__selecting_destroy(strl__selecting *self)
+{
+    if (!self)
+        return;
+    strl__selection_deinit(&self->out);
+    strl__free(self->runs);
+    strl__free(self);
+}
+
+uint32_t strl__selecting_visited(const strl__selecting *self)
+{
+    return self->out.visited;
+}
+
+void strl__selecting_take(strl__selecting *self, strl__selection *selection)
+{
+    order_pieces(&self->out);
+    *selection = self->out;
+    self->out = (strl__selection){.next_node = STRL_NONE};
+}
+
+strl_status strl__select(strl_container *container, const strl__query *query, uint64_t most_bytes,
+                         strl__selection *selection, strl_error *err)
+{
+    strl__selecting *self;
+    bool is_done = false;
+    *selection = (strl__selection){.next_node = STRL_NONE};
+    strl_status status = strl__selecting_create(container, query, most_bytes, &self, err);
+    if (status != STRL_OK)
+        return status;
+    status = strl__selecting_step(self, container, UINT32_MAX, &is_done, err);
+    if (status == STRL_ERR_LIMIT && strl__selecting_cut(self))
+        status = STRL_OK;
     if (status == STRL_OK)
-        order_pieces(selection);
+        strl__selecting_take(self, selection);
     else
-        strl__selection_deinit(selection);
+        selection->visited = self->out.visited;
+    strl__selecting_destroy(self);
     return status;
 }
 

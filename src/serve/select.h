@@ -20,7 +20,24 @@ typedef struct strl__selection {
     uint32_t next_node; /* where cut: what was asked for and is lower is answered, and nothing else; else STRL_NONE */
 } strl__selection;
 
-/* most_bytes: of the answer; the first node is always answered. STRL_ERR_ARGUMENT: the query asks for what there is not. */
+/* A selection in the making, which may pause between any two nodes. */
+typedef struct strl__selecting strl__selecting;
+
+/* STRL_ERR_ARGUMENT: the query asks for what there is not. */
+strl_status strl__selecting_create(const strl_container *container, const strl__query *query, uint64_t most_bytes,
+                                   strl__selecting **selecting, strl_error *err);
+void strl__selecting_destroy(strl__selecting *selecting); /* NULL is legal */
+/* Looks at that many nodes more at most. The container is the one of the beginning, or the same opened anew. STRL_ERR_LIMIT: what it
+ * reads from gives no more now; nothing is lost, and it may go on later. */
+strl_status strl__selecting_step(strl__selecting *selecting, strl_container *container, uint32_t most_visits, bool *is_done,
+                                 strl_error *err);
+/* The answer ends here. False where it has no node yet: that would be no answer. */
+bool strl__selecting_cut(strl__selecting *selecting);
+uint32_t strl__selecting_visited(const strl__selecting *selecting); /* nodes so far */
+/* Once it is done or cut; the selection is the caller's. */
+void strl__selecting_take(strl__selecting *selecting, strl__selection *selection);
+
+/* All of it at once. most_bytes: of the answer; the first node is always answered. STRL_ERR_ARGUMENT: the query asks for what there is not. */
 strl_status strl__select(strl_container *container, const strl__query *query, uint64_t most_bytes,
                          strl__selection *selection, strl_error *err);
 void strl__selection_deinit(strl__selection *selection);

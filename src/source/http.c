@@ -17,60 +17,108 @@
 /* A blocking read brings as much: of a container's end all that a first image needs but the root's mesh. */
 #define AHEAD_BYTES ((uint64_t)48 << 10)
 #define MOST_AHEAD_BYTES ((uint64_t)2 << 20) /* where one blocking read follows the other */
-#define AHEAD_GAP ((uint64_t)4 << 10)        /* between two that follow each other */
+#define AHEAD_GAP AHEAD_BYTES                /* between two that follow each other */
+#define BACKWARD_GAP ((uint64_t)4 << 10)
 
 /* ---- blocking reads */
 
-/* Mutex held. Where the range is in memory already; NULL = nowhere. */
-static const uint8_t *find_known(const strl__http *http, uint64_t offset, size_t size)
+/* Mutex held. The bytes from `offset` on that are in memory, and how many; NULL = none. */
+static const uint8_t *find_known(const strl__http *http, uint64_t offset, size_t *bytes)
 {
-    if (offset + size <= http->head_bytes)
+    if (offset < http->head_bytes) {
+        *bytes = http->head_bytes - (size_t)offset;
         return http->head + offset;
-    if (http->ahead && offset >= http->ahead_begin && offset + size <= http->ahead_end)
-        return http->ahead + (offset - http->ahead_begin);
+    }
+    for (unsigned i = 0; i < STRL__HTTP_AHEAD; i++) {
+        const strl__http_ahead *ahead = &http->ahead[i];
+        if (!ahead->data || offset < ahead->begin || offset >= ahead->end)
+            continue;
+        *bytes = (size_t)(ahead->end - offset);
+        return ahead->data + (offset - ahead->begin);
+    }
     return NULL;
 }
 
-/* Mutex held. What came along with another read is new to the cache. */
-static void copy_known(strl__http *http, const uint8_t *known, uint64_t offset, void *data, size_t size)
+/* Mutex held. Whether all of a range is in memory already; copies it where data is not NULL. What came along with another read
+ * is new to the cache. */
+static bool copy_known(strl__http *http, uint64_t offset, size_t size, uint8_t *data)
 {
-    memcpy(data, known, size);
-    if (offset + size > http->head_bytes)
-        strl__http_keep(http, offset, known, size);
+    size_t count = 0;
+    for (size_t done = 0; done < size; done += count) {
+        const uint8_t *known = find_known(http, offset + done, &count);
+        if (!known)
+            return false;
+        count = count < size - done ? count : size - done;
+        if (data)
+            memcpy(data + done, known, count);
+    }
+    if (data && size > 0 && offset + size > http->head_bytes)
+        strl__http_keep(http, offset, data, size);
+    return true;
+}
+
+/* Mutex held. The last read that this one goes on from, forward or backward; NULL = none. */
+static const strl__http_ahead *find_near(const strl__http *http, const strl__http_read *read, bool *is_backward)
+{
+    for (unsigned i = 1; i <= STRL__HTTP_AHEAD; i++) {
+        const strl__http_ahead *ahead = &http->ahead[(http->ahead_next + STRL__HTTP_AHEAD - i) % STRL__HTTP_AHEAD];
+        bool is_used = ahead->end > ahead->begin;
+        *is_backward = false;
+        if (is_used && read->begin >= ahead->begin && read->begin <= ahead->end + AHEAD_GAP && read->end > ahead->end)
+            return ahead;
+        *is_backward = true;
+        if (is_used && read->end <= ahead->end && read->end + BACKWARD_GAP >= ahead->begin && read->begin < ahead->begin)
+            return ahead;
+    }
+    return NULL;
 }
 
 /* Mutex held. What to fetch for a blocking read: more than it asks for, because the next one asks for what is near. */
 static void look_ahead(strl__http *http, strl__http_read *read)
 {
     uint64_t total = http->base.bytes;
-    bool forward =
-        read->begin >= http->ahead_begin && read->begin <= http->ahead_end + AHEAD_GAP && read->end > http->ahead_end;
-    bool backward =
-        read->end <= http->ahead_end && read->end + AHEAD_GAP >= http->ahead_begin && read->begin < http->ahead_begin;
-    if (!forward && !backward)
+    bool is_backward;
+    const strl__http_ahead *near = find_near(http, read, &is_backward);
+    if (!near)
         http->ahead_window = AHEAD_BYTES;
     else if (http->ahead_window < MOST_AHEAD_BYTES)
         http->ahead_window *= 2;
     uint64_t window = http->ahead_window;
     if (read->size >= window)
         return;
-    if (backward)
+    if (near && is_backward)
         read->begin = read->end > window ? read->end - window : 0;
     else
         read->end = total - read->begin > window ? read->begin + window : total;
+    if (near && !is_backward && read->begin > near->end)
+        read->begin = near->end; /* of many trees the records lie behind the pages */
     if (read->end == total && read->end - read->begin < window)
         read->begin = total > window ? total - window : 0;
+}
+
+/* Mutex held. Makes room for that many bytes. */
+static void forget_oldest_ahead(strl__http *http, uint64_t bytes)
+{
+    for (unsigned i = 0; i < STRL__HTTP_AHEAD; i++)
+        bytes += http->ahead[i].data ? http->ahead[i].end - http->ahead[i].begin : 0;
+    for (unsigned i = 0; i < STRL__HTTP_AHEAD && bytes > STRL__HTTP_AHEAD_BYTES; i++) {
+        strl__http_ahead *oldest = &http->ahead[(http->ahead_next + i) % STRL__HTTP_AHEAD];
+        bytes -= oldest->data ? oldest->end - oldest->begin : 0;
+        strl__free(oldest->data);
+        oldest->data = NULL;
+    }
 }
 
 /* Mutex held. Takes the read's bytes over. */
 static void keep_ahead(strl__http *http, strl__http_read *read)
 {
-    http->ahead_begin = read->begin;
-    http->ahead_end = read->end;
-    strl__free(http->ahead);
-    http->ahead = NULL;
+    strl__http_ahead *ahead = &http->ahead[http->ahead_next];
+    http->ahead_next = (http->ahead_next + 1) % STRL__HTTP_AHEAD;
+    strl__free(ahead->data);
+    *ahead = (strl__http_ahead){read->begin, read->end, NULL};
     if (read->end - read->begin > read->size) {
-        http->ahead = read->result.data;
+        forget_oldest_ahead(http, read->end - read->begin);
+        ahead->data = read->result.data;
         read->result.data = NULL;
     }
 }
@@ -119,16 +167,68 @@ static strl_status http_read(strl_source *source, uint64_t offset, void *data, s
         .offset = offset, .size = size, .begin = offset, .end = offset + size, .urgency = INFINITY, .waited = true};
     strl_status status = STRL_OK;
     strl_mutex_lock(&http->mutex);
-    const uint8_t *known = find_known(http, offset, size);
     if (http->changed.status != STRL_OK) {
         status = fail_changed(http, err);
-    } else if (known) {
-        copy_known(http, known, offset, data, size);
-    } else if (size > 0) {
+    } else if (!copy_known(http, offset, size, data)) {
         look_ahead(http, &like);
         status = wait_for(http, &like, data, err);
     }
     strl_mutex_unlock(&http->mutex);
+    return status;
+}
+
+/* Mutex held. The bytes of a range that are here already are copied; else *read is on its way to them. */
+static strl_status begin_read(strl__http *http, const strl_source_span *span, strl__http_read **read, strl_error *err)
+{
+    const strl__http_read like = {.offset = span->offset,
+                                  .size = span->size,
+                                  .begin = span->offset,
+                                  .end = span->offset + span->size,
+                                  .urgency = INFINITY,
+                                  .waited = true};
+    *read = NULL;
+    if (copy_known(http, span->offset, span->size, span->data))
+        return STRL_OK;
+    strl_status status = strl__http_read_add(http, &like, read, err);
+    if (status == STRL_OK)
+        wake(http, *read);
+    return status;
+}
+
+/* Mutex held. */
+static strl_status end_read(strl__http *http, strl__http_read *read, void *data, strl_error *err)
+{
+    while (read->state != STRL__HTTP_DONE)
+        strl_condition_wait(&http->answered, &http->mutex);
+    strl_status status = read->result.status;
+    if (status == STRL_OK)
+        memcpy(data, read->result.data, read->size);
+    else if (err)
+        *err = read->result.error;
+    strl__free(read->result.data);
+    strl__free(read);
+    return status;
+}
+
+/* The network thread sees all of them at once: what is near to each other shares a request. */
+static strl_status http_read_many(strl_source *source, const strl_source_span *spans, size_t count, strl_error *err)
+{
+    strl__http *http = (strl__http *)source;
+    strl_status status = STRL_OK;
+    strl__http_read **reads = strl__alloc_zero(count ? count : 1, sizeof *reads);
+    if (!reads)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu reads", count);
+    strl_mutex_lock(&http->mutex);
+    if (http->changed.status != STRL_OK)
+        status = fail_changed(http, err);
+    for (size_t i = 0; status == STRL_OK && i < count; i++)
+        status = begin_read(http, &spans[i], &reads[i], err);
+    for (size_t i = 0; i < count; i++) { /* whatever has failed: they are on their way */
+        strl_status own = reads[i] ? end_read(http, reads[i], spans[i].data, status == STRL_OK ? err : NULL) : STRL_OK;
+        status = status == STRL_OK ? own : status;
+    }
+    strl_mutex_unlock(&http->mutex);
+    strl__free(reads);
     return status;
 }
 
@@ -137,9 +237,8 @@ static strl_status http_read(strl_source *source, uint64_t offset, void *data, s
 /* Mutex held. Whether the read could be answered without a request. */
 static bool answer_known(strl__http *http, strl__http_read *read)
 {
-    const uint8_t *known = find_known(http, read->offset, read->size);
     strl_error error = http->changed;
-    if (error.status == STRL_OK && !known && read->size > 0)
+    if (error.status == STRL_OK && !copy_known(http, read->offset, read->size, NULL))
         return false;
     if (error.status == STRL_OK && !(read->result.data = strl__alloc(read->size, 1)))
         strl__fail(&error, STRL_ERR_MEMORY, "no memory for a read of %zu bytes", read->size);
@@ -147,8 +246,7 @@ static bool answer_known(strl__http *http, strl__http_read *read)
         strl__http_read_fail(http, read, &error);
         return true;
     }
-    if (known)
-        copy_known(http, known, read->offset, read->result.data, read->size);
+    copy_known(http, read->offset, read->size, read->result.data);
     strl__http_read_finish(http, read);
     return true;
 }
@@ -232,9 +330,12 @@ static void http_doubt(strl_source *source, uint64_t offset, size_t size)
 {
     strl__http *http = (strl__http *)source;
     strl_mutex_lock(&http->mutex);
-    if (http->ahead && offset < http->ahead_end && offset + size > http->ahead_begin) {
-        strl__free(http->ahead);
-        http->ahead = NULL;
+    for (unsigned i = 0; i < STRL__HTTP_AHEAD; i++) {
+        strl__http_ahead *ahead = &http->ahead[i];
+        if (offset >= ahead->end || offset + size <= ahead->begin)
+            continue;
+        strl__free(ahead->data);
+        ahead->data = NULL;
     }
     strl__http_forget(http, offset, size);
     strl_mutex_unlock(&http->mutex);
@@ -271,7 +372,7 @@ static void http_close(strl_source *source)
         curl_multi_wakeup(http->multi);
     strl_mutex_unlock(&http->mutex);
     strl_thread_join(http->network);
-    for (uint32_t i = 0; i < http->desc.connections; i++)
+    for (uint32_t i = 0; i <= http->desc.connections; i++)
         curl_easy_cleanup(http->transfers[i].easy);
     if (http->multi)
         curl_multi_cleanup(http->multi);
@@ -279,10 +380,12 @@ static void http_close(strl_source *source)
     strl__cache_close(http->cache);
     strl__http_disk_deinit(http);
     free_reads(http);
-    strl__free(http->ahead);
+    for (unsigned i = 0; i < STRL__HTTP_AHEAD; i++)
+        strl__free(http->ahead[i].data);
     strl__free(http->target);
     strl__free(http->url);
     strl__free(http->shown);
+    strl__free(http->certificates);
     strl_condition_deinit(&http->answered);
     strl_condition_deinit(&http->disk_work);
     strl_mutex_deinit(&http->mutex);
@@ -325,7 +428,7 @@ static strl_status make_handles(strl__http *http, strl_error *err)
 {
     http->multi = curl_ready == CURLE_OK ? curl_multi_init() : NULL;
     bool good = http->multi != NULL;
-    for (uint32_t i = 0; good && i < http->desc.connections; i++) {
+    for (uint32_t i = 0; good && i <= http->desc.connections; i++) {
         http->transfers[i].http = http;
         http->transfers[i].easy = curl_easy_init();
         good = http->transfers[i].easy != NULL;
@@ -333,8 +436,8 @@ static strl_status make_handles(strl__http *http, strl_error *err)
     http->headers = good ? curl_slist_append(NULL, "Accept-Encoding: identity") : NULL;
     if (!http->headers)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for connections");
-    curl_multi_setopt(http->multi, CURLMOPT_MAX_HOST_CONNECTIONS, (long)http->desc.connections);
-    curl_multi_setopt(http->multi, CURLMOPT_MAXCONNECTS, (long)http->desc.connections);
+    curl_multi_setopt(http->multi, CURLMOPT_MAX_HOST_CONNECTIONS, (long)http->desc.connections + 1);
+    curl_multi_setopt(http->multi, CURLMOPT_MAXCONNECTS, (long)http->desc.connections + 1);
     return STRL_OK;
 }
 
@@ -356,6 +459,7 @@ strl_status strl_source_open_http(const char *url, const strl_http_desc *desc, s
         .poll = http_poll,
         .cancel = http_cancel,
         .read = http_read,
+        .read_many = http_read_many,
         .close = http_close,
         .room = http_room,
         .get_network_stats = http_network_stats,
@@ -369,13 +473,14 @@ strl_status strl_source_open_http(const char *url, const strl_http_desc *desc, s
     strl_condition_init(&http->answered);
     strl_condition_init(&http->disk_work);
     http->kept_end = &http->kept;
-    http->ahead_begin = http->ahead_end = UINT64_MAX / 2; /* near to nothing */
     strl_once_run(&curl_once, init_curl);
     strl_status status = strl__http_url(url, &http->url, &http->shown, &http->secure, err);
     if (status == STRL_OK) {
         apply_desc(http, desc);
         status = make_handles(http, err);
     }
+    if (status == STRL_OK && desc && desc->certificates && !(http->certificates = strl__strdup(desc->certificates)))
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory to open an address");
     if (status == STRL_OK)
         status = strl_thread_start(&http->network, strl__http_network_run, http, err);
     if (status == STRL_OK)

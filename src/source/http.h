@@ -9,6 +9,9 @@
  * buffer, so that a transfer does not care who still wants them: it spreads what comes over the reads that are
  * attached to it at the moment.
  *
+ * Where nothing comes any more a transfer beside the others looks whether the server answers again: one byte, that no read
+ * wants. What was silent while a later request was answered is overtaken: it is given up and asked for again.
+ *
  * Invariants: (1) an accepted read is in `reads` until it is DONE, then in `finished` (or its waiter's hands)
  * until it is taken, so it is answered exactly once; (2) everything under `mutex` is touched with it held, and
  * nothing waits while it is; (3) while the network thread runs only it calls libcurl,
@@ -27,6 +30,8 @@
 #define STRL__HTTP_HEAD_BYTES 4096u /* what opening reads: a container's header, which says what model it is */
 #define STRL__HTTP_MOST_CONNECTIONS 32u
 #define STRL__HTTP_MOST_REDIRECTS 5
+#define STRL__HTTP_AHEAD 64u /* reads whose surroundings are kept, */
+#define STRL__HTTP_AHEAD_BYTES ((uint64_t)8 << 20) /* so much of them at most */
 #define STRL__HTTP_MOST_MERGED ((uint64_t)2 << 20) /* bytes of a request for several reads */
 
 typedef enum strl__http_state {
@@ -56,7 +61,9 @@ typedef struct strl__http_read {
 typedef struct strl__http_transfer {
     struct strl__http *http;
     CURL *easy; /* kept from one to the next */
-    bool active, opening, redirected;
+    bool active, opening, redirected, overtaken;
+    bool looking; /* the last one of `transfers`, which has no reads */
+    uint64_t begun_ns;
     uint64_t begin, end; /* asked for */
     uint64_t received;
     uint64_t discarded; /* of the body of an answer that is of no use */
@@ -68,6 +75,12 @@ typedef struct strl__http_transfer {
     bool receiving;                     /* counted in the pace */
     char reason[CURL_ERROR_SIZE];
 } strl__http_transfer;
+
+/* What a blocking read has fetched. */
+typedef struct strl__http_ahead {
+    uint64_t begin, end;
+    uint8_t *data; /* owned; NULL = nothing beyond what was asked for, which has been taken away */
+} strl__http_ahead;
 
 /* Bytes to be kept in the cache, or (without data) an entry to be dropped from it. */
 typedef struct strl__http_kept {
@@ -83,12 +96,16 @@ typedef struct strl__http {
     char *url;   /* as libcurl has normalised it */
     char *shown; /* for sentences: without what may be secret in it */
     strl_http_desc desc;
+    char *certificates; /* NULL = libcurl's */
     bool secure; /* https */
     strl_thread *network, *disk;
     CURLM *multi;       /* the network thread's, once it runs */
     strl__cache *cache; /* the disk thread's; NULL = none */
     /* The network thread's. */
-    strl__http_transfer transfers[STRL__HTTP_MOST_CONNECTIONS];
+    strl__http_transfer transfers[STRL__HTTP_MOST_CONNECTIONS + 1]; /* desc.connections for reads, and one that looks */
+    uint64_t heard_ns;    /* when bytes that a read wants came last */
+    uint64_t answered_ns; /* when the latest of the requests that were answered was begun */
+    uint64_t renewed_ns;  /* connections that are older are not used again; 0 = there are none such */
     char *target;               /* where the address leads to; NULL = not known */
     struct curl_slist *headers; /* of every request */
     bool headers_conditional;   /* they name what was opened */
@@ -106,8 +123,8 @@ typedef struct strl__http {
     uint8_t model[16]; /* for the cache's keys */
     uint8_t head[STRL__HTTP_HEAD_BYTES];
     size_t head_bytes;
-    uint8_t *ahead;                  /* what a blocking read fetched beyond itself; owned; NULL = nothing */
-    uint64_t ahead_begin, ahead_end; /* of what the last blocking read fetched, in `ahead` or not */
+    strl__http_ahead ahead[STRL__HTTP_AHEAD]; /* the oldest is `ahead_next`: it goes first */
+    unsigned ahead_next;
     uint64_t ahead_window;
     strl__http_kept *kept, **kept_end; /* to be written; owned */
     strl__http_kept *doubted;          /* to be dropped, before anything is looked up; owned */
@@ -161,9 +178,9 @@ void strl__http_network_run(void *http); /* the network thread */
 bool strl__http_transfer_start(strl__http_transfer *transfer);
 /* libcurl has come to its end, or `code` stands for what ended it. Answers its reads or sends them back. */
 void strl__http_transfer_end(strl__http_transfer *transfer, CURLcode code);
-/* When it will have stalled, if nothing comes any more. */
+/* Mutex held. When it will have stalled, if nothing comes any more; when it may be overtaken, where that is sooner. */
 uint64_t strl__http_transfer_deadline(const strl__http_transfer *transfer);
-/* Looks whether it has stalled by now; then the reason is in its error. */
+/* Looks whether it has stalled by now, or is overtaken; then the reason is in its error. */
 bool strl__http_transfer_stalled(strl__http_transfer *transfer, uint64_t now_ns);
 
 #endif

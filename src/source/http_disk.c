@@ -156,14 +156,16 @@ static bool trim_some(strl__http *http)
     return more;
 }
 
-/* So that no read waits behind looking a large folder through. */
-static bool make_room_some(strl__http *http)
+/* Room first, in steps, so that no read waits behind looking a large folder through. Meanwhile what was to be written may have been
+ * forgotten. */
+static void keep_some(strl__http *http)
 {
     uint32_t size = (uint32_t)http->kept->size;
     strl_mutex_unlock(&http->mutex);
     bool more = strl__cache_room_step(http->cache, size);
     strl_mutex_lock(&http->mutex);
-    return more;
+    if (!more && http->kept)
+        write_one(http);
 }
 
 void strl__http_disk_run(void *context)
@@ -177,10 +179,8 @@ void strl__http_disk_run(void *context)
             drop_one(http);
         else if (!http->disk_closing && (read = strl__http_read_most_urgent(http, STRL__HTTP_NEW, UINT64_MAX)))
             look_up(http, read);
-        else if (http->kept && make_room_some(http))
-            continue;
         else if (http->kept)
-            write_one(http);
+            keep_some(http);
         else if (!trimmed)
             trimmed = !trim_some(http);
         else

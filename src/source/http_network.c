@@ -10,6 +10,9 @@
 #define LEAST_REQUESTS 2u    /* under way whatever they weigh: while one answer comes the next is asked for */
 #define MOST_CANDIDATES 256u /* for sharing a request */
 #define IDLE_NS 1000000000u  /* the longest sleep */
+#define LOOK_NS 1000000000u  /* of silence, and between two looks whether the server answers again: */
+#define LOOK_SHARE 4u        /* this part of the silence, */
+#define MOST_LOOK_NS 4000000000u /* so much at most */
 
 /* ---- which */
 
@@ -165,18 +168,41 @@ static void start_all(strl__http *http)
     }
 }
 
-/* ---- ending */
+/* ---- looking whether the server answers */
 
-/* Whether nobody wants the rest of it. */
-static bool is_abandoned(strl__http *http, const strl__http_transfer *transfer)
+static void sooner(uint64_t *when_ns, uint64_t other_ns)
 {
-    strl_mutex_lock(&http->mutex);
-    size_t i = 0;
-    while (i < http->read_count && http->reads[i]->transfer != transfer)
-        i++;
-    bool abandoned = i == http->read_count && transfer->received < transfer->end - transfer->begin;
-    strl_mutex_unlock(&http->mutex);
-    return abandoned;
+    if (other_ns < *when_ns)
+        *when_ns = other_ns;
+}
+
+static strl__http_transfer *looker(strl__http *http)
+{
+    return &http->transfers[http->desc.connections];
+}
+
+/* Mutex held. Since when nothing has come of what is asked for; UINT64_MAX where nothing is. */
+static uint64_t silent_since(const strl__http *http)
+{
+    uint64_t since_ns = UINT64_MAX;
+    for (uint32_t i = 0; i < http->desc.connections; i++)
+        if (http->transfers[i].active)
+            sooner(&since_ns, http->transfers[i].begun_ns);
+    return since_ns < http->heard_ns ? http->heard_ns : since_ns;
+}
+
+/* Mutex held. UINT64_MAX: never, as things are. */
+static uint64_t next_look_ns(strl__http *http, uint64_t now_ns)
+{
+    uint64_t since_ns = silent_since(http), latency_ns = (uint64_t)(4e9 * http->pace.latency_s);
+    if (since_ns == UINT64_MAX || !http->opened)
+        return UINT64_MAX;
+    uint64_t pause_ns = now_ns > since_ns ? (now_ns - since_ns) / LOOK_SHARE : 0;
+    pause_ns = pause_ns < LOOK_NS ? LOOK_NS : pause_ns > MOST_LOOK_NS ? MOST_LOOK_NS : pause_ns;
+    uint64_t when_ns = since_ns + (latency_ns > LOOK_NS ? latency_ns : LOOK_NS);
+    if (when_ns < looker(http)->begun_ns + pause_ns)
+        when_ns = looker(http)->begun_ns + pause_ns;
+    return when_ns > http->not_before_ns ? when_ns : http->not_before_ns;
 }
 
 static void abandon(strl__http *http, strl__http_transfer *transfer)
@@ -189,10 +215,48 @@ static void abandon(strl__http *http, strl__http_transfer *transfer)
     strl_mutex_unlock(&http->mutex);
 }
 
+static void look(strl__http *http)
+{
+    strl__http_transfer *transfer = looker(http);
+    uint64_t now_ns = strl_clock_ns();
+    strl_mutex_lock(&http->mutex);
+    bool is_due = now_ns >= next_look_ns(http, now_ns);
+    strl_mutex_unlock(&http->mutex);
+    if (!is_due)
+        return;
+    if (transfer->active)
+        abandon(http, transfer); /* that one was sent to a server that was silent */
+    strl_mutex_lock(&http->mutex);
+    transfer->looking = transfer->active = true;
+    transfer->begin = 0;
+    transfer->end = 1;
+    http->stats.requests++;
+    strl_mutex_unlock(&http->mutex);
+    make_conditional(http);
+    if (!strl__http_transfer_start(transfer))
+        strl__http_transfer_end(transfer, CURLE_OUT_OF_MEMORY);
+}
+
+/* ---- ending */
+
+/* Whether nobody wants the rest of it. */
+static bool is_abandoned(strl__http *http, const strl__http_transfer *transfer)
+{
+    strl_mutex_lock(&http->mutex);
+    size_t i = 0;
+    while (i < http->read_count && http->reads[i]->transfer != transfer)
+        i++;
+    bool abandoned = i == http->read_count && transfer->received < transfer->end - transfer->begin;
+    if (transfer->looking)
+        abandoned = silent_since(http) == UINT64_MAX;
+    strl_mutex_unlock(&http->mutex);
+    return abandoned;
+}
+
 static void check_all(strl__http *http)
 {
     uint64_t now_ns = strl_clock_ns();
-    for (uint32_t i = 0; i < http->desc.connections; i++) {
+    for (uint32_t i = 0; i <= http->desc.connections; i++) {
         strl__http_transfer *transfer = &http->transfers[i];
         if (!transfer->active)
             continue;
@@ -227,20 +291,15 @@ static bool end_finished(strl__http *http)
 
 /* ---- the thread */
 
-static void sooner(uint64_t *when_ns, uint64_t other_ns)
-{
-    if (other_ns < *when_ns)
-        *when_ns = other_ns;
-}
-
 /* How long there is nothing to do, if nothing comes. */
 static int sleep_ms(strl__http *http)
 {
     uint64_t now_ns = strl_clock_ns(), when_ns = now_ns + IDLE_NS;
     strl_mutex_lock(&http->mutex);
-    for (uint32_t i = 0; i < http->desc.connections; i++)
+    for (uint32_t i = 0; i <= http->desc.connections; i++)
         if (http->transfers[i].active)
             sooner(&when_ns, strl__http_transfer_deadline(&http->transfers[i]));
+    sooner(&when_ns, next_look_ns(http, now_ns));
     for (size_t i = 0; i < http->read_count; i++) {
         const strl__http_read *read = http->reads[i];
         uint64_t due_ns = read->not_before_ns > http->not_before_ns ? read->not_before_ns : http->not_before_ns;
@@ -266,11 +325,12 @@ void strl__http_network_run(void *context)
         int running;
         check_all(http);
         start_all(http);
+        look(http);
         curl_multi_perform(http->multi, &running);
         if (!end_finished(http))
             curl_multi_poll(http->multi, NULL, 0, sleep_ms(http), NULL);
     }
-    for (uint32_t i = 0; i < http->desc.connections; i++)
+    for (uint32_t i = 0; i <= http->desc.connections; i++)
         if (http->transfers[i].active)
             curl_multi_remove_handle(http->multi, http->transfers[i].easy);
 }

@@ -6,8 +6,10 @@
 #define LEAST_WINDOW 65536.0
 #define LEAST_ROOM 262144.0
 #define MOST_WINDOW 67108864.0
+#define LATENCY_OF_A_NETWORK 0.01
 #define LEAST_GAP 4096.0 /* less than a header and its answer weigh; pages of a container lie some bytes apart */
 #define MOST_GAP 262144.0
+#define UNKNOWN_GAP 49152.0 /* at the latency of a network worth a request on any but a slow link, as the first bytes will tell */
 #define SAMPLE_NS 50000000u /* of bytes coming make a measurement, or so many bytes: */
 #define SAMPLE_BYTES 1048576u
 #define SMOOTHING 0.3
@@ -88,6 +90,8 @@ uint64_t strl__pace_room(const strl__pace *pace, uint64_t waiting)
 
 uint64_t strl__pace_gap(const strl__pace *pace, unsigned connections)
 {
+    if (pace->bytes_per_s == 0)
+        return pace->latency_s > LATENCY_OF_A_NETWORK ? (uint64_t)UNKNOWN_GAP : (uint64_t)LEAST_GAP;
     return (uint64_t)clamp(bytes_of(pace, 0) / (connections > 0 ? connections : 1), LEAST_GAP, MOST_GAP);
 }
 

@@ -13,6 +13,9 @@
 #define MOST_RETRY_AFTER_S 30 /* a server that wants more time than that has failed */
 #define STALL_BYTES 1024u
 #define BUFFER_BYTES 65536L
+#define OVERTAKEN_NS 1000000000u /* of silence, while a later request is answered; twice that at the next attempt */
+#define MOST_DOUBLINGS 8u
+#define MOST_OUTAGE_WAITS 3u /* then one request a second is all that looks whether the server is back */
 
 /* ---- what comes */
 
@@ -119,6 +122,7 @@ static bool take_body(strl__http_transfer *transfer, const uint8_t *data, size_t
     else
         strl__pace_begin(&http->pace, now_ns);
     transfer->receiving = true;
+    http->heard_ns = transfer->looking ? http->heard_ns : now_ns;
     http->stats.bytes += size;
     spread(transfer, data, size);
     note_progress(transfer, now_ns);
@@ -169,9 +173,23 @@ static bool set_address(strl__http_transfer *transfer)
     curl_easy_setopt(easy, CURLOPT_MAXREDIRS, (long)STRL__HTTP_MOST_REDIRECTS);
     curl_easy_setopt(easy, CURLOPT_HTTP_VERSION, (long)CURL_HTTP_VERSION_2TLS);
     curl_easy_setopt(easy, CURLOPT_PIPEWAIT, http->secure ? 1L : 0L);
+    if (http->certificates)
+        curl_easy_setopt(easy, CURLOPT_CAINFO, http->certificates);
     curl_easy_setopt(easy, CURLOPT_CONNECTTIMEOUT_MS, (long)http->desc.connect_ms);
     curl_easy_setopt(easy, CURLOPT_NOSIGNAL, 1L);
     return code == CURLE_OK;
+}
+
+/* A connection may be lost without a word, and one of HTTP/2 outlives the requests that were given up on it. */
+static void set_connection(strl__http_transfer *transfer)
+{
+    const strl__http *http = transfer->http;
+    curl_easy_setopt(transfer->easy, CURLOPT_FRESH_CONNECT, transfer->looking ? 1L : 0L);
+#if LIBCURL_VERSION_NUM >= 0x075000
+    if (http->renewed_ns)
+        curl_easy_setopt(transfer->easy, CURLOPT_MAXLIFETIME_CONN,
+                         (long)((transfer->begun_ns - http->renewed_ns) / 1000000000u + 1));
+#endif
 }
 
 static bool set_request(strl__http_transfer *transfer)
@@ -197,13 +215,14 @@ static bool set_request(strl__http_transfer *transfer)
 bool strl__http_transfer_start(strl__http_transfer *transfer)
 {
     transfer->received = transfer->discarded = transfer->watched_bytes = 0;
-    transfer->judged = transfer->receiving = false;
+    transfer->judged = transfer->receiving = transfer->overtaken = false;
     transfer->verdict = STRL__HTTP_GOOD;
     transfer->error = (strl_error){0};
     transfer->fields = (strl__http_fields){0};
     transfer->reason[0] = 0;
-    transfer->watched_ns = strl_clock_ns();
+    transfer->watched_ns = transfer->begun_ns = strl_clock_ns();
     curl_easy_reset(transfer->easy);
+    set_connection(transfer);
     return set_address(transfer) && set_request(transfer) &&
            curl_multi_add_handle(transfer->http->multi, transfer->easy) == CURLM_OK;
 }
@@ -215,20 +234,48 @@ static uint64_t stall_ns(const strl__http_transfer *transfer)
     return (uint64_t)transfer->http->desc.stall_ms * 1000000u;
 }
 
+/* Mutex held. How long it may be silent while a later request is answered: the last attempt has all the time there is, since
+ * a server may be slow with these bytes alone. */
+static uint64_t patience_ns(const strl__http_transfer *transfer)
+{
+    const strl__http *http = transfer->http;
+    uint64_t patience = (uint64_t)(4e9 * http->pace.latency_s);
+    uint32_t failed = 0;
+    for (size_t i = 0; i < http->read_count; i++)
+        if (http->reads[i]->transfer == transfer && http->reads[i]->attempts > failed)
+            failed = http->reads[i]->attempts;
+    if (failed + 1 >= http->desc.attempts)
+        return stall_ns(transfer);
+    patience = patience > OVERTAKEN_NS ? patience : OVERTAKEN_NS;
+    patience <<= failed < MOST_DOUBLINGS ? failed : MOST_DOUBLINGS;
+    return patience < stall_ns(transfer) ? patience : stall_ns(transfer);
+}
+
 uint64_t strl__http_transfer_deadline(const strl__http_transfer *transfer)
 {
-    return transfer->watched_ns + stall_ns(transfer);
+    bool overtaken = transfer->http->answered_ns > transfer->watched_ns;
+    return transfer->watched_ns + (overtaken ? patience_ns(transfer) : stall_ns(transfer));
 }
 
 bool strl__http_transfer_stalled(strl__http_transfer *transfer, uint64_t now_ns)
 {
-    uint64_t come = transfer->received + transfer->discarded;
-    if (now_ns < strl__http_transfer_deadline(transfer))
+    strl__http *http = transfer->http;
+    uint64_t come = transfer->received + transfer->discarded, stalled_ns = transfer->watched_ns + stall_ns(transfer);
+    strl_mutex_lock(&http->mutex);
+    bool ends = now_ns >= strl__http_transfer_deadline(transfer);
+    strl_mutex_unlock(&http->mutex);
+    if (!ends)
         return false;
     transfer->verdict = STRL__HTTP_AGAIN;
-    strl__fail(&transfer->error, STRL_ERR_NETWORK,
-               "the server stalled: %" PRIu64 " bytes came in %" PRIu32 " ms, expected %u at least",
-               come - transfer->watched_bytes, transfer->http->desc.stall_ms, STALL_BYTES);
+    transfer->overtaken = now_ns < stalled_ns;
+    if (transfer->overtaken) {
+        http->renewed_ns = http->answered_ns;
+        strl__fail(&transfer->error, STRL_ERR_NETWORK, "the answer stalled: a later request was answered before it");
+    } else {
+        strl__fail(&transfer->error, STRL_ERR_NETWORK,
+                   "the server stalled: %" PRIu64 " bytes came in %" PRIu32 " ms, expected %u at least",
+                   come - transfer->watched_bytes, http->desc.stall_ms, STALL_BYTES);
+    }
     return true;
 }
 
@@ -278,7 +325,11 @@ static void succeed(strl__http_transfer *transfer)
     curl_off_t sent = 0, began = 0;
     char *effective = NULL;
     long redirects = 0;
+    if (http->outages > 0)
+        http->not_before_ns = 0; /* it is over */
     http->outages = http->refusals = 0;
+    if (transfer->begun_ns > http->answered_ns)
+        http->answered_ns = transfer->begun_ns;
     if (curl_easy_getinfo(transfer->easy, CURLINFO_PRETRANSFER_TIME_T, &sent) == CURLE_OK &&
         curl_easy_getinfo(transfer->easy, CURLINFO_STARTTRANSFER_TIME_T, &began) == CURLE_OK && began > sent)
         strl__pace_add_latency(&http->pace, (uint64_t)(began - sent) * 1000u);
@@ -299,7 +350,8 @@ static void note_outage(strl__http_transfer *transfer, uint64_t now_ns)
     if (now_ns < http->not_before_ns)
         return;
     http->outages++;
-    http->not_before_ns = now_ns + strl__backoff_ns(base_ns, http->outages, strl__http_random(http));
+    unsigned waits = http->outages < MOST_OUTAGE_WAITS ? http->outages : MOST_OUTAGE_WAITS;
+    http->not_before_ns = now_ns + strl__backoff_ns(base_ns, waits, strl__http_random(http));
     for (size_t i = http->read_count; i-- > 0;)
         if (http->reads[i]->state == STRL__HTTP_WAITING)
             strl__http_read_again(http, http->reads[i], &transfer->error, now_ns);
@@ -386,10 +438,10 @@ static void fail(strl__http_transfer *transfer, CURLcode code)
     if (transfer->verdict == STRL__HTTP_AGAIN && reached)
         obey_retry_after(transfer, now_ns);
     strl__http_name_error(http, &transfer->error);
-    if (!reached)
-        note_outage(transfer, now_ns);
-    else
+    if (reached)
         http->outages = 0;
+    else if (!transfer->looking && !transfer->overtaken)
+        note_outage(transfer, now_ns);
     send_back(transfer, now_ns);
 }
 

@@ -39,6 +39,18 @@ strl_status strl_source_read(strl_source *source, uint64_t offset, void *data, s
     return status == STRL_OK ? source->klass->read(source, offset, data, size, err) : status;
 }
 
+strl_status strl_source_read_many(strl_source *source, const strl_source_span *spans, size_t count, strl_error *err)
+{
+    strl_status status = STRL_OK;
+    for (size_t i = 0; status == STRL_OK && i < count; i++)
+        status = check_range(source, spans[i].offset, spans[i].size, err);
+    if (status == STRL_OK && source->klass->read_many)
+        return source->klass->read_many(source, spans, count, err);
+    for (size_t i = 0; status == STRL_OK && i < count; i++)
+        status = source->klass->read(source, spans[i].offset, spans[i].data, spans[i].size, err);
+    return status;
+}
+
 uint64_t strl_source_room(strl_source *source)
 {
     return source->klass->room ? source->klass->room(source) : UINT64_MAX;

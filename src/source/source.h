@@ -18,6 +18,13 @@ typedef struct strl_source_result {
     strl_error error; /* where status is not STRL_OK */
 } strl_source_result;
 
+/* One of several ranges that are read together. */
+typedef struct strl_source_span {
+    uint64_t offset;
+    size_t size;
+    void *data; /* the caller's, of `size` bytes */
+} strl_source_span;
+
 /* Implementations fill this in as the first member of their own struct. */
 typedef struct strl_source_class {
     const char *kind; /* "file", "memory", "callback", "delayed", "http" */
@@ -27,6 +34,8 @@ typedef struct strl_source_class {
     void (*cancel)(strl_source *source, uint64_t token);
     strl_status (*read)(strl_source *source, uint64_t offset, void *data, size_t size, strl_error *err);
     void (*close)(strl_source *source);
+    /* NULL: one after the other. */
+    strl_status (*read_many)(strl_source *source, const strl_source_span *spans, size_t count, strl_error *err);
     /* Where bytes come over a network; all NULL elsewhere. */
     uint64_t (*room)(strl_source *source);
     bool (*get_network_stats)(const strl_source *source, strl_network_stats *stats);
@@ -50,6 +59,8 @@ bool strl_source_poll(strl_source *source, strl_source_result *result);
 void strl_source_cancel(strl_source *source, uint64_t token);
 /* Reads and waits: for opening a container and for tools, never for a frame. */
 strl_status strl_source_read(strl_source *source, uint64_t offset, void *data, size_t size, strl_error *err);
+/* The same of several ranges, which a network brings in a few round trips. The failure is that of the first of them that failed. */
+strl_status strl_source_read_many(strl_source *source, const strl_source_span *spans, size_t count, strl_error *err);
 /* How many bytes may be asked for now so that they come soon, and that what is more urgent a moment later does not have
  * to wait behind them: follows bandwidth and latency. UINT64_MAX where there is nothing to wait for. What is submitted
  * beyond it is served all the same. */

@@ -87,12 +87,12 @@ static bool is_foreign(const strl__node *parent, const strl__node *child)
 
 static void note_foreign(strl_walk *walk, const strl__node *parent, strl__node *child)
 {
-    if (child->retry.frame > walk->frame)
+    if (strl__is_waiting(walk, &child->retry))
         return;
     strl_error error = {0};
     strl__fail(&error, STRL_ERR_FORMAT, "tree %u: node %u is not the child of node %u that it is said to be",
                parent->treelet->tree, id_of(child), id_of(parent));
-    strl__back_off(walk, &child->retry);
+    strl__back_off(walk, &child->retry, false);
     strl__note_fault(walk, &error);
 }
 
@@ -125,13 +125,13 @@ static strl__outlook find_child(strl__descent *c, strl__node *parent, uint32_t i
         return STRL__HERE;
     }
     if (*child) {
-        bool waiting = (*child)->residency == STRL__ABSENT && (*child)->retry.frame > walk->frame;
+        bool waiting = (*child)->residency == STRL__ABSENT && strl__is_waiting(walk, &(*child)->retry);
         if (waiting && (*child)->retry.failures < STRL__GIVE_UP_FAILURES)
             c->cut->waits = true;
         return waiting ? STRL__BACKING_OFF : STRL__HERE;
     }
     const strl__treelet *treelet = strl__treelets_find(&walk->treelets, parent->treelet->tree, id / STRL_TREELET_NODES);
-    if (treelet && treelet->residency == STRL__ABSENT && treelet->retry.frame > walk->frame) {
+    if (treelet && treelet->residency == STRL__ABSENT && strl__is_waiting(walk, &treelet->retry)) {
         c->cut->waits |= treelet->retry.failures < STRL__GIVE_UP_FAILURES;
         return STRL__BACKING_OFF;
     }

@@ -33,7 +33,7 @@ static double lattice_step(const strl_walk *walk)
     return longest > 0 ? longest / LATTICE : 1;
 }
 
-static double side_px(double allowed_px, unsigned size)
+double strl__far_px(double allowed_px, unsigned size)
 {
     return fmin(size ? ldexp(1, (int)size) : fmax(1, allowed_px), STRL__MOST_POINT_PX);
 }
@@ -90,23 +90,46 @@ static void find_sight(const strl_view *view, const double place[3], double sigh
         sight[k] = view->orthographic ? view->forward[k] : place[k] - view->eye[k];
 }
 
-strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far, double px, bool is_missing,
-                           strl_error *err)
+strl_vertex *strl__far_points_add(strl__far_points *points, bool labels, uint32_t own_part)
 {
-    double least, largest, place[3], sight[3], step = lattice_step(walk), depth = find_place(cut->view, box, is_missing, place);
+    if (!strl__grow(&points->items, &points->capacity, points->count + 1, sizeof *points->items) ||
+        (labels && !strl__grow(&points->labels, &points->label_capacity, points->count + 1, sizeof *points->labels)))
+        return NULL;
+    if (labels)
+        points->labels[points->count] = (strl_vertex_label){own_part - 1, STRL_NONE, {0, 0}}; /* of none: more than any count */
+    return &points->items[points->count++];
+}
+
+void strl__far_points_deinit(strl__far_points *points)
+{
+    strl__free(points->items);
+    strl__free(points->labels);
+    *points = (strl__far_points){0};
+}
+
+void strl__far_place(const strl_walk *walk, const double world[3], int32_t position[3])
+{
+    double step = lattice_step(walk);
+    for (int k = 0; k < 3; k++)
+        position[k] = (int32_t)lrint(fmin(fmax((world[k] - walk->bounds[k]) / step, 0), LATTICE));
+}
+
+strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far, double px, bool is_missing,
+                           uint32_t own_part, strl_error *err)
+{
+    double least, largest, place[3], sight[3], depth = find_place(cut->view, box, is_missing, place);
     if (!(px > 0) || !(depth > 0) || !(far->area > 0)) /* not in the image, or nothing */
         return STRL_OK;
     double scale = cut->view->focal_px / (cut->view->orthographic ? 1 : depth);
     unsigned size = is_missing ? size_of(diagonal(box) * scale) : 0;
-    double side = side_px(cut->allowed_px, size);
+    double side = strl__far_px(cut->allowed_px, size);
     strl__far_points *points = &walk->far[size];
-    if (!strl__grow(&points->items, &points->capacity, points->count + 1, sizeof *points->items))
+    strl_vertex *point = strl__far_points_add(points, walk->labels, own_part);
+    if (!point)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu splats", points->count);
-    strl_vertex *point = &points->items[points->count++];
     find_sight(cut->view, place, sight);
     double opacity = opacity_of(far, sight, (double)far->area * scale * scale / (side * side));
-    for (int k = 0; k < 3; k++)
-        point->position[k] = (int32_t)lrint(fmin(fmax((place[k] - walk->bounds[k]) / step, 0), LATTICE));
+    strl__far_place(walk, place, point->position);
     for (int k = 0; k < 2; k++)
         point->normal[k] = (uint16_t)(far->normal[k] | (k == 0 ? far->spread << STRL_SPREAD_SHIFT : 0));
     for (unsigned k = 0; k < 3; k++)
@@ -120,10 +143,10 @@ strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box
 }
 
 /* Without placement, node or level: they stand for many. */
-strl_draw_item strl__far_item(const strl_walk *walk, unsigned size)
+strl_draw_item strl__far_item(const strl_walk *walk, double point_px, double box_px)
 {
-    strl_draw_item item = {.placement = STRL_NONE, .node = STRL_NONE, .step = lattice_step(walk), .error_px = (float)walk->far[size].px,
-                           .point_px = (float)side_px(walk->stats.allowed_error_px, size)};
+    strl_draw_item item = {.placement = STRL_NONE, .node = STRL_NONE, .step = lattice_step(walk), .error_px = (float)box_px,
+                           .point_px = (float)fmin(fmax(point_px, 1), STRL__MOST_POINT_PX)};
     for (int k = 0; k < 3; k++) {
         item.box_max[k] = (int64_t)LATTICE;
         item.origin[k] = walk->bounds[k];

@@ -33,7 +33,10 @@ typedef enum strl__residency { STRL__ABSENT, STRL__PENDING, STRL__RESIDENT } str
 /* When something that failed may be asked for again. */
 typedef struct strl__retry {
     uint32_t failures; /* in a row */
-    uint64_t frame;    /* not before this frame */
+    uint64_t frame;    /* not before this frame, */
+    bool is_unread;    /* unless it was the source that failed, and it has come back: */
+    uint64_t returns;  /* the walk's, when it failed */
+    bool was_early;    /* it was asked for before that frame; once for each wait */
 } strl__retry;
 
 /* A decoded node: one block of at most strl__node_bytes, which `vertices` begins. indices[k]
@@ -147,10 +150,16 @@ typedef struct strl__walk_tree {
 /* Points of one size, for what is not drawn itself. */
 typedef struct strl__far_points {
     strl_vertex *items;
-    size_t count, capacity;
+    strl_vertex_label *labels; /* [count], of the placements' own parts; NULL where the walk keeps none */
+    size_t count, capacity, label_capacity;
     double px; /* the largest box that one of them stands for, in pixels */
 } strl__far_points;
 
+/* Of splats: shares of the allowed size, a cell being as a rule half as large as the one above; then those that close holes,
+ * STRL__MOST_POINT_PX and halves of it, two for each. */
+#define STRL__POINT_SHARES 4u
+#define STRL__MISSING_SIZES 8u
+#define STRL__POINT_SIZES (STRL__POINT_SHARES + STRL__MISSING_SIZES)
 #define STRL__FAR_SIZES 7u /* 0: the size of the allowed error; k: 2^k pixels, for runs that are not there yet */
 
 /* A page's bytes, shared by the decode jobs of its nodes. */
@@ -336,6 +345,9 @@ struct strl_walk {
 
     strl__request requests[STRL__MAX_REQUESTS];
     uint32_t requests_in_flight, requests_pending;
+    bool is_away, is_looking; /* the source's last answer was a failure; in this frame one thing that waits may be asked for */
+    uint64_t away_ns, look_ns; /* since when; when to look next */
+    uint64_t returns;          /* how often it came back */
     uint64_t room; /* bytes that the source still has room for in this frame */
     strl__job **jobs; /* owned, in order of submission */
     size_t job_count, job_capacity;
@@ -357,6 +369,7 @@ struct strl_walk {
     size_t point_count, point_capacity;
     float scattered[256]; /* of a splat's coverage: 0 = the faces are a wall, 1 = there is nearly none */
     strl__far_points far[STRL__FAR_SIZES]; /* of the frame */
+    strl__far_points merged[STRL__POINT_SIZES]; /* splats of placements that show few, of the frame */
     double far_near, far_far;              /* depths of their boxes; far_far 0: there is none */
     uint16_t *numbers; /* 0, 1, 2, ...; NULL where there was no splat yet */
     strl_camera camera; /* of the last frame */
@@ -412,10 +425,18 @@ void strl__run_evict(strl_walk *walk, strl__run *run);
 /* far.c */
 /* Whether the box projects to at most the allowed error. *px: to how much. */
 bool strl__is_far(const strl__cut *cut, const strl_box *box, double *px);
-/* A point for what the box holds, which projects to px; as large as the box where it is not there yet. */
+/* A point for what the box holds, which projects to px; as large as the box where it is not there yet. own_part: of the placement that it
+ * is, as of strl_draw_item; 0 = none or several. */
 strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far, double px, bool is_missing,
-                           strl_error *err);
-strl_draw_item strl__far_item(const strl_walk *walk, unsigned size); /* what all items of far points of a size have in common */
+                           uint32_t own_part, strl_error *err);
+/* Room for one more, its label set; NULL: no memory. */
+strl_vertex *strl__far_points_add(strl__far_points *points, bool labels, uint32_t own_part);
+void strl__far_points_deinit(strl__far_points *points);
+/* A place in the world on the lattice of these points. */
+void strl__far_place(const strl_walk *walk, const double world[3], int32_t position[3]);
+double strl__far_px(double allowed_px, unsigned size);
+/* All of an item of such points but themselves; what they stand for is at most box_px large. */
+strl_draw_item strl__far_item(const strl_walk *walk, double point_px, double box_px);
 
 /* treelets.c */
 strl__treelet *strl__treelets_find(const strl__treelets *treelets, uint32_t tree, uint32_t index);
@@ -441,8 +462,15 @@ void strl__node_reserve(strl_walk *walk, strl__node *node); /* absent -> pending
 void strl__node_release(strl_walk *walk, strl__node *node); /* pending -> absent */
 void strl__node_install(strl_walk *walk, strl__node *node, const strl__mesh *mesh); /* pending -> resident */
 void strl__node_touch(strl_walk *walk, strl__node *node);                           /* now the youngest */
-void strl__back_off(const strl_walk *walk, strl__retry *retry);
+
+/* faults.c */
 void strl__note_fault(strl_walk *walk, const strl_error *error);
+void strl__back_off(const strl_walk *walk, strl__retry *retry, bool is_unread);
+bool strl__is_waiting(const strl_walk *walk, const strl__retry *retry); /* it has failed and is not to be asked for yet */
+void strl__retry_asked(const strl_walk *walk, strl__retry *retry);
+void strl__source_answers(strl_walk *walk);
+void strl__source_fails(strl_walk *walk);
+void strl__begin_look(strl_walk *walk); /* once a frame, after the answers */
 
 /* requests.c */
 void strl__requests_receive(strl_walk *walk);
@@ -467,7 +495,7 @@ void strl__refine_front(strl_walk *walk);
 strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const strl_brick_head *head, bool labels,
                                strl__mesh *mesh, strl_error *err);
 
-/* splats.c: behind the other items of the list. */
+/* points.c: behind the other items of the list. */
 strl_status strl__draw_splats(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err);
 
 /* draw.c */

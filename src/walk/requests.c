@@ -72,11 +72,8 @@ static void node_done(strl_walk *walk, strl__request *request)
         free_slot(walk, request);
 }
 
-/* cancelled: not its fault. */
-static void drop_node(strl_walk *walk, strl__request *request, strl__node *node, bool cancelled)
+static void drop_node(strl_walk *walk, strl__request *request, strl__node *node)
 {
-    if (!cancelled)
-        strl__back_off(walk, &node->retry);
     strl__node_release(walk, node);
     node_done(walk, request);
 }
@@ -84,7 +81,8 @@ static void drop_node(strl_walk *walk, strl__request *request, strl__node *node,
 static void node_failed(strl_walk *walk, strl__request *request, strl__node *node, const strl_error *error)
 {
     strl__note_fault(walk, error);
-    drop_node(walk, request, node, false);
+    strl__back_off(walk, &node->retry, false);
+    drop_node(walk, request, node);
 }
 
 /* Hands the job over as soon as the node is there by which it is decoded. */
@@ -105,7 +103,7 @@ static bool advance_waiting(strl_walk *walk, strl__job *job)
     strl_error error = {0};
     strl__request *request = job->node->request;
     if (job->node->decoded_by->residency == STRL__ABSENT)
-        drop_node(walk, request, job->node, true); /* what it waits for has failed, and will be asked for again first */
+        drop_node(walk, request, job->node); /* what it waits for has failed, and will be asked for again first */
     else if (submit_job(walk, job, &error) != STRL_OK)
         node_failed(walk, request, job->node, &error);
     else
@@ -184,34 +182,31 @@ static strl_status start_job(strl_walk *walk, strl__node *node, strl__page *page
     return STRL_OK;
 }
 
-/* One fault, however many nodes. */
-static void page_failed(strl_walk *walk, strl__request *request, const strl_error *error)
+/* One fault, however many nodes. is_unread: the source failed; else what it brought is wrong. */
+static void request_failed(strl_walk *walk, strl__request *request, const strl_error *error, bool is_unread)
 {
-    bool cancelled = error->status == STRL_ERR_CANCELLED;
-    if (!cancelled)
+    bool is_fault = error->status != STRL_ERR_CANCELLED;
+    if (is_fault)
         strl__note_fault(walk, error);
-    for (uint32_t i = request->node_count; i-- > 0;)
-        drop_node(walk, request, request->nodes[i], cancelled);
-}
-
-static void treelet_failed(strl_walk *walk, strl__request *request, const strl_error *error)
-{
-    request->treelet->residency = STRL__ABSENT;
-    if (error->status != STRL_ERR_CANCELLED) {
-        strl__back_off(walk, &request->treelet->retry);
-        strl__note_fault(walk, error);
+    if (request->treelet) {
+        request->treelet->residency = STRL__ABSENT;
+        if (is_fault)
+            strl__back_off(walk, &request->treelet->retry, is_unread);
+        free_slot(walk, request);
+        return;
     }
-    free_slot(walk, request);
-}
-
-static void run_failed(strl_walk *walk, strl__request *request, const strl_error *error)
-{
-    if (error->status != STRL_ERR_CANCELLED) {
-        strl__back_off(walk, &request->run->retry);
-        strl__note_fault(walk, error);
+    if (request->run) {
+        if (is_fault)
+            strl__back_off(walk, &request->run->retry, is_unread);
+        strl__run_release(walk, request->run);
+        free_slot(walk, request);
+        return;
     }
-    strl__run_release(walk, request->run);
-    free_slot(walk, request);
+    for (uint32_t i = request->node_count; i-- > 0;) {
+        if (is_fault)
+            strl__back_off(walk, &request->nodes[i]->retry, is_unread);
+        drop_node(walk, request, request->nodes[i]);
+    }
 }
 
 static void receive_page(strl_walk *walk, strl__request *request, strl_source_result *result)
@@ -226,7 +221,7 @@ static void receive_page(strl_walk *walk, strl__request *request, strl_source_re
     if (status == STRL_OK && !(page = strl__alloc_zero(1, sizeof *page)))
         status = strl__fail(&error, STRL_ERR_MEMORY, "no memory for a page");
     if (status != STRL_OK) {
-        page_failed(walk, request, &error);
+        request_failed(walk, request, &error, false);
         return;
     }
     page->data = result->data, page->size = result->size;
@@ -250,7 +245,7 @@ static void receive_treelet(strl_walk *walk, strl__request *request, const strl_
         return;
     }
     strl_source_doubt(walk->source, request->treelet->ref.offset, request->treelet->ref.bytes);
-    treelet_failed(walk, request, &error);
+    request_failed(walk, request, &error, false);
 }
 
 static void receive_run(strl_walk *walk, strl__request *request, const strl_source_result *result)
@@ -261,19 +256,19 @@ static void receive_run(strl_walk *walk, strl__request *request, const strl_sour
         return;
     }
     strl_source_doubt(walk->source, request->run->facts.page.offset, request->run->facts.page.bytes);
-    run_failed(walk, request, &error);
+    request_failed(walk, request, &error, false);
 }
 
 static void receive(strl_walk *walk, strl__request *request, strl_source_result *result)
 {
     result->error.status = result->status;
     walk->stats.bytes_read += result->status == STRL_OK ? result->size : 0;
-    if (result->status != STRL_OK && request->treelet)
-        treelet_failed(walk, request, &result->error);
-    else if (result->status != STRL_OK && request->run)
-        run_failed(walk, request, &result->error);
-    else if (result->status != STRL_OK)
-        page_failed(walk, request, &result->error);
+    if (result->status == STRL_OK)
+        strl__source_answers(walk);
+    else if (result->status != STRL_ERR_CANCELLED)
+        strl__source_fails(walk);
+    if (result->status != STRL_OK)
+        request_failed(walk, request, &result->error, true);
     else if (request->treelet)
         receive_treelet(walk, request, result);
     else if (request->run)
@@ -292,6 +287,7 @@ void strl__requests_receive(strl_walk *walk)
             receive(walk, request, &result);
         strl__free(result.data);
     }
+    strl__begin_look(walk);
 }
 
 /* ---- submission */
@@ -358,6 +354,7 @@ static void submit_page(strl_walk *walk, strl__request *request, strl__node *nod
     request->offset = page->offset;
     request->nodes[request->node_count++] = node;
     strl__node_reserve(walk, node);
+    strl__retry_asked(walk, &node->retry);
     node->request = request;
     if (submit(walk, request, page->offset, page->bytes, urgency, &error) != STRL_OK)
         node_failed(walk, request, node, &error);
@@ -384,6 +381,7 @@ static bool ask_for_node(strl_walk *walk, const strl__candidate *candidate, uint
         return true;
     }
     strl__node_reserve(walk, node);
+    strl__retry_asked(walk, &node->retry);
     node->request = request;
     request->nodes[request->node_count++] = node;
     request->touched_frame = walk->frame;
@@ -394,7 +392,7 @@ static void ask_for_treelet(strl_walk *walk, const strl__candidate *candidate, u
 {
     const strl__treelet *parent = candidate->node->treelet;
     strl__treelet *treelet = strl__treelets_find(&walk->treelets, parent->tree, candidate->treelet);
-    if ((treelet && (treelet->residency != STRL__ABSENT || treelet->retry.frame > walk->frame)) ||
+    if ((treelet && (treelet->residency != STRL__ABSENT || strl__is_waiting(walk, &treelet->retry))) ||
         !has_slot(walk, in_flight))
         return;
     /* Decoding has checked that a treelet names those of all children of its nodes. */
@@ -407,8 +405,9 @@ static void ask_for_treelet(strl_walk *walk, const strl__candidate *candidate, u
     strl__request *request = take_slot(walk);
     request->treelet = treelet;
     treelet->residency = STRL__PENDING;
+    strl__retry_asked(walk, &treelet->retry);
     if (submit(walk, request, ref->offset, ref->bytes, candidate->urgency, &error) != STRL_OK)
-        treelet_failed(walk, request, &error);
+        request_failed(walk, request, &error, false);
 }
 
 /* As ask_for_node. */
@@ -424,8 +423,9 @@ static bool ask_for_run(strl_walk *walk, const strl__candidate *candidate, uint3
     strl__request *request = take_slot(walk);
     request->run = run;
     strl__run_reserve(walk, run, request);
+    strl__retry_asked(walk, &run->retry);
     if (submit(walk, request, page->offset, page->bytes, candidate->urgency, &error) != STRL_OK)
-        run_failed(walk, request, &error);
+        request_failed(walk, request, &error, false);
     return true;
 }
 
@@ -459,11 +459,12 @@ static void forget_stale(strl_walk *walk)
 
 void strl__requests_submit(strl_walk *walk)
 {
+    uint32_t in_flight = walk->is_looking ? 1 : walk->requests_in_flight;
     walk->room = strl_source_room(walk->source);
-    ask_for_all(walk, &walk->missing, walk->requests_in_flight, walk->frame + 1);
+    ask_for_all(walk, &walk->missing, in_flight, walk->frame + 1);
     uint64_t idle_since = walk->frame > SPARE_FRAMES ? walk->frame - SPARE_FRAMES : 0;
     ask_for_all(walk, &walk->along, 0, idle_since); /* no slot is theirs */
     if (walk->missing.count == 0)
-        ask_for_all(walk, &walk->prefetch, (walk->requests_in_flight + 1) / 2, idle_since);
+        ask_for_all(walk, &walk->prefetch, (in_flight + 1) / 2, idle_since);
     forget_stale(walk);
 }

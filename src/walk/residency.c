@@ -2,10 +2,6 @@
  * way. */
 #include "walk/internal.h"
 
-#include <string.h>
-
-#define RETRY_FRAMES 8u /* doubles with each failure in a row */
-#define RETRY_DOUBLINGS 7u
 /* Ids are breadth first, so the children of 128 nodes fill at most this many treelets. */
 #define MAX_CHILD_TREELETS (STRL_NODE_MAX_CHILDREN + 1)
 
@@ -191,21 +187,4 @@ strl__node *strl__node_find(strl_walk *walk, uint32_t tree, uint32_t id)
     treelet->touched_frame = walk->frame;
     uint32_t i = id % STRL_TREELET_NODES;
     return treelet->residency == STRL__RESIDENT && i < treelet->data.node_count ? &treelet->nodes[i] : NULL;
-}
-
-/* ---- faults */
-
-void strl__back_off(const strl_walk *walk, strl__retry *retry)
-{
-    uint32_t doublings = retry->failures < RETRY_DOUBLINGS ? retry->failures : RETRY_DOUBLINGS;
-    retry->failures++;
-    retry->frame = walk->frame + ((uint64_t)RETRY_FRAMES << doublings);
-}
-
-void strl__note_fault(strl_walk *walk, const strl_error *error)
-{
-    size_t length = strnlen(error->message, sizeof walk->stats.last_fault - 1);
-    walk->stats.faults++;
-    memcpy(walk->stats.last_fault, error->message, length);
-    walk->stats.last_fault[length] = 0;
 }

@@ -1,29 +1,14 @@
-/* The splats of a frame: of all bricks whose cells are small enough, merged into items of points, a few for each placement, and of
- * placements that are too far away (far.c). Where what is below a brick has not arrived, coarser ones close the hole. */
-#include "walk/internal.h"
+/* The points of one placement in a frame: the splats of its bricks whose cells are small enough, and coarser ones that close the holes where
+ * what is below a brick has not arrived. */
+#include "walk/points.h"
 
 #include <math.h>
 #include <string.h>
 
 #include "geometry/octahedral.h"
 
-#define SHARES 4u        /* sizes of splats, parts of the allowed one: a cell is as a rule half as large as the one above */
-#define MISSING_SIZES 8u /* of those that close holes: STRL__MOST_POINT_PX and halves of it, two for each */
-#define SIZES (SHARES + MISSING_SIZES)
-#define MOST_POINTS 65535u /* of an item: indices have 16 bits */
 #define SQUARE_OF_CUBE 1.3160741 /* a cube of side 1 covers at most as much as a square of this side */
 #define MOST_PARTS 32.0 /* along a side of a cell that is larger than any point */
-
-/* Points of one placement, counted or made. */
-typedef struct sink {
-    strl_walk *walk;
-    const strl_view *view;
-    const strl_tree *tree; /* points are relative to the least corner of its box, in which all lie */
-    float sight[3];        /* direction to the brick in the tree's space, of length 1 */
-    double unit_share;     /* of a point, what the side of a cell of one lattice unit takes */
-    bool counts;           /* they are counted alone */
-    size_t at[SIZES];      /* how many so far, or where the next goes */
-} sink;
 
 /* ---- points */
 
@@ -35,7 +20,7 @@ static uint16_t spread_of(const strl_splat *splat)
     return (uint16_t)((twice < 255 ? twice : 255) * STRL_SPREAD_MOST / 255);
 }
 
-static void place_point(const sink *self, const strl_node *record, const int32_t place[3], strl_vertex *point)
+static void place_point(const strl__points *self, const strl_node *record, const int32_t place[3], strl_vertex *point)
 {
     for (int k = 0; k < 3; k++)
         point->position[k] = (int32_t)(uint32_t)((uint64_t)record->anchor[k] - (uint64_t)self->tree->box_min[k] + (uint64_t)(int64_t)place[k]);
@@ -52,7 +37,7 @@ static float along_line(const strl_splat *splat, const float direction[3])
 
 /* Points that are larger than their cells overlap: as many as lie in one pixel hide together what a cell hides, so that a wall stays one,
  * from wherever it is looked at. Of scattered faces that lie parallel less is seen from the side, the more scattered the more. */
-static float opacity_of(const sink *self, const strl_splat *splat)
+static float opacity_of(const strl__points *self, const strl_splat *splat)
 {
     if (splat->coverage == 255)
         return 1;
@@ -62,7 +47,7 @@ static float opacity_of(const sink *self, const strl_splat *splat)
     return 1 - powf(1 - hidden, (float)fmin(1, ldexp(self->unit_share, 2 * splat->side)));
 }
 
-static strl_vertex point_of_splat(const sink *self, const strl_node *record, const strl_splat *splat)
+static strl_vertex point_of_splat(const strl__points *self, const strl_node *record, const strl_splat *splat)
 {
     strl_vertex point;
     place_point(self, record, splat->centre, &point);
@@ -75,37 +60,35 @@ static strl_vertex point_of_splat(const sink *self, const strl_node *record, con
     return point;
 }
 
-static void take_splats(sink *self, const strl_node *record, const strl_splat *splats, uint32_t count, unsigned size)
+static void take_splats(strl__points *self, const strl_node *record, const strl_splat *splats, uint32_t count, unsigned size)
 {
-    for (uint32_t i = 0; i < count && !self->counts; i++)
-        self->walk->points[self->at[size] + i] = point_of_splat(self, record, &splats[i]);
+    for (uint32_t i = 0; i < count && self->purpose != STRL__POINTS_COUNT; i++) {
+        const strl_vertex point = point_of_splat(self, record, &splats[i]);
+        if (self->purpose == STRL__POINTS_MERGE)
+            strl__points_merge(self, size, &point);
+        else
+            self->walk->points[self->at[size] + i] = point;
+    }
     self->at[size] += count;
 }
 
 /* ---- what is there */
 
-/* The least size that covers the cells of the brick's splats: 0 = a part of the allowed one, to SHARES - 1 = all of it. Where that is a
+/* The least size that covers the cells of the brick's splats: 0 = a part of the allowed one, to STRL__POINT_SHARES - 1 = all of it. Where that is a
  * pixel there is but one. */
 static unsigned share_of(const strl_walk *walk, const strl__active *active)
 {
     const strl__mesh *mesh = &active->node->mesh;
     double allowed = walk->stats.allowed_error_px;
     if (!(walk->splat_ratio * allowed > 1))
-        return SHARES - 1;
+        return STRL__POINT_SHARES - 1;
     double size = (double)mesh->errors[active->state] * active->placed->length_scale;
-    double parts = ceil(SHARES * strl_sight_error_px(&active->sight, size) / walk->splat_ratio / allowed);
-    return parts >= SHARES ? SHARES - 1 : parts >= 1 ? (unsigned)parts - 1 : 0;
-}
-
-static double px_of_size(const strl_walk *walk, unsigned size)
-{
-    if (size >= SHARES)
-        return STRL__MOST_POINT_PX * exp2(-0.5 * (size - SHARES));
-    return walk->splat_ratio * walk->stats.allowed_error_px * (size + 1) / SHARES;
+    double parts = ceil(STRL__POINT_SHARES * strl_sight_error_px(&active->sight, size) / walk->splat_ratio / allowed);
+    return parts >= STRL__POINT_SHARES ? STRL__POINT_SHARES - 1 : parts >= 1 ? (unsigned)parts - 1 : 0;
 }
 
 /* As of a placement that turns and scales alike along all axes; of others near enough for looks. */
-static void find_sight(sink *self, const strl__active *active)
+static void find_sight(strl__points *self, const strl__active *active)
 {
     const double *transform = active->placed->transform;
     double way[3], turned[3], square = 0;
@@ -120,7 +103,7 @@ static void find_sight(sink *self, const strl__active *active)
 }
 
 /* Of the state that the brick is drawn in. */
-static void take_shown(sink *self, const strl__active *active)
+static void take_shown(strl__points *self, const strl__active *active)
 {
     const strl__mesh *mesh = &active->node->mesh;
     if (active->state >= mesh->step_count)
@@ -129,7 +112,7 @@ static void take_shown(sink *self, const strl__active *active)
     if (first == end)
         return;
     unsigned size = share_of(self->walk, active);
-    double unit = strl_sight_error_px(&active->sight, active->placed->length_scale) / fmax(1, px_of_size(self->walk, size));
+    double unit = strl_sight_error_px(&active->sight, active->placed->length_scale) / fmax(1, strl__points_px(self->walk, size));
     self->unit_share = unit * unit;
     find_sight(self, active);
     take_splats(self, active->node->record, mesh->splats + first, end - first, size);
@@ -158,8 +141,8 @@ static splat_run finest_splats(const strl__node *node)
 /* The least size that is not less than px, as far as there is one. */
 static unsigned missing_size(double px)
 {
-    double halves = px > 0 ? 2 * log2(STRL__MOST_POINT_PX / px) : MISSING_SIZES;
-    return SHARES + (halves <= 0 ? 0 : halves < MISSING_SIZES ? (unsigned)halves : MISSING_SIZES - 1);
+    double halves = px > 0 ? 2 * log2(STRL__MOST_POINT_PX / px) : STRL__MISSING_SIZES;
+    return STRL__POINT_SHARES + (halves <= 0 ? 0 : halves < STRL__MISSING_SIZES ? (unsigned)halves : STRL__MISSING_SIZES - 1);
 }
 
 static bool is_within(const strl_node *record, const strl_node *from, const strl_splat *splat)
@@ -173,7 +156,7 @@ static bool is_within(const strl_node *record, const strl_node *from, const strl
 }
 
 /* What the camera sees of the cell. */
-static strl_sight sight_of(const sink *self, const strl__active *active, const strl_node *record, const strl_splat *splat)
+static strl_sight sight_of(const strl__points *self, const strl__active *active, const strl_node *record, const strl_splat *splat)
 {
     int64_t least[3], most[3], half = ((int64_t)1 << splat->side) / 2;
     for (int k = 0; k < 3; k++) {
@@ -208,7 +191,7 @@ static void find_plane(const strl_splat *splat, float across[3], float up[3])
 }
 
 /* A cell larger than any point is covered by several, in that plane. */
-static void take_plane(sink *self, const strl_node *record, const strl_splat *splat, double px)
+static void take_plane(strl__points *self, const strl_node *record, const strl_splat *splat, double px)
 {
     const int parts = (int)fmin(ceil(px / STRL__MOST_POINT_PX), MOST_PARTS);
     const double side = ldexp(SQUARE_OF_CUBE, splat->side) / parts;
@@ -221,11 +204,11 @@ static void take_plane(sink *self, const strl_node *record, const strl_splat *sp
             double at = splat->centre[k] + x * (double)across[k] + y * (double)up[k], anchor = (double)record->anchor[k];
             part.centre[k] = (int32_t)lrint(fmin(fmax(at, (double)self->tree->box_min[k] - anchor), (double)self->tree->box_max[k] - anchor));
         }
-        take_splats(self, record, &part, 1, SHARES);
+        take_splats(self, record, &part, 1, STRL__POINT_SHARES);
     }
 }
 
-static void take_cell(sink *self, const strl__active *active, const strl_node *record, const strl_splat *splat)
+static void take_cell(strl__points *self, const strl__active *active, const strl_node *record, const strl_splat *splat)
 {
     const strl_sight sight = sight_of(self, active, record, splat);
     const double size = ldexp(SQUARE_OF_CUBE, splat->side) * active->placed->length_scale;
@@ -239,7 +222,7 @@ static void take_cell(sink *self, const strl__active *active, const strl_node *r
 }
 
 /* The finest splats of the brick, or those of the tree's preview that lie in it, where these are finer. */
-static void take_missing(sink *self, const strl__active *active)
+static void take_missing(strl__points *self, const strl__active *active)
 {
     const strl__node *node = active->node;
     self->unit_share = 1;
@@ -254,19 +237,7 @@ static void take_missing(sink *self, const strl__active *active)
             take_cell(self, active, run.record, &run.splats[i]);
 }
 
-/* ---- of a placement */
-
-/* Behind the front's items of the same placement. */
-static size_t end_of_placement(const strl__front *front, size_t first)
-{
-    size_t end = first + 1;
-    while (end < front->count && front->items[end].placement == front->items[first].placement)
-        end++;
-    return end;
-}
-
-/* The points of the front's items [first, end), which are of one placement. */
-static void take_all(sink *self, size_t first, size_t end)
+void strl__points_take(strl__points *self, size_t first, size_t end)
 {
     for (size_t i = first; i < end; i++) {
         const strl__active *active = &self->walk->front.items[i];
@@ -275,119 +246,4 @@ static void take_all(sink *self, size_t first, size_t end)
         take_shown(self, active);
         take_missing(self, active);
     }
-}
-
-static sink make_sink(strl_walk *walk, const strl_view *view, size_t first)
-{
-    return (sink){.walk = walk, .view = view, .tree = walk->trees[walk->front.items[first].placed->tree].tree, .counts = true};
-}
-
-static strl_status add_points(strl_walk *walk, const strl_view *view, size_t first, size_t end, strl_error *err)
-{
-    sink counted = make_sink(walk, view, first);
-    take_all(&counted, first, end);
-    sink made = counted;
-    size_t all = 0;
-    made.counts = false;
-    for (unsigned k = 0; k < SIZES; all += counted.at[k++])
-        made.at[k] = walk->point_count + all;
-    if (!strl__grow(&walk->points, &walk->point_capacity, walk->point_count + all, sizeof *walk->points))
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu splats", walk->point_count + all);
-    if (all)
-        take_all(&made, first, end);
-    walk->point_count += all;
-    return STRL_OK;
-}
-
-/* ---- items */
-
-static bool fill_numbers(strl_walk *walk)
-{
-    if (walk->numbers)
-        return true;
-    walk->numbers = strl__alloc(MOST_POINTS, sizeof *walk->numbers);
-    for (uint32_t i = 0; walk->numbers && i < MOST_POINTS; i++)
-        walk->numbers[i] = (uint16_t)i;
-    return walk->numbers != NULL;
-}
-
-/* `shape`: all of an item but its points. */
-static strl_status add_items(strl_walk *walk, const strl_draw_item *shape, const strl_vertex *points, size_t count, strl_draw_list *list,
-                             strl_error *err)
-{
-    for (size_t first = 0; first < count; first += MOST_POINTS) {
-        uint32_t part = count - first < MOST_POINTS ? (uint32_t)(count - first) : MOST_POINTS;
-        if (!strl__grow(&walk->items, &walk->item_capacity, (size_t)list->count + 1, sizeof *walk->items))
-            return strl__fail(err, STRL_ERR_MEMORY, "no memory for a draw list of %u items", list->count);
-        strl_draw_item *item = &walk->items[list->count++];
-        *item = *shape;
-        item->key = ++walk->loads;
-        item->visible = true;
-        item->vertices = points + first;
-        item->indices = walk->numbers;
-        item->vertex_count = item->index_count = item->draw_count = item->dirty_count = part;
-        walk->stats.splats += part;
-        walk->stats.max_error_px = fmaxf(walk->stats.max_error_px, item->error_px);
-    }
-    return STRL_OK;
-}
-
-/* Of points of one placement. */
-static strl_draw_item shape_of(const strl_walk *walk, const strl__active *active, double px)
-{
-    const strl__placement *placement = active->placed;
-    const strl_tree *tree = walk->trees[placement->tree].tree;
-    strl_draw_item item = {.placement = active->placement,
-                           .own_part = placement->own_part,
-                           .step = tree->step,
-                           .point_px = (float)fmin(fmax(px, 1), STRL__MOST_POINT_PX),
-                           .error_px = (float)px};
-    memcpy(item.anchor, tree->box_min, sizeof item.anchor);
-    memcpy(item.box_min, tree->box_min, sizeof item.box_min);
-    memcpy(item.box_max, tree->box_max, sizeof item.box_max);
-    memcpy(item.origin, tree->origin, sizeof item.origin);
-    memcpy(item.transform, placement->transform, sizeof item.transform);
-    return item;
-}
-
-/* Items are made when all points are there: the array has its place only then. */
-static strl_status list_splats(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err)
-{
-    const strl__front *front = &walk->front;
-    strl_status status = STRL_OK;
-    size_t at = 0;
-    for (size_t i = 0, next; i < front->count && !status; i = next) {
-        next = end_of_placement(front, i);
-        sink counted = make_sink(walk, view, i);
-        take_all(&counted, i, next);
-        for (unsigned k = 0; k < SIZES && !status; at += counted.at[k++]) {
-            const strl_draw_item shape = shape_of(walk, &front->items[i], px_of_size(walk, k));
-            status = add_items(walk, &shape, walk->points + at, counted.at[k], list, err);
-        }
-    }
-    return status;
-}
-
-strl_status strl__draw_splats(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err)
-{
-    strl_status status = STRL_OK;
-    walk->point_count = 0;
-    for (size_t i = 0, next; i < walk->front.count && !status; i = next) {
-        next = end_of_placement(&walk->front, i);
-        status = add_points(walk, view, i, next, err);
-    }
-    size_t points = walk->point_count;
-    for (unsigned size = 0; size < STRL__FAR_SIZES; size++)
-        points += walk->far[size].count;
-    if (status || points == 0)
-        return status;
-    if (!fill_numbers(walk))
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory for splats");
-    status = list_splats(walk, view, list, err);
-    for (unsigned size = 0; size < STRL__FAR_SIZES && !status; size++) {
-        const strl_draw_item far = strl__far_item(walk, size);
-        status = add_items(walk, &far, walk->far[size].items, walk->far[size].count, list, err);
-    }
-    list->items = walk->items;
-    return status;
 }

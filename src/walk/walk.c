@@ -10,53 +10,80 @@
 #define DEFAULT_MEMORY_BYTES ((uint64_t)512 << 20)
 #define DEFAULT_REQUESTS 16u
 #define DEFAULT_REMOTE_REQUESTS 64u /* the source says how many of them are of use now */
+#define MOST_ROOT_BYTES ((uint64_t)8 << 20) /* that are read together while a walk is opened */
 #define AHEAD_FRAMES 15           /* how far the eye's motion is carried on for prefetching */
 #define AHEAD_EVERY 4             /* frames between two looks ahead */
 
 /* ---- opening */
 
-/* Reads a range and waits. *data is the caller's. */
-static strl_status read_range(strl_walk *walk, uint64_t offset, size_t size, uint8_t **data, strl_error *err)
+/* What is read of several trees together. */
+typedef struct root_reads {
+    strl_source_span *spans; /* [tree_count], their data owned */
+    uint32_t *trees;         /* whose they are */
+    size_t count;
+    uint64_t bytes;
+} root_reads;
+
+typedef strl_status (*take_fn)(strl_walk *walk, uint32_t tree, const strl_source_span *span, strl_error *err);
+
+/* The container has bounded the size. */
+static strl_status add_read(root_reads *reads, uint32_t tree, uint64_t offset, uint32_t size, strl_error *err)
 {
-    *data = strl__alloc(size, 1); /* the container has bounded it */
-    if (!*data)
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a page of %zu bytes", size);
-    return strl_source_read(walk->source, offset, *data, size, err);
+    void *data = strl__alloc(size, 1);
+    if (!data)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a page of %" PRIu32 " bytes", size);
+    reads->trees[reads->count] = tree;
+    reads->spans[reads->count++] = (strl_source_span){offset, size, data};
+    reads->bytes += size;
+    return STRL_OK;
 }
 
-static strl_status load_root_records(strl_walk *walk, uint32_t tree, strl_error *err)
+static void drop_reads(root_reads *reads)
+{
+    while (reads->count > 0)
+        strl__free(reads->spans[--reads->count].data);
+    reads->bytes = 0;
+}
+
+/* Reads what was added, and waits. */
+static strl_status take_all(strl_walk *walk, root_reads *reads, take_fn take, strl_error *err)
+{
+    strl_status status = strl_source_read_many(walk->source, reads->spans, reads->count, err);
+    for (size_t i = 0; status == STRL_OK && i < reads->count; i++)
+        status = take(walk, reads->trees[i], &reads->spans[i], err);
+    drop_reads(reads);
+    return status;
+}
+
+static strl_status ask_for_records(strl_walk *walk, root_reads *reads, uint32_t tree, strl_error *err)
 {
     strl_treelet_ref ref;
-    uint8_t *data = NULL;
     strl_status status = strl_container_root_treelet(walk->container, tree, &ref, err);
     if (status != STRL_OK)
         return status;
-    strl__treelet *treelet = strl__treelet_reserve(walk, tree, 0, &ref);
-    if (!treelet)
+    if (!strl__treelet_reserve(walk, tree, 0, &ref))
         return strl__fail(err, STRL_ERR_MEMORY,
                           "the root records of tree %" PRIu32 " do not fit into the memory for walking, %" PRIu64
                           " bytes",
                           tree, walk->memory_bytes);
-    status = read_range(walk, ref.offset, ref.bytes, &data, err);
-    if (status == STRL_OK) {
-        status = strl__treelet_load(walk, treelet, data, ref.bytes, err);
-        if (status == STRL_ERR_FORMAT)
-            strl_source_doubt(walk->source, ref.offset, ref.bytes);
-    }
+    return add_read(reads, tree, ref.offset, ref.bytes, err);
+}
+
+static strl_status take_records(strl_walk *walk, uint32_t tree, const strl_source_span *span, strl_error *err)
+{
+    strl__treelet *treelet = strl__treelets_find(&walk->treelets, tree, 0);
+    strl_status status = strl__treelet_load(walk, treelet, span->data, span->size, err);
     if (status == STRL_OK)
         walk->trees[tree].root = &treelet->nodes[0];
-    strl__free(data);
+    else if (status == STRL_ERR_FORMAT)
+        strl_source_doubt(walk->source, span->offset, span->size);
     return status;
 }
 
-static strl_status load_root(strl_walk *walk, uint32_t tree, strl_error *err)
+static strl_status ask_for_root(strl_walk *walk, root_reads *reads, uint32_t tree, strl_error *err)
 {
-    uint8_t *data = NULL;
-    strl__mesh mesh;
-    strl_status status = load_root_records(walk, tree, err);
-    if (status != STRL_OK)
-        return status;
     strl__node *root = walk->trees[tree].root;
+    const strl_page_ref *page = &root->record->page;
     uint64_t bytes = strl__node_bytes(root->record, walk->labels);
     if (!strl__make_room(walk, bytes, 0))
         return strl__fail(err, STRL_ERR_MEMORY,
@@ -65,17 +92,56 @@ static strl_status load_root(strl_walk *walk, uint32_t tree, strl_error *err)
                           tree, bytes, walk->memory_bytes);
     strl__node_reserve(walk, root);
     walk->root_bytes += bytes;
-    const strl_page_ref *page = &root->record->page;
-    status = read_range(walk, page->offset, page->bytes, &data, err);
-    if (status == STRL_OK && (status = strl_page_check(page, data, page->bytes, err)) != STRL_OK)
-        strl_source_doubt(walk->source, page->offset, page->bytes);
+    return add_read(reads, tree, page->offset, page->bytes, err);
+}
+
+static strl_status take_root(strl_walk *walk, uint32_t tree, const strl_source_span *span, strl_error *err)
+{
+    strl__walk_tree *own = &walk->trees[tree];
+    const strl_node *record = own->root->record;
+    strl__mesh mesh;
+    strl_status status = strl_page_check(&record->page, span->data, span->size, err);
+    if (status != STRL_OK)
+        strl_source_doubt(walk->source, span->offset, span->size);
     if (status == STRL_OK && !strl__placements_are_few(walk))
-        status = strl_page_far(root->record, data, page->bytes, &walk->trees[tree].far, err);
+        status = strl_page_far(record, span->data, span->size, &own->far, err);
     if (status == STRL_OK)
-        status = strl__mesh_create(root->record, data, page->bytes, NULL, walk->labels, walk->trees[tree].shared, &mesh, err);
+        status = strl__mesh_create(record, span->data, span->size, NULL, walk->labels, own->shared, &mesh, err);
     if (status == STRL_OK)
-        strl__node_install(walk, root, &mesh);
-    strl__free(data);
+        strl__node_install(walk, own->root, &mesh);
+    return status;
+}
+
+/* Of all trees that are used; some MiB at a time, so that it takes no more memory than that. */
+static strl_status read_roots(strl_walk *walk, root_reads *reads,
+                              strl_status (*ask)(strl_walk *, root_reads *, uint32_t, strl_error *), take_fn take,
+                              strl_error *err)
+{
+    strl_status status = STRL_OK;
+    for (uint32_t tree = 0; status == STRL_OK && tree < walk->tree_count; tree++) {
+        if (!walk->trees[tree].used)
+            continue;
+        status = ask(walk, reads, tree, err);
+        if (status == STRL_OK && reads->bytes >= MOST_ROOT_BYTES)
+            status = take_all(walk, reads, take, err);
+    }
+    return status == STRL_OK ? take_all(walk, reads, take, err) : status;
+}
+
+static strl_status load_roots(strl_walk *walk, strl_error *err)
+{
+    root_reads reads = {.spans = strl__alloc(walk->tree_count, sizeof *reads.spans),
+                        .trees = strl__alloc(walk->tree_count, sizeof *reads.trees)};
+    strl_status status = STRL_OK;
+    if (!reads.spans || !reads.trees)
+        status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the roots of %" PRIu32 " trees", walk->tree_count);
+    if (status == STRL_OK)
+        status = read_roots(walk, &reads, ask_for_records, take_records, err);
+    if (status == STRL_OK)
+        status = read_roots(walk, &reads, ask_for_root, take_root, err);
+    drop_reads(&reads);
+    strl__free(reads.spans);
+    strl__free(reads.trees);
     return status;
 }
 
@@ -88,9 +154,8 @@ static strl_status load_trees(strl_walk *walk, strl_error *err)
     for (uint32_t tree = 0; tree < walk->tree_count; tree++)
         walk->trees[tree].tree = strl_container_tree(walk->container, tree);
     strl_status status = strl__placements_load(walk, err);
-    for (uint32_t tree = 0; status == STRL_OK && tree < walk->tree_count; tree++)
-        if (walk->trees[tree].used)
-            status = load_root(walk, tree, err);
+    if (status == STRL_OK)
+        status = load_roots(walk, err);
     return status ? status : strl__placements_bound(walk, err);
 }
 
@@ -174,7 +239,9 @@ void strl_walk_close(strl_walk *walk)
                            walk->numbers,
                            walk};
     for (unsigned size = 0; size < STRL__FAR_SIZES; size++)
-        strl__free(walk->far[size].items);
+        strl__far_points_deinit(&walk->far[size]);
+    for (unsigned size = 0; size < STRL__POINT_SIZES; size++)
+        strl__far_points_deinit(&walk->merged[size]);
     for (size_t i = 0; i < sizeof owned / sizeof *owned; i++)
         strl__free(owned[i]);
 }

@@ -23,7 +23,7 @@ enum { STAGES = sizeof stages / sizeof stages[0], STEPS = 50 };
 static void ask_shares(double shares[STAGES])
 {
     strl_estimate estimate;
-    strl__estimate_start(&estimate, 0);
+    strl__estimate_start(&estimate, STRL_BUILD_CLUSTERS, 0);
     for (int i = 0; i < STAGES; i++) {
         double before = estimate.share;
         strl__estimate_stage(&estimate, stages[i]);
@@ -32,6 +32,26 @@ static void ask_shares(double shares[STAGES])
     }
     assert_true(fabs(estimate.share - 1) < 1e-9);
     assert_int_equal(estimate.stage_index, STRL_BUILD_STAGES);
+}
+
+/* Of samples as well, whose stages are fewer: none of them is a jump over those that there are not. */
+static void the_stages_of_samples_make_a_whole(void **state)
+{
+    static const char *const sampled[] = {"survey", "read", "sort", "write"};
+    double most[] = {0.2, 0.3, 0.8, 0.05};
+    strl_estimate estimate;
+    (void)state;
+    strl__estimate_start(&estimate, STRL_BUILD_SAMPLES, 0);
+    for (int i = 0; i < 4; i++) {
+        double before = estimate.share;
+        strl__estimate_stage(&estimate, sampled[i]);
+        strl__estimate_update(&estimate, 1, 2, 0);
+        assert_true(estimate.share > before);
+        strl__estimate_update(&estimate, 1, 1, 0);
+        assert_true(estimate.share - before < most[i]);
+    }
+    assert_true(fabs(estimate.share - 1) < 1e-9);
+    assert_true(strl__estimate_seconds(STRL_BUILD_SAMPLES, 1000000, 1) < strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 1) / 4);
 }
 
 static void ask_seconds(double seconds[STAGES], double total)
@@ -48,7 +68,7 @@ static void simulate(strl_estimate *estimate, int first, const double seconds[ST
     double now = 5, total = 0, share = 0;
     for (int i = first; i < STAGES; i++)
         total += seconds[i];
-    strl__estimate_start(estimate, (uint64_t)(now * SECOND));
+    strl__estimate_start(estimate, STRL_BUILD_CLUSTERS, (uint64_t)(now * SECOND));
     for (int i = first; i < STAGES; i++) {
         strl__estimate_stage(estimate, stages[i]);
         if (i == first)
@@ -134,7 +154,7 @@ static void a_stage_that_stands_still_moves_the_end_away(void **state)
 {
     (void)state;
     strl_estimate estimate;
-    strl__estimate_start(&estimate, 0);
+    strl__estimate_start(&estimate, STRL_BUILD_CLUSTERS, 0);
     strl__estimate_stage(&estimate, "level 0");
     strl__estimate_guess(&estimate, 100);
     double before = estimate.seconds_left;
@@ -150,14 +170,14 @@ static void without_anything_known_nothing_is_said(void **state)
 {
     (void)state;
     strl_estimate estimate;
-    strl__estimate_start(&estimate, 7);
+    strl__estimate_start(&estimate, STRL_BUILD_CLUSTERS, 7);
     strl__estimate_stage(&estimate, "survey");
     assert_true(estimate.seconds_left == 0 && strl__estimate_rate(&estimate, 1000) == 0);
     strl__estimate_update(&estimate, 0, 0, 7);
     assert_true(estimate.seconds_left == 0 && estimate.share == 0);
-    assert_true(strl__estimate_seconds(1000000, 0, false) == strl__estimate_seconds(1000000, 1, false));
-    assert_true(strl__estimate_seconds(1000000, 2, false) < strl__estimate_seconds(1000000, 1, false));
-    assert_true(strl__estimate_seconds(1000000, 1, true) > strl__estimate_seconds(1000000, 1, false));
+    assert_true(strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 0) == strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 1));
+    assert_true(strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 2) < strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 1));
+    assert_true(strl__estimate_seconds(STRL_BUILD_CERTIFIED, 1000000, 1) > strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 1));
 }
 
 static void more_triangles_need_more_memory(void **state)
@@ -177,6 +197,7 @@ static void more_triangles_need_more_memory(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
+        cmocka_unit_test(the_stages_of_samples_make_a_whole),
         cmocka_unit_test(usual_shares_tell_the_time_left),
         cmocka_unit_test(a_wrong_guess_is_forgotten),
         cmocka_unit_test(a_slow_stage_is_soon_believed),

@@ -16,11 +16,18 @@ import image_writer  # noqa: E402
 # Under a sanitizer, where a build takes ten times as long, fewer kills of a smaller model.
 KILLS, KILLED = (2, "72K") if sanitizers() else (8, "300K")
 SMALL = "72K"  # little more than what checkpoints are made of
+SAMPLES = ("--structure", "samples", "--memory", "64M")  # of several buckets
 
 
 def killed_at_random_moments_it_resumes(folder):
     """Each build several times, until it comes to its end; each time after a random share of the time that a whole one took."""
-    scene, random = Scene(folder, KILLED), Random(3)
+    for number, options in enumerate(((), SAMPLES)):
+        own = os.path.join(folder, str(number))
+        os.mkdir(own)
+        kill_at_random(Scene(own, KILLED, *options), Random(3))
+
+
+def kill_at_random(scene, random):
     kills = builds = resumed = 0
     for attempt in range(20 * KILLS):
         build = Build(*scene.words("--resume", "--json", "--jobs", str(random.randint(1, 3))))
@@ -55,10 +62,15 @@ def killed_while_it_writes_it_resumes(folder):
 def interrupted_it_keeps_what_is_finished(folder):
     scene = Scene(folder, SMALL)
     for number in (signal.SIGINT, signal.SIGTERM):
-        said = scene.stopped(number)
-        assert said.count("\n") == 1 and "interrupted" in said and "--resume" in said, said
-        assert sorted(os.listdir(folder)) == ["in.ply", "out.stroll.tmp"]
-        scene.resume()
+        interrupt(scene, number)
+    interrupt(Scene(folder, SMALL, *SAMPLES), signal.SIGINT, when="checkpoint")
+
+
+def interrupt(scene, number, **options):
+    said = scene.stopped(number, **options)
+    assert said.count("\n") == 1 and "interrupted" in said and "--resume" in said, said
+    assert sorted(os.listdir(scene.folder)) == ["in.ply", "out.stroll.tmp"]
+    scene.resume()
 
 
 def with_nothing_to_resume_it_begins(folder):
@@ -153,6 +165,34 @@ def another_request_is_refused(folder):
     os.utime(scene.source, ns=(facts.st_atime_ns, facts.st_mtime_ns))
     os.remove(other)
     scene.resume("--memory", "2G")
+
+
+def another_request_for_samples_is_refused(folder):
+    """They take no stage of clusters, nor clusters theirs; and what is damaged is found."""
+    scene = Scene(folder, SMALL, *SAMPLES)
+    scene.stopped(when="checkpoint")
+    plain = (scene.source, "-o", scene.out, "--memory", "64M")
+    for words, holds in ((plain, "--structure is clusters, in the build to be resumed it was samples"),
+                         (scene.words("--probability", "0.5"), "--probability is 0.5"), (scene.words("--grid", "0.5"), "--grid")):
+        assert_begins_anew(run("build", *words, "--resume"), holds)
+    facts = os.stat(scene.source)
+    os.utime(scene.source, ns=(facts.st_atime_ns, facts.st_mtime_ns + 10**9))
+    assert_begins_anew(run("build", *scene.words("--resume")), "in.ply was changed")
+    os.utime(scene.source, ns=(facts.st_atime_ns, facts.st_mtime_ns))
+    for name in ("ingest.spill", "buckets.spill", "bucket-007.spill"):
+        path = os.path.join(scene.out + ".tmp", name)
+        whole = read(path)
+        for damaged in (whole[:20] + bytes([whole[20] ^ 1]) + whole[21:], whole[:20]):
+            with open(path, "wb") as file:
+                file.write(damaged)
+            assert_begins_anew(run("build", *scene.words("--resume")), name)
+        with open(path, "wb") as file:
+            file.write(whole)
+    scene.resume("--jobs", "1")
+    clusters = Scene(folder, SMALL)
+    clusters.stopped()
+    assert_begins_anew(run("build", *clusters.words("--structure", "samples", "--resume")), "--structure is samples")
+    clusters.resume()
 
 
 def hang_image(source, name):
@@ -271,9 +311,10 @@ def fill(path):
 
 
 if sanitizers():  # what reads scratch; the rest is the program's order of work, the same without them
-    run_tests(killed_at_random_moments_it_resumes, damage_is_found)
+    run_tests(killed_at_random_moments_it_resumes, damage_is_found, another_request_for_samples_is_refused)
 run_tests(killed_at_random_moments_it_resumes, killed_while_it_writes_it_resumes,
           interrupted_it_keeps_what_is_finished, with_nothing_to_resume_it_begins, of_a_small_model_nothing_is_kept, without_resume_it_begins_anew,
           what_was_not_saved_is_cut_off_or_removed, damage_is_found, another_request_is_refused,
+          another_request_for_samples_is_refused,
           a_changed_file_beside_the_model_is_refused,
           scratch_elsewhere_is_found_again_and_removed, on_a_full_disk_it_waits_for_room)

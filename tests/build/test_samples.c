@@ -49,6 +49,16 @@ static void add_soup(mesh_file *mesh, uint32_t count, const double at[3], double
     }
 }
 
+static void assert_same_bytes(const char *a, const char *b)
+{
+    size_t size, other_size;
+    uint8_t *one = built_read_file(built_path(a), &size), *other = built_read_file(built_path(b), &other_size);
+    assert_int_equal(size, other_size);
+    assert_memory_equal(one, other, size);
+    free(one);
+    free(other);
+}
+
 static void a_surface_is_kept(void **state)
 {
     (void)state;
@@ -149,6 +159,32 @@ static void very_many_of_one_kind_go_on_below(void **state)
     for (uint32_t i = 0; i < 80000; i++)
         mesh_file_add_face(&mesh, i % 3, (i + 1) % 3, (i + 2) % 3);
     sample_tree_prove(&mesh);
+    mesh_file_free(&mesh);
+}
+
+/* More than some buckets of little memory, in the lowest corner, where keys begin, and in the highest. */
+static void several_pieces_share_a_spot(void **state)
+{
+    (void)state;
+    mesh_file mesh = {0};
+    mesh_file_torus(&mesh, 64, 40);
+    for (int high = 0; high < 2; high++) {
+        double at = high ? 100 : -100;
+        uint32_t a = mesh_file_add_vertex(&mesh, at, at, at), b = mesh_file_add_vertex(&mesh, at * 0.9999, at, at),
+                 c = mesh_file_add_vertex(&mesh, at, at * 0.9999, at);
+        for (uint32_t i = 0; i < 150000 / SMALLER; i++)
+            mesh_file_add_face(&mesh, a, b, c);
+    }
+    mesh_file_write_ply(&mesh, built_path("spot.ply"));
+    for (unsigned jobs = 1; jobs < 4; jobs += 2) {
+        strl_build_result result = sample_tree_build("spot.ply", jobs > 1 ? "more.stroll" : "one.stroll",
+                                                     (strl_build_desc){.jobs = jobs, .memory_bytes = STRL_BUILD_LEAST_MEMORY});
+        assert_int_equal(result.triangles_leaf, mesh.face_count);
+    }
+    assert_same_bytes("one.stroll", "more.stroll");
+    sample_tree_check("one.stroll");
+    sample_tree_compare("one.stroll", &mesh);
+    sample_tree_verify("one.stroll", "spot.ply");
     mesh_file_free(&mesh);
 }
 
@@ -338,16 +374,6 @@ static void parts_materials_and_texture_coordinates_go_with_their_corners(void *
 
 /* ---- the same, whoever works */
 
-static void assert_same_bytes(const char *a, const char *b)
-{
-    size_t size, other_size;
-    uint8_t *one = built_read_file(built_path(a), &size), *other = built_read_file(built_path(b), &other_size);
-    assert_int_equal(size, other_size);
-    assert_memory_equal(one, other, size);
-    free(one);
-    free(other);
-}
-
 static void the_bytes_do_not_depend_on_the_threads(void **state)
 {
     (void)state;
@@ -411,7 +437,6 @@ static void what_samples_cannot_be_asked_for_is_refused(void **state)
     mesh_file_free(&mesh);
     assert_refused((strl_build_desc){.certify = true}, "certif");
     assert_refused((strl_build_desc){.no_dependencies = true}, "dependenc");
-    assert_refused((strl_build_desc){.resume = true}, "resume");
     assert_refused((strl_build_desc){.probability = 1}, "probability");
     assert_refused((strl_build_desc){.probability = 1.5}, "probability");
     assert_refused((strl_build_desc){.probability = -0.5}, "probability");
@@ -454,6 +479,7 @@ int main(void)
         cmocka_unit_test(a_heap_at_one_spot_is_kept),
         cmocka_unit_test(a_triangle_given_often_is_kept_as_often),
         cmocka_unit_test(very_many_of_one_kind_go_on_below),
+        cmocka_unit_test(several_pieces_share_a_spot),
         cmocka_unit_test(one_triangle_is_a_tree),
         cmocka_unit_test(far_from_the_origin_nothing_is_lost),
         cmocka_unit_test(a_model_in_one_line_is_kept),

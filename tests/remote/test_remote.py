@@ -5,6 +5,7 @@ what was read is kept; what has changed is recognised.
 usage: test_remote.py PROGRAM"""
 import filecmp
 import json
+import math
 import os
 import pathlib
 import shutil
@@ -17,6 +18,8 @@ import time
 ROOT = pathlib.Path(os.environ.get("STRL_TEST_ROOT", pathlib.Path(__file__).resolve().parents[2]))
 sys.path.insert(0, str(ROOT / "tests/support"))
 sys.dont_write_bytecode = True
+sys.path.insert(0, str(ROOT / "tests/readers"))
+import gltf_writer
 from shaped_server import ShapedServer
 
 CAMERAS = ("--path", "orbit", "--frames", "3", "--size", "480x270")
@@ -107,6 +110,29 @@ class Test:
         opening = [(first, last) for _, first, last in asked[:3]]
         self.check("the header, the end of the file, the root's page", opening[0] == (0, 4095) and
                    sum(last + 1 - first for first, last in opening) < 400000, opening)
+
+    def test_many_trees_are_opened_together(self, server):
+        """Meshes of two uses each. One after the other their records and roots took two round trips a tree."""
+        trees, model, roots, side = 150, gltf_writer.Model(), [], 48
+        for tree in range(trees):
+            points = [(x, y, math.sin(x + tree) + math.cos(y)) for y in range(side) for x in range(side)]
+            faces = [y * side + x + corner for y in range(side - 1) for x in range(side - 1)
+                     for corner in (0, 1, side, 1, side + 1, side)]
+            mesh = model.mesh({"attributes": {"POSITION": model.accessor(points, gltf_writer.FLOAT)},
+                               "indices": model.accessor(faces, gltf_writer.U32)})
+            roots += [model.node(mesh=mesh, translation=[tree % 15 * 60, tree // 15 * 60, 60 * use]) for use in range(2)]
+        model.scene(*roots)
+        model.glb(self.folder / "trees.glb")
+        path = self.web / "trees.stroll"
+        self.must("build", self.folder / "trees.glb", "-o", path)
+        self.check("there are many trees", len(json.loads(self.must("info", path, "--json").stdout)["trees"]) == trees)
+        local = self.render(path)[0]
+        server.latency = 0.08
+        server.asked.clear()
+        out, lines, result = self.render(server.url("trees.stroll"), "--no-cache")
+        server.latency = 0
+        self.same("images of many trees are the same", out, local, result)
+        self.check("a few requests open them", len(server.asked) < trees / 3, len(server.asked))
 
     def test_info_and_extract(self, server):
         url = server.url("model.stroll")

@@ -44,7 +44,7 @@ def faces(path):
 def what_samples_cannot_do_is_refused(folder):
     source, out = os.path.join(folder, "in.ply"), os.path.join(folder, "out.stroll")
     must("scene", "boxes", "--triangles", "1K", "-o", source, "--quiet")
-    for words, part in ((("--certify",), "--certify"), (("--resume",), "--resume"), (("--no-dependencies",), "--no-dependencies"),
+    for words, part in ((("--certify",), "--certify"), (("--no-dependencies",), "--no-dependencies"),
                         (("--probability", "0"), "probability"), (("--probability", "1"), "probability"),
                         (("--probability", "-0.5"), "probability"), (("--probability", "nan"), "probability"),
                         (("--memory", "63M"), "memory")):

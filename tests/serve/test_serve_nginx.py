@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Byte ranges are enough: nginx, which knows nothing of Stroll, answers them for the same file as our server does.
+"""Byte ranges are enough: nginx, which knows nothing of Stroll, answers them for the same file as our server does, and a walk
+reads them over TLS and HTTP/2.
 
 usage: test_serve_nginx.py PROGRAM"""
 import os
@@ -11,7 +12,7 @@ import sys
 import tempfile
 import time
 
-from serving import PATIENCE_S, Server, check, content, make_folder, run_all
+from serving import PATIENCE_S, STROLL, Server, check, content, make_folder, run_all
 
 NGINX = shutil.which("nginx", path=os.environ.get("PATH", "") + ":/usr/sbin:/usr/local/sbin")
 CONFIGURATION = """daemon off;
@@ -20,7 +21,8 @@ pid {folder}/pid;
 error_log {folder}/error.log;
 events {{ }}
 http {{
-    access_log off;
+    log_format asked "$server_protocol $connection $msec $request_time";
+    access_log {folder}/asked.log asked;
     default_type application/octet-stream;
     client_body_temp_path {folder}/body;
     proxy_temp_path {folder}/proxy;
@@ -28,7 +30,7 @@ http {{
     uwsgi_temp_path {folder}/uwsgi;
     scgi_temp_path {folder}/scgi;
     server {{
-        listen 127.0.0.1:{port};
+        listen 127.0.0.1:{port}{more};
         root {root};
         add_header Access-Control-Allow-Origin *;
     }}
@@ -39,13 +41,14 @@ http {{
 class Nginx(Server):
     """The same questions to nginx."""
 
-    def __init__(self, served, folder):
+    def __init__(self, served, folder, more=""):
+        """more: of the line `listen`, and lines after it."""
         self.host = "127.0.0.1"
         self.log_file = tempfile.TemporaryFile()
         for _ in range(20): # another program may take the port before nginx does
             self.port = free_port()
             with open(folder + "/nginx.conf", "w") as file:
-                file.write(CONFIGURATION.format(folder=folder, port=self.port, root=served))
+                file.write(CONFIGURATION.format(folder=folder, port=self.port, root=served, more=more))
             self.child = subprocess.Popen([NGINX, "-p", folder, "-c", folder + "/nginx.conf"], stderr=self.log_file)
             if self.answers():
                 return
@@ -109,7 +112,81 @@ def a_part_is_the_same_from_nginx(folder):
         theirs.child.wait(PATIENCE_S)
 
 
+def certificate_of_127_0_0_1(folder):
+    """Signed by itself: (certificate, key), files of PEM."""
+    pair = folder + "/certificate.pem", folder + "/key.pem"
+    subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=127.0.0.1", "-addext",
+                    "subjectAltName=IP:127.0.0.1", "-out", pair[0], "-keyout", pair[1]], check=True, stderr=subprocess.DEVNULL)
+    return pair
+
+
+def stroll(*words, **variables):
+    environment = {name: value for name, value in os.environ.items() if name not in ("CURL_CA_BUNDLE", "SSL_CERT_FILE")}
+    return subprocess.run([STROLL, *words], capture_output=True, text=True, timeout=PATIENCE_S,
+                          env={**environment, "no_proxy": "127.0.0.1", **variables})
+
+
+def must(*words, **variables):
+    result = stroll(*words, **variables)
+    check(result.returncode == 0, words, result.stderr)
+    return result.stdout
+
+
+def images(model, out, **variables):
+    must("render", model, "--path", "orbit", "--frames", "2", "--size", "480x270", "-o", out, "--quiet",
+         *(("--no-cache",) if "://" in model else ()), **variables)
+    return [content(f"{out}/{name}") for name in sorted(os.listdir(out)) if name.endswith(".png")]
+
+
+def asked_of(folder):
+    """(protocol, connection, begin, end) of each request."""
+    lines = [line.split() for line in content(folder + "/asked.log").decode().splitlines()]
+    return [(line[0], line[1], float(line[2]) - float(line[3]), float(line[2])) for line in lines]
+
+
+def most_at_once(asked):
+    moments = sorted([(begin, 1) for _, _, begin, _ in asked] + [(end, -1) for _, _, _, end in asked])
+    most = now = 0
+    for _, step in moments:
+        now += step
+        most = max(most, now)
+    return most
+
+
+def walks_over_tls_are_those_of_the_file(folder):
+    if not shutil.which("openssl"):
+        print("not looked at: TLS (there is no openssl)")
+        return
+    served = make_folder(folder)
+    must("scene", "isosurface", "--triangles", "400K", "-o", folder + "/scene.ply")
+    must("build", folder + "/scene.ply", "-o", served + "/scene.stroll", "--quiet")
+    certificate, key = certificate_of_127_0_0_1(folder)
+    local = images(served + "/scene.stroll", folder + "/local"), must("info", served + "/scene.stroll", "--json")
+    for http2, variable in (("", "SSL_CERT_FILE"), (" http2", "CURL_CA_BUNDLE")):
+        place = folder + "/nginx-tls" + http2.strip()
+        os.mkdir(place)
+        open_to_all(folder)
+        tls = f" ssl{http2}; ssl_certificate {certificate}; ssl_certificate_key {key}; limit_rate 400k"
+        with Nginx(served, place, tls) as server:
+            url = f"https://127.0.0.1:{server.port}/scene.stroll"
+            refused = stroll("info", url, "--no-cache")
+            check(refused.returncode == 1 and "the server does not prove who it is" in refused.stderr and
+                  refused.stderr.count("\n") == 1 and not asked_of(place), refused.stderr)
+            refused = stroll("info", url, "--no-cache", **{variable: folder + "/none.pem"})
+            check(refused.returncode == 1 and "none.pem" in refused.stderr and not asked_of(place), refused.stderr)
+            trust = {variable: certificate}
+            check(must("info", url, "--json", "--no-cache", **trust) == local[1])
+            opened = len(asked_of(place))
+            check(images(url, place + "/images", **trust) == local[0])
+            server.child.terminate()
+            server.child.wait(PATIENCE_S)
+        asked = asked_of(place)[opened:]
+        connections = {connection for _, connection, _, _ in asked}
+        check({protocol for protocol, *_ in asked} == {"HTTP/2.0" if http2 else "HTTP/1.1"}, asked)
+        check(most_at_once(asked) > 1 and (len(connections) == 1 if http2 else len(connections) > 1), asked)
+
+
 if not NGINX:
     print("nginx is not installed")
     sys.exit(77)
-sys.exit(run_all("stroll-serve-", (a_part_is_the_same_from_nginx,)))
+sys.exit(run_all("stroll-serve-", (a_part_is_the_same_from_nginx, walks_over_tls_are_those_of_the_file)))

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import threading
 
-from serving import GOLDEN, STROLL, Container, Message, Server, check, content, make_folder, put, run_all
+from serving import GOLDEN, STROLL, Container, Message, Server, check, content, head, make_folder, put, run_all
 
 NONE = 0xffffffff
 
@@ -141,6 +141,23 @@ def what_is_too_much_is_cut_and_says_where(folder, built):
         check(server.metrics()["queries_cut_total"] >= 2)
 
 
+def a_query_of_much_work_takes_turns(folder, built):
+    """Each node with all that is below it: more nodes are looked at than the 1,024 of a turn."""
+    served, model = make_queried(folder, built)
+    tree = model.trees[0]
+    query = "subtrees=0:" + subtrees((node, 65535) for node in range(tree.node_count))
+    looked_at = sum(len(tree.subtree(node, 65535)) for node in range(tree.node_count))
+    check(looked_at > 1024, looked_at)
+    with Server(served) as server:
+        check_answer(ask(server, query), model, 0, set(range(tree.node_count)))
+        turns = server.metrics()["query_turns_total"]
+        check(looked_at // 1024 < turns <= looked_at // 1024 + 10, turns, looked_at)
+        for _ in range(40): # who leaves in between gives the place back
+            with server.connect() as gone:
+                gone.sendall(head("GET", f"/model.stroll?{query}", close=False))
+        check_answer(ask(server, query), model, 0, set(range(tree.node_count)))
+
+
 def what_is_not_there_is_refused(folder, built):
     served, model = make_queried(folder, built)
     count = model.trees[0].node_count
@@ -211,7 +228,8 @@ def damaged_containers_are_refused_and_harm_nobody(folder, built):
 
 
 TESTS = (the_test_model_has_what_it_takes, nodes_bring_their_treelets_and_pages, subtrees_bring_all_down_to_their_depth,
-         asked_in_any_order_answers_are_the_same, what_is_too_much_is_cut_and_says_where, what_is_not_there_is_refused,
+         asked_in_any_order_answers_are_the_same, what_is_too_much_is_cut_and_says_where, a_query_of_much_work_takes_turns,
+         what_is_not_there_is_refused,
          a_replaced_container_is_answered_from_anew, more_containers_than_are_kept_open_are_answered,
          damaged_containers_are_refused_and_harm_nobody)
 

@@ -201,6 +201,64 @@ static void a_query_that_may_read_no_more_is_cut(void **state)
     drop_served(self);
 }
 
+/* In steps of so many nodes, each of which may read little; others are at work in between. Returns how many there were. */
+static unsigned select_in_steps(served *self, const strl__query *query, uint64_t most_bytes, uint32_t step, strl__selection *selection)
+{
+    strl__selecting *selecting = NULL;
+    strl_error err = {0};
+    bool is_done = false;
+    unsigned steps = 0;
+    for (; !is_done && steps < 100000; steps++) {
+        strl__model *model;
+        assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &model, &err), STRL_OK);
+        if (!selecting)
+            assert_int_equal(strl__selecting_create(model->container, query, most_bytes, &selecting, &err), STRL_OK);
+        model->left_bytes = 2 * STRL__MAX_TREELET_BYTES;
+        uint32_t before = strl__selecting_visited(selecting);
+        strl_status status = strl__selecting_step(selecting, model->container, step, &is_done, &err);
+        assert_true(status == STRL_OK || (status == STRL_ERR_LIMIT && !is_done));
+        assert_true(strl__selecting_visited(selecting) - before <= step);
+        strl__models_return(&self->models, model);
+        if (steps % 16 == 3)
+            strl__models_forget(&self->models, 0);
+    }
+    assert_true(is_done);
+    strl__selecting_take(selecting, selection);
+    strl__selecting_destroy(selecting);
+    return steps;
+}
+
+static void a_selection_in_steps_is_that_of_one_go(void **state)
+{
+    (void)state;
+    served *self = make_served(8, 3);
+    strl__query *query = query_of(0, 0);
+    for (query->count = 0; query->count < 100; query->count++) /* they overlap */
+        query->items[query->count] = (strl__query_item){query->count * 3, 65535};
+    for (unsigned cut = 0; cut < 2; cut++) {
+        strl__model *model;
+        strl__selection whole, parts;
+        strl_error err = {0};
+        uint64_t most = cut ? 20000 : UINT64_C(1) << 40;
+        assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &model, &err), STRL_OK);
+        assert_int_equal(strl__select(model->container, query, most, &whole, &err), STRL_OK);
+        strl__models_return(&self->models, model);
+        assert_int_equal(whole.cut, cut);
+        for (uint32_t step = 1; step < 10000; step = step * 7 + 1) {
+            assert_true(select_in_steps(self, query, most, step, &parts) >= whole.visited / step);
+            assert_int_equal(parts.node_count, whole.node_count);
+            assert_int_equal(parts.visited, whole.visited);
+            assert_int_equal(parts.next_node, whole.next_node);
+            assert_int_equal(parts.bytes, whole.bytes);
+            assert_int_equal(parts.count, whole.count);
+            assert_memory_equal(parts.pieces, whole.pieces, whole.count * sizeof *whole.pieces);
+            strl__selection_deinit(&parts);
+        }
+        strl__selection_deinit(&whole);
+    }
+    drop_served(self);
+}
+
 static void no_memory_is_a_failure_and_no_more(void **state)
 {
     (void)state;
@@ -264,6 +322,7 @@ int main(void)
         cmocka_unit_test(children_out_of_order_are_refused),
         cmocka_unit_test(a_query_that_may_read_no_more_goes_on_next_time),
         cmocka_unit_test(a_query_that_may_read_no_more_is_cut),
+        cmocka_unit_test(a_selection_in_steps_is_that_of_one_go),
         cmocka_unit_test(no_memory_is_a_failure_and_no_more),
         cmocka_unit_test(a_container_at_work_keeps_nobody_waiting),
         cmocka_unit_test(what_is_idle_is_closed),

@@ -2,6 +2,7 @@
  * may be wrong. Times are as short as they can be, and nothing depends on how fast the machine is. */
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdatomic.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -176,6 +177,108 @@ static void a_waiting_read_gives_its_bytes_and_brings_what_is_near(void **state)
     for (uint64_t at = 405000; at < 1000000; at += 5000)
         check_read(source, at, 5000);
     assert_true(fault_server_asked(server, NULL, 0) < 12);
+    strl_source_close(source);
+    fault_server_destroy(server);
+}
+
+/* As tools read a model of many trees, whose order is not that of the file. */
+static void a_waiting_read_that_comes_back_finds_what_was_near(void **state)
+{
+    (void)state;
+    enum { PLACES = 5, STEPS = 60, APART = 200000, STEP = 1700 };
+    fault_server *server = fault_server_create(&good, NULL, NULL);
+    strl_source *source = must_open(fault_server_url(server, "/model"), &quick);
+    for (uint64_t i = 0; i < STEPS; i++)
+        for (uint64_t place = 0; place < PLACES; place++) /* the last ones lie across what two requests brought */
+            check_read(source, place * APART + i * STEP, STEP + 300);
+    assert_true(fault_server_asked(server, NULL, 0) <= 1 + 3 * PLACES);
+    strl_source_doubt(source, APART + 5 * STEP, 10);
+    unsigned before = fault_server_asked(server, NULL, 0);
+    check_read(source, 2 * APART + 5 * STEP, 10);
+    assert_int_equal(fault_server_asked(server, NULL, 0), before);
+    check_read(source, APART + 5 * STEP, 10);
+    assert_int_equal(fault_server_asked(server, NULL, 0), before + 1); /* what is doubted comes anew */
+    strl_source_close(source);
+    fault_server_destroy(server);
+}
+
+enum { MANY = 60, MANY_BYTES = 3000 };
+
+static void many_spans(strl_source_span *spans, uint8_t *data)
+{
+    for (size_t i = 0; i < MANY; i++)
+        spans[i] = (strl_source_span){.offset = i * 7 % MANY * 17000, .size = i == 9 ? 0 : MANY_BYTES, .data = data + i * MANY_BYTES};
+}
+
+static void reads_together_give_what_each_would_alone(void **state)
+{
+    (void)state;
+    static uint8_t data[MANY * MANY_BYTES];
+    strl_source_span spans[MANY];
+    strl_error err = {0};
+    fault_asked asked[MANY];
+    const fault_rule cut = {.cut = true, .after = 1000};
+    fault_server *server = fault_server_create(&good, by_number, LISTED(well, well, cut, well));
+    strl_source *source = must_open(fault_server_url(server, "/model"), &quick);
+    many_spans(spans, data);
+    assert_int_equal(strl_source_read_many(source, spans, MANY, &err), STRL_OK);
+    for (size_t i = 0; i < MANY; i++)
+        assert_memory_equal(data + i * MANY_BYTES, content + spans[i].offset, spans[i].size);
+    unsigned requests = fault_server_asked(server, asked, MANY);
+    assert_true(requests <= 1 + MANY);
+    spans[20].offset = BYTES - 10;
+    assert_int_equal(strl_source_read_many(source, spans, MANY, &err), STRL_ERR_FORMAT);
+    assert_int_equal(fault_server_asked(server, NULL, 0), requests);
+    assert_int_equal(strl_source_read_many(source, spans, 0, &err), STRL_OK);
+    strl_source_close(source);
+    fault_server_destroy(server);
+}
+
+static fault_rule refuse_the_end(void *context, unsigned number, const fault_asked *asked)
+{
+    (void)context, (void)number;
+    return (fault_rule){.status = asked->last >= BYTES / 2 ? 403 : 0};
+}
+
+static void of_reads_together_the_first_that_failed_is_told(void **state)
+{
+    (void)state;
+    static uint8_t data[MANY * MANY_BYTES];
+    strl_source_span spans[MANY];
+    strl_error err = {0};
+    fault_server *server = fault_server_create(&good, refuse_the_end, NULL);
+    strl_source *source = must_open(fault_server_url(server, "/model"), &quick);
+    many_spans(spans, data);
+    assert_int_equal(strl_source_read_many(source, spans, MANY, &err), STRL_ERR_NETWORK);
+    assert_non_null(strstr(err.message, "refuses access (403)"));
+    assert_int_equal(strl_source_read_many(source, spans, 4, &err), STRL_OK); /* of the first half of the file */
+    assert_memory_equal(data + MANY_BYTES, content + spans[1].offset, MANY_BYTES);
+    strl_source_close(source);
+    fault_server_destroy(server);
+}
+
+static void read_many_of(void *context)
+{
+    static uint8_t data[MANY * MANY_BYTES];
+    strl_source_span spans[MANY];
+    many_spans(spans, data);
+    assert_int_equal(strl_source_read_many(context, spans, MANY, NULL), STRL_ERR_NETWORK);
+}
+
+/* No request is answered, and yet there is one on each connection. */
+static void reads_together_are_asked_for_together(void **state)
+{
+    (void)state;
+    enum { CONNECTIONS = 5 };
+    const fault_rule silent = {.delay_ms = 120000};
+    const strl_http_desc desc = {.connections = CONNECTIONS, .backoff_ms = 1, .stall_ms = 60000};
+    fault_server *server = fault_server_create(&good, by_number, LISTED(well, silent));
+    strl_source *source = must_open(fault_server_url(server, "/model"), &desc);
+    strl_thread *reader;
+    assert_int_equal(strl_thread_start(&reader, read_many_of, source, NULL), STRL_OK);
+    wait_until_asked(server, 1 + CONNECTIONS);
+    fault_server_kill(server);
+    strl_thread_join(reader);
     strl_source_close(source);
     fault_server_destroy(server);
 }
@@ -447,6 +550,75 @@ static void a_stall_is_counted_from_the_last_bytes_that_came(void **state)
     check_read_fails(source, 100000, 100000, "the server stalled");
     uint64_t took_ns = strl_clock_ns() - begin_ns;
     assert_true(took_ns >= 3000 * MS && took_ns < 5500 * MS);
+    strl_source_close(source);
+    fault_server_destroy(server);
+}
+
+/* Stalls as long as it is told to. */
+typedef struct stalling {
+    atomic_bool now;
+    uint64_t slow_from; /* answers of ranges from here on come after SLOW_MS */
+} stalling;
+
+#define SLOW_MS 3000u
+
+static fault_rule while_stalling(void *context, unsigned number, const fault_asked *asked)
+{
+    const stalling *self = context;
+    (void)number;
+    if (self->slow_from && asked->first >= self->slow_from)
+        return (fault_rule){.delay_ms = SLOW_MS};
+    return (fault_rule){.stall = atomic_load(&self->now), .after = 0};
+}
+
+/* All connections are lost. Without a look at the server each of them would be waited for, a minute long. */
+static void once_a_stalled_server_answers_all_is_asked_for_again(void **state)
+{
+    (void)state;
+    enum { READS = 12, CONNECTIONS = 6 };
+    const strl_http_desc desc = {.connections = CONNECTIONS, .stall_ms = 60000, .attempts = 2, .backoff_ms = 100};
+    stalling stalls = {.now = false};
+    fault_server *server = fault_server_create(&good, while_stalling, &stalls);
+    strl_source *source = must_open(fault_server_url(server, "/model"), &desc);
+    atomic_store(&stalls.now, true);
+    for (uint64_t i = 0; i < READS; i++)
+        submit(source, i, 50000 + 80000 * i, 20000, 0);
+    strl_sleep_ns(4500 * MS);
+    unsigned asked = fault_server_asked(server, NULL, 0);
+    assert_true(asked > 1 + CONNECTIONS && asked <= 1 + CONNECTIONS + 4); /* it is looked at once a second */
+    atomic_store(&stalls.now, false);
+    uint64_t begin_ns = strl_clock_ns();
+    for (unsigned n = 0; n < READS; n++) {
+        strl_source_result result = next_answer(source);
+        if (result.status != STRL_OK)
+            fail_msg("%s", result.error.message);
+        assert_memory_equal(result.data, content + 50000 + 80000 * result.token, 20000);
+        strl__free(result.data);
+    }
+    assert_true(strl_clock_ns() - begin_ns < 20000 * MS); /* some 1.3 s, of the 60 without it */
+    assert_int_equal(stats_of(source).failures, 0);
+    strl_source_close(source);
+    fault_server_destroy(server);
+}
+
+/* Others are answered before it: at its last attempt it has all the time. */
+static void a_server_that_is_slow_with_some_bytes_gives_them_in_the_end(void **state)
+{
+    (void)state;
+    const strl_http_desc desc = {.connections = 2, .stall_ms = 60000, .attempts = 2, .backoff_ms = 1};
+    stalling slow = {.slow_from = 900000};
+    fault_server *server = fault_server_create(&good, while_stalling, &slow);
+    strl_source *source = must_open(fault_server_url(server, "/model"), &desc);
+    submit(source, 0, 900000, 1000, 1);
+    wait_until_asked(server, 2);
+    submit(source, 1, 100000, 1000, 0);
+    for (unsigned n = 0; n < 2; n++) {
+        strl_source_result result = next_answer(source);
+        assert_int_equal(result.token, 1 - n);
+        assert_int_equal(result.status, STRL_OK);
+        strl__free(result.data);
+    }
+    assert_int_equal(stats_of(source).retries, 1);
     strl_source_close(source);
     fault_server_destroy(server);
 }
@@ -862,6 +1034,26 @@ static void wrong_bytes_that_somebody_doubts_do_not_come_out_of_the_cache(void *
     strl_path_remove_directory(desc.cache, NULL);
 }
 
+/* While the cache makes room for what was read nobody watches for what comes in. */
+static void a_doubt_at_any_moment_leaves_no_read_behind(void **state)
+{
+    (void)state;
+    const strl_http_desc desc = cached("doubts");
+    fault_server *server = fault_server_create(&good, NULL, NULL);
+    strl_source *source = must_open(fault_server_url(server, "/model"), &desc);
+    for (uint64_t i = 0; i < 1000; i++) {
+        uint64_t offset = i * 7919 % (BYTES - 2000);
+        check_read(source, offset, 1000);
+        if (i % 3 == 0)
+            strl_sleep_ns(i * 250 % 50000);
+        strl_source_doubt(source, offset, 1000);
+        check_read(source, offset, 1000);
+    }
+    strl_source_close(source);
+    fault_server_destroy(server);
+    strl_path_remove_directory(desc.cache, NULL);
+}
+
 static void a_cache_that_cannot_be_used_is_done_without(void **state)
 {
     (void)state;
@@ -902,6 +1094,12 @@ static strl_status use_source(const char *url, const strl_http_desc *desc)
             assert_memory_equal(result.data, content + 10000 + 5000 * result.token, 4000);
         strl__free(result.data);
     }
+    uint8_t together[4][1000];
+    strl_source_span spans[4];
+    for (size_t i = 0; i < 4; i++)
+        spans[i] = (strl_source_span){200000 + 100000 * i, sizeof together[i], together[i]};
+    if (source && first == STRL_OK)
+        first = strl_source_read_many(source, spans, 4, &err);
     strl_source_close(source);
     return first;
 }
@@ -942,6 +1140,10 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(every_read_is_answered_once_with_its_bytes),
         cmocka_unit_test(a_waiting_read_gives_its_bytes_and_brings_what_is_near),
+        cmocka_unit_test(a_waiting_read_that_comes_back_finds_what_was_near),
+        cmocka_unit_test(reads_together_give_what_each_would_alone),
+        cmocka_unit_test(of_reads_together_the_first_that_failed_is_told),
+        cmocka_unit_test(reads_together_are_asked_for_together),
         cmocka_unit_test(ranges_outside_are_not_accepted_and_small_files_open),
         cmocka_unit_test(later_requests_are_for_what_was_opened_alone),
         cmocka_unit_test(the_most_urgent_goes_first),
@@ -953,6 +1155,8 @@ int main(void)
         cmocka_unit_test(an_answer_cut_short_is_continued_not_begun_anew),
         cmocka_unit_test(attempts_are_bounded_and_their_failure_says_why),
         cmocka_unit_test(a_stall_is_counted_from_the_last_bytes_that_came),
+        cmocka_unit_test(once_a_stalled_server_answers_all_is_asked_for_again),
+        cmocka_unit_test(a_server_that_is_slow_with_some_bytes_gives_them_in_the_end),
         cmocka_unit_test(a_server_that_says_when_is_not_asked_before),
         cmocka_unit_test(a_server_that_was_killed_and_comes_back_is_read_on),
         cmocka_unit_test(reads_wait_for_a_server_that_restarts_soon),
@@ -970,6 +1174,7 @@ int main(void)
         cmocka_unit_test(a_second_run_reads_nothing_but_the_header),
         cmocka_unit_test(damaged_entries_heal),
         cmocka_unit_test(wrong_bytes_that_somebody_doubts_do_not_come_out_of_the_cache),
+        cmocka_unit_test(a_doubt_at_any_moment_leaves_no_read_behind),
         cmocka_unit_test(a_cache_that_cannot_be_used_is_done_without),
         cmocka_unit_test(every_failed_allocation_is_a_clean_failure),
         cmocka_unit_test(a_local_source_is_not_remote),

@@ -108,6 +108,8 @@ static void gaps_are_worth_what_a_request_costs(void **state)
     const strl__pace pace = {.bytes_per_s = 625000, .latency_s = 0.08}, unknown = {0};
     assert_about((double)strl__pace_gap(&pace, 5), 10000);
     assert_int_equal(strl__pace_gap(&unknown, 6), 4096);
+    const strl__pace far = {.latency_s = 0.08}; /* the first bytes will tell what the link carries */
+    assert_int_equal(strl__pace_gap(&far, 6), 48 << 10);
     const strl__pace wide = {.bytes_per_s = 1e12, .latency_s = 1};
     assert_int_equal(strl__pace_gap(&wide, 1), 256 << 10);
 }

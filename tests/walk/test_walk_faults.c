@@ -8,6 +8,7 @@
 
 #include "base/memory.h"
 #include "container/container.h"
+#include "platform/thread.h"
 #include "walk/grid_model.h"
 #include "walk/internal.h"
 #include "walk/walk_checks.h"
@@ -49,6 +50,53 @@ static void a_source_that_fails_now_and_then_heals(void **state)
     check_same_lists(&wanted, &list);
     assert_true(strl_walk_get_stats(walk)->faults > 0);
     assert_true(strl_walk_get_stats(walk)->last_fault[0] != 0);
+    strl_walk_close(walk);
+    strl_walk_close(sound);
+}
+
+typedef struct mortal {
+    bool is_dead;
+    unsigned reads;
+} mortal;
+
+static strl_status read_mortal(void *context, uint64_t offset, void *data, size_t size, strl_error *err)
+{
+    mortal *self = context;
+    self->reads++;
+    if (self->is_dead)
+        return strl_error_set(err, STRL_ERR_NETWORK, "nobody is there");
+    memcpy(data, model + offset, size);
+    return STRL_OK;
+}
+
+/* By frames alone it would be some thousand of them, at this point. */
+static void what_failed_is_asked_for_again_once_the_source_is_back(void **state)
+{
+    (void)state;
+    enum { LOOKS_FOR_MS = 2500, FRAME_MS = 10 };
+    mortal server = {.is_dead = false};
+    const strl_source_callbacks callbacks = {.bytes = model_bytes, .context = &server, .read = read_mortal};
+    strl_source *source;
+    assert_int_equal(strl_source_open_callbacks(&callbacks, 0, &source, NULL), STRL_OK);
+    strl_walk *walk = open_walk(source, NULL), *sound = open_walk(memory_source(model, model_bytes), NULL);
+    strl_camera camera = flight_camera(500);
+    strl_draw_list wanted = settle(sound, &camera, 400), list = {0};
+    server.is_dead = true;
+    for (unsigned i = 0; i < 2100; i++) /* the next one after 1,024 */
+        list = walk_frame(walk, &camera);
+    check_cut_is_closed(&list, 0);
+    unsigned before = server.reads;
+    strl_sleep_ns((uint64_t)LOOKS_FOR_MS * 1000000u);
+    for (unsigned i = 0; i < 3; i++) /* a look is one read, whatever waits */
+        walk_frame(walk, &camera);
+    assert_true(server.reads - before <= 3);
+    server.is_dead = false;
+    for (unsigned i = 0; i < 600 && (i == 0 || strl_walk_get_stats(walk)->missing_nodes > 0); i++) {
+        list = walk_frame(walk, &camera);
+        strl_walk_pump(walk, UINT64_MAX);
+        strl_sleep_ns((uint64_t)FRAME_MS * 1000000u);
+    }
+    check_same_lists(&wanted, &list);
     strl_walk_close(walk);
     strl_walk_close(sound);
 }
@@ -209,6 +257,7 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_source_that_fails_now_and_then_heals),
+        cmocka_unit_test(what_failed_is_asked_for_again_once_the_source_is_back),
         cmocka_unit_test(a_damaged_page_keeps_its_nodes_coarse_until_it_is_repaired),
         cmocka_unit_test(a_file_damaged_anywhere_is_refused_or_walked_without_a_crack),
         cmocka_unit_test(a_node_that_two_others_name_as_their_child_is_drawn_once),

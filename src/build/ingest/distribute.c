@@ -16,6 +16,9 @@
  * some three times a bucket: with this share up to 32 threads may sort at once (strl__ingest_window). */
 #define SHARES_OF_MEMORY 96u
 
+#define BUFFER_BYTES ((size_t)64 << 10)      /* of a bucket */
+#define KEPT_BUFFER_BYTES ((size_t)48 << 10) /* and a step of 16 KiB, of which a checksum is made */
+
 uint64_t strl__bucket_bytes(const strl_build_context *context)
 {
     return context->memory_bytes / SHARES_OF_MEMORY;
@@ -44,6 +47,25 @@ static void quantise(const strl_ingest *ingest, const double position[3], uint32
     }
 }
 
+static uint64_t key_of_centroid(const strl_ingest *ingest, const survey_sample *sample)
+{
+    double centroid[3];
+    uint32_t cell[3];
+    for (int k = 0; k < 3; k++)
+        centroid[k] = (sample->position[0][k] + sample->position[1][k] + sample->position[2][k]) / 3;
+    quantise(ingest, centroid, cell);
+    return strl__curve_key(ingest, cell);
+}
+
+/* The very key that the triangle gets: splitters that are equal tell of many triangles that have it. */
+static uint64_t key_of_triangle(const strl_ingest *ingest, const survey_sample *sample)
+{
+    strl_soup_triangle triangle;
+    for (int c = 0; c < 3; c++)
+        quantise(ingest, sample->position[c], triangle.corner[c].position);
+    return strl__curve_key_of_triangle(ingest, &triangle);
+}
+
 /* The border of the largest cells between two keys, a < b: b, or what lies before it. */
 static uint64_t octree_border(uint64_t a, uint64_t b)
 {
@@ -63,12 +85,19 @@ static void choose_splitters(const uint64_t *keys, uint32_t count, bool octree, 
     }
 }
 
-static strl_status open_buckets(strl_build_context *context, const model_survey *survey, const strl_ingest *ingest, bool octree,
+void strl__bucket_name(uint32_t index, char name[24])
+{
+    snprintf(name, 24, "bucket-%03u", index);
+}
+
+/* Uses up the sample. */
+static strl_status open_buckets(strl_build_context *context, model_survey *survey, const strl_ingest *ingest, bool octree,
                                 strl_buckets *buckets, strl_error *err)
 {
     uint64_t bytes = survey->triangles * strl__soup_bucket_bytes(ingest), each = strl__bucket_bytes(context) * 2 / 3;
     uint64_t wanted = bytes / (each ? each : 1) + 1;
     buckets->count = wanted > MAX_BUCKETS ? MAX_BUCKETS : (uint32_t)wanted;
+    buckets->shares_keys = octree;
     uint64_t *keys = strl__alloc(survey->sample_count, sizeof *keys);
     buckets->splitter = strl__alloc(buckets->count, sizeof *buckets->splitter);
     buckets->spill = strl__alloc_zero(buckets->count, sizeof(strl_spill *));
@@ -77,17 +106,17 @@ static strl_status open_buckets(strl_build_context *context, const model_survey 
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for %u buckets", buckets->count);
         goto done;
     }
-    for (uint32_t i = 0; i < survey->sample_count; i++) {
-        uint32_t cell[3];
-        quantise(ingest, survey->sample[i], cell);
-        keys[i] = strl__curve_key(ingest, cell);
-    }
+    for (uint32_t i = 0; i < survey->sample_count; i++)
+        keys[i] = octree ? key_of_triangle(ingest, &survey->sample[i]) : key_of_centroid(ingest, &survey->sample[i]);
+    strl__free(survey->sample); /* it is as large as some bucket buffers */
+    survey->sample = NULL;
     qsort(keys, survey->sample_count, sizeof *keys, compare_keys);
     choose_splitters(keys, survey->sample_count, octree, buckets);
     for (uint32_t i = 0; i < buckets->count && !status; i++) {
-        char name[32];
-        snprintf(name, sizeof name, "bucket-%03u", i);
-        status = strl_spill_open(context->spills, name, 64u << 10, &buckets->spill[i], err);
+        char name[24];
+        strl__bucket_name(i, name);
+        status = octree && context->keep ? strl_spill_open_kept(context->spills, name, KEPT_BUFFER_BYTES, &buckets->spill[i], err)
+                                         : strl_spill_open(context->spills, name, BUFFER_BYTES, &buckets->spill[i], err);
     }
 done:
     strl__free(keys);
@@ -103,7 +132,8 @@ void strl__buckets_deinit(strl_buckets *buckets)
     *buckets = (strl_buckets){0};
 }
 
-static uint32_t bucket_of(const strl_buckets *buckets, uint64_t key)
+/* How many splitters do not come after the key. */
+static uint32_t splitters_up_to(const strl_buckets *buckets, uint64_t key)
 {
     uint32_t low = 0, high = buckets->count - 1;
     while (low < high) {
@@ -114,6 +144,25 @@ static uint32_t bucket_of(const strl_buckets *buckets, uint64_t key)
             low = middle + 1;
     }
     return low;
+}
+
+/* index: of the triangle in its input. */
+static uint32_t bucket_of(const strl_buckets *buckets, uint64_t key, uint64_t index)
+{
+    uint32_t end = splitters_up_to(buckets, key);
+    if (!buckets->shares_keys || end < 2 || buckets->splitter[end - 2] != key)
+        return end;
+    uint32_t first = (key ? splitters_up_to(buckets, key - 1) : 0) + 1;
+    return first + (uint32_t)(strl__mix64(index) % (end - first));
+}
+
+void strl__bucket_range(const strl_buckets *buckets, uint32_t index, uint64_t *low, uint64_t *high)
+{
+    const uint64_t *after = index + 1 < buckets->count ? &buckets->splitter[index] : NULL;
+    const uint64_t *before = index ? &buckets->splitter[index - 1] : NULL;
+    bool is_share = before && after && *before == *after;
+    *low = before ? *before + (!is_share && index > 1 && before[-1] == *before) : 0;
+    *high = is_share ? *low : after ? *after - 1 : UINT64_MAX;
 }
 
 /* Pairs (part, material) to palette ids: a hash table beside ingest->palette. */
@@ -251,7 +300,7 @@ static strl_status place_batch(void *user, const strl_triangle_batch *batch, uns
             continue;
         }
         strl__soup_pack(ingest, &triangle, out->records + i * d->record_bytes);
-        out->bucket[i] = bucket_of(d->buckets, strl__curve_key_of_triangle(ingest, &triangle));
+        out->bucket[i] = bucket_of(d->buckets, strl__curve_key_of_triangle(ingest, &triangle), batch->first + i);
     }
     return STRL_OK;
 }
@@ -407,7 +456,7 @@ static strl_status distribute_inputs(distribution *d, strl_reader *const *reader
     return status;
 }
 
-strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, const model_survey *survey, bool octree,
+strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, model_survey *survey, bool octree,
                              strl_ingest *ingest, strl_buckets *buckets, strl_error *err)
 {
     distribution d = {.context = context, .ingest = ingest, .buckets = buckets};

@@ -61,7 +61,7 @@ static strl_status check_room(strl_build_context *context, const model_survey *s
     return status ? status : strl__ingest_check_memory(context, survey->triangles, err);
 }
 
-static strl_status read_tree(strl_build_context *context, const model_survey *survey, bool octree, strl_ingest *ingest,
+static strl_status read_tree(strl_build_context *context, model_survey *survey, bool octree, strl_ingest *ingest,
                              strl_buckets *buckets, strl_error *err)
 {
     ingest->has_normals = survey->any_normal;
@@ -90,7 +90,7 @@ strl_status strl_ingest_begin(strl_build_context *context, bool octree, strl_ing
     ingest->up = model->up;
     memcpy(ingest->unit, model->unit, sizeof ingest->unit);
     if (!status)
-        status = strl__survey_run(context, model->readers, &survey, err);
+        status = strl__survey_run(context, model->readers, octree, &survey, err);
     if (status)
         goto done;
     context->result->triangles_in += survey.triangles;

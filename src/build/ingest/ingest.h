@@ -49,6 +49,7 @@ typedef struct strl_names {
 typedef struct strl_ingest {
     double origin[3], step;   /* lattice cell c is origin + step * c */
     double centre[3];         /* of the box of all that was read; not of a resumed build */
+    double longest;           /* side of that box; nor this */
     double finest_step;       /* that the extent allows */
     double short_edge;        /* 99 of 100 edges are longer; 0 = there is none */
     bool is_coarse;           /* the step had to be more than a sixteenth of short_edge */

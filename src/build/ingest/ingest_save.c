@@ -10,9 +10,9 @@
 #define EDGE_BYTES 12u
 #define CELL_BYTES 4u
 #define PALETTE_BYTES 8u
-#define NUMBER_BYTES 116u /* what write_numbers writes */
+#define NUMBER_BYTES 91u /* what write_numbers writes */
 #define IMAGE_BYTES 28u
-#define MOST_CURVE_SHIFT 31u
+#define MOST_CURVE_SHIFT 10u /* of positions below 2^31 the curve has 21 bits */
 
 /* ---- writing ---- */
 
@@ -22,6 +22,7 @@ static void write_numbers(const strl_ingest *ingest, strl_writer *writer)
         strl_writer_f64(writer, ingest->origin[k]);
     strl_writer_f64(writer, ingest->step);
     strl_writer_f32(writer, ingest->leaf_error);
+    strl_writer_u8(writer, (uint8_t)ingest->curve_shift);
     strl_writer_u8(writer, (uint8_t)ingest->up);
     strl_writer_bytes(writer, ingest->unit, sizeof ingest->unit);
     strl_writer_u8(writer, (uint8_t)(ingest->has_normals | ingest->has_colours << 1 | ingest->lacks_normals << 2 | ingest->has_texcoords << 3));
@@ -98,14 +99,19 @@ static strl_status write_edges(const strl_ingest *ingest, strl_saved_writer *sav
     return status;
 }
 
+strl_status strl__ingest_save_facts(strl_build_context *context, const strl_ingest *ingest, strl_error *err)
+{
+    strl_saved_writer saved = {0};
+    strl_status status = strl__build_open_stream(context, "ingest", &saved.spill, err);
+    return status ? status : strl_saved_finish(&saved, write_ingest(ingest, &saved, err), err);
+}
+
 strl_status strl_ingest_save(strl_build_context *context, const strl_ingest *ingest, strl_spill **graph,
                              strl_error *err)
 {
     strl_saved_writer saved = {0};
     *graph = NULL;
-    strl_status status = strl__build_open_stream(context, "ingest", &saved.spill, err);
-    if (!status)
-        status = strl_saved_finish(&saved, write_ingest(ingest, &saved, err), err);
+    strl_status status = strl__ingest_save_facts(context, ingest, err);
     if (!status)
         status = strl__build_open_stream(context, "graph", graph, err);
     saved.spill = *graph;
@@ -120,6 +126,7 @@ static bool read_numbers(strl_cursor *cursor, strl_ingest *ingest)
         ingest->origin[k] = strl_cursor_f64(cursor);
     ingest->step = strl_cursor_f64(cursor);
     ingest->leaf_error = strl_cursor_f32(cursor);
+    ingest->curve_shift = strl_cursor_u8(cursor);
     unsigned up = strl_cursor_u8(cursor);
     const uint8_t *unit = strl_cursor_take(cursor, sizeof ingest->unit);
     unsigned flags = strl_cursor_u8(cursor);
@@ -246,7 +253,7 @@ static strl_status read_image(strl_saved_reader *saved, strl_names *materials, s
                : strl__fail(err, STRL_ERR_MEMORY, "no memory for the images of the materials");
 }
 
-static strl_status read_ingest(strl_saved_reader *saved, strl_ingest *ingest, strl_error *err)
+static strl_status read_ingest(strl_saved_reader *saved, bool with_cells, strl_ingest *ingest, strl_error *err)
 {
     strl_status status = strl_saved_get(saved, NUMBER_BYTES, err);
     if (status)
@@ -254,7 +261,10 @@ static strl_status read_ingest(strl_saved_reader *saved, strl_ingest *ingest, st
     if (!read_numbers(&saved->cursor, ingest))
         return strl_saved_fail("the numbers of the lattice", err);
     uint64_t parts = strl_cursor_u64(&saved->cursor), materials = strl_cursor_u64(&saved->cursor);
-    status = read_cells(saved, ingest, err);
+    if (with_cells)
+        status = read_cells(saved, ingest, err);
+    else if (ingest->cell_count)
+        status = strl_saved_fail("the number of cells", err);
     if (!status)
         status = read_palette(saved, ingest, err);
     if (!status)
@@ -300,16 +310,23 @@ static strl_status take_soup(strl_build_context *context, strl_ingest *ingest, s
     return status;
 }
 
+strl_status strl__ingest_restore_facts(strl_build_context *context, bool with_cells, strl_ingest *ingest, strl_error *err)
+{
+    strl_saved_reader saved = {0};
+    *ingest = (strl_ingest){0};
+    strl_status status = strl_spill_take(context->spills, "ingest", &saved.spill, err);
+    if (!status)
+        status = read_ingest(&saved, with_cells, ingest, err);
+    strl_saved_reader_deinit(&saved);
+    return status;
+}
+
 strl_status strl_ingest_restore(strl_build_context *context, bool with_edges, bool with_soup, strl_ingest *ingest,
                                 strl_spill **graph, strl_error *err)
 {
     strl_saved_reader saved = {0};
-    *ingest = (strl_ingest){0};
     *graph = NULL;
-    strl_status status = strl_spill_take(context->spills, "ingest", &saved.spill, err);
-    if (!status)
-        status = read_ingest(&saved, ingest, err);
-    strl_saved_reader_deinit(&saved);
+    strl_status status = strl__ingest_restore_facts(context, true, ingest, err);
     if (!status && with_soup)
         status = take_soup(context, ingest, err);
     if (!status && with_edges)

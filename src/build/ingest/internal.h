@@ -6,18 +6,26 @@
 
 #define MAX_BUCKETS 384u
 
+typedef struct survey_sample {
+    double position[3][3];
+    uint64_t index; /* of all triangles */
+} survey_sample;
+
 /* First pass: what must be known before a single position can be put on the lattice. */
 typedef struct model_survey {
     double min[3], max[3];
     uint64_t triangles;            /* as the readers gave them */
     bool any_normal, any_colour, any_texcoord;
     uint64_t *edge_histogram;      /* [EDGE_BINS] of squared edge lengths */
-    double (*sample)[3];           /* [SAMPLE_CAPACITY] centroids, one of sample_stride triangles */
+    survey_sample *sample;         /* [SAMPLE_CAPACITY] one of sample_stride triangles */
     uint32_t sample_count;
+    bool is_scattered;             /* no pattern in the order of the input hides anything from the sample */
     uint64_t sample_stride;
 } model_survey;
 
-strl_status strl__survey_run(strl_build_context *context, strl_reader *const *readers, model_survey *survey, strl_error *err);
+/* octree: buckets will be made as strl_ingest_begin says. */
+strl_status strl__survey_run(strl_build_context *context, strl_reader *const *readers, bool octree, model_survey *survey,
+                             strl_error *err);
 void strl__survey_deinit(model_survey *survey);
 /* Sets origin, step and what is said about it, curve_shift, leaf_error. */
 strl_status strl__survey_choose_lattice(const strl_build_context *context, const model_survey *survey, strl_ingest *ingest,
@@ -44,14 +52,12 @@ bool strl__ingest_add_image(strl_names *materials, size_t material, const strl_m
 bool strl__ingest_fill_images(strl_names *materials);
 
 void strl__soup_pack(const strl_ingest *ingest, const strl_soup_triangle *triangle, uint8_t *bytes);
-/* Two corners in one lattice cell. */
-bool strl__soup_has_collapsed(const strl_soup_triangle *triangle);
 void strl__soup_set_palette(const strl_ingest *ingest, uint32_t palette, uint8_t *bytes);
 
 /* Parts, materials and images of all inputs, whichever the tree is made of. They are known after the first survey. */
 strl_status strl__ingest_add_names(strl_build_context *context, strl_ingest *ingest, strl_error *err);
-/* Triangles to buckets by curve range. */
-strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, const model_survey *survey, bool octree,
+/* Triangles to buckets by curve range. Uses up the survey's sample. */
+strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, model_survey *survey, bool octree,
                              strl_ingest *ingest, strl_buckets *buckets, strl_error *err);
 
 /* A lattice position and the cell that has it. */
@@ -90,6 +96,10 @@ strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest,
                                strl_error *err);
 /* Pairs to edges and shared positions. */
 strl_status strl__connect_cells(strl_build_context *context, strl_ingest *ingest, pair_spills *pairs, strl_error *err);
+
+/* The stream "ingest" of a checkpoint: all that is neither graph nor triangles. with_cells: they have been cut. */
+strl_status strl__ingest_save_facts(strl_build_context *context, const strl_ingest *ingest, strl_error *err);
+strl_status strl__ingest_restore_facts(strl_build_context *context, bool with_cells, strl_ingest *ingest, strl_error *err);
 
 /* Bytes that one bucket or pair spill may take, so that every worker can hold one and its sort; the same for any number of workers. */
 uint64_t strl__bucket_bytes(const strl_build_context *context);

@@ -128,6 +128,15 @@ bool strl__soup_has_collapsed(const strl_soup_triangle *triangle)
            same_place(corner[2].position, corner[0].position);
 }
 
+bool strl__soup_is_sound(const strl_ingest *ingest, const strl_soup_triangle *triangle)
+{
+    uint32_t bits = 0;
+    for (int c = 0; c < 3; c++)
+        for (int k = 0; k < 3; k++)
+            bits |= triangle->corner[c].position[k];
+    return bits >> 31 == 0 && triangle->palette < ingest->palette_count && !strl__soup_has_collapsed(triangle);
+}
+
 /* Spreads the low 21 bits so that two zeros stand between any two. */
 static uint64_t spread(uint64_t v)
 {

@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/hash.h"
 #include "base/memory.h"
 #include "build/ingest/batches.h"
 #include "build/ingest/internal.h"
@@ -46,21 +47,27 @@ static void count_edges(uint64_t *histogram, const strl_triangle *triangle)
     }
 }
 
-/* Keeps one of sample_stride triangles; when the table is full, every other one goes. index: of all triangles. */
+/* One of sample_stride triangles, a power of two: of those that are for one stride, half are for the next. */
+static bool is_sampled(const model_survey *survey, uint64_t index)
+{
+    return ((survey->is_scattered ? strl__mix64(index) : index) & (survey->sample_stride - 1)) == 0;
+}
+
+/* When the table is full, those of the next stride stay. index: of all triangles. */
 static void take_sample(model_survey *survey, const strl_triangle *triangle, uint64_t index)
 {
-    if (survey->sample_count == SAMPLE_CAPACITY) {
-        for (uint32_t i = 0; i < SAMPLE_CAPACITY / 2; i++)
-            memcpy(survey->sample[i], survey->sample[2 * i], sizeof *survey->sample);
-        survey->sample_count /= 2;
+    while (survey->sample_count == SAMPLE_CAPACITY) {
+        survey->sample_count = 0;
         survey->sample_stride *= 2;
-        if (index % survey->sample_stride)
-            return;
+        for (uint32_t i = 0; i < SAMPLE_CAPACITY; i++)
+            if (is_sampled(survey, survey->sample[i].index))
+                survey->sample[survey->sample_count++] = survey->sample[i];
     }
-    for (int k = 0; k < 3; k++)
-        survey->sample[survey->sample_count][k] =
-            (triangle->position[0][k] + triangle->position[1][k] + triangle->position[2][k]) / 3;
-    survey->sample_count++;
+    if (!is_sampled(survey, index))
+        return;
+    survey_sample *sample = &survey->sample[survey->sample_count++];
+    memcpy(sample->position, triangle->position, sizeof sample->position);
+    sample->index = index;
 }
 
 static void look_at(tally *s, const strl_triangle *triangle)
@@ -93,12 +100,11 @@ static strl_status sample_batch(void *user, const strl_triangle_batch *batch, un
 {
     surveying *s = user;
     model_survey *survey = s->survey;
-    uint64_t end = survey->triangles + batch->count, stride = survey->sample_stride;
     (void)slot;
-    for (uint64_t index = (survey->triangles + stride - 1) / stride * stride; index < end;
-         index = (index / survey->sample_stride + 1) * survey->sample_stride)
-        take_sample(survey, &batch->triangle[index - survey->triangles], index);
-    survey->triangles = end;
+    for (size_t i = 0; i < batch->count; i++)
+        if (is_sampled(survey, survey->triangles + i))
+            take_sample(survey, &batch->triangle[i], survey->triangles + i);
+    survey->triangles += batch->count;
     return strl__build_report(s->context, s->bytes_before + batch->bytes_done, s->bytes_total, err);
 }
 
@@ -138,7 +144,8 @@ static uint64_t bytes_of(const strl_reader *reader)
     return info.file_bytes;
 }
 
-strl_status strl__survey_run(strl_build_context *context, strl_reader *const *readers, model_survey *survey, strl_error *err)
+strl_status strl__survey_run(strl_build_context *context, strl_reader *const *readers, bool octree, model_survey *survey,
+                             strl_error *err)
 {
     surveying s = {.context = context, .survey = survey};
     unsigned workers = strl_pool_workers(context->pool);
@@ -148,7 +155,7 @@ strl_status strl__survey_run(strl_build_context *context, strl_reader *const *re
     pass.finish = sample_batch;
     pass.user = &s;
     *survey = (model_survey){.min = {INFINITY, INFINITY, INFINITY}, .max = {-INFINITY, -INFINITY, -INFINITY},
-                              .sample_stride = 1};
+                              .is_scattered = octree, .sample_stride = 1};
     survey->edge_histogram = strl__alloc_zero(EDGE_BINS, sizeof *survey->edge_histogram);
     survey->sample = strl__alloc(SAMPLE_CAPACITY, sizeof *survey->sample);
     if (!status && (!make_tallies(&s, workers) || !survey->edge_histogram || !survey->sample))
@@ -266,8 +273,10 @@ strl_status strl__survey_choose_lattice(const strl_build_context *context, const
         status = choose_step(context, survey, extent, ingest, err);
     if (status)
         return status;
-    for (int k = 0; k < 3; k++)
+    for (int k = 0; k < 3; k++) {
         ingest->centre[k] = survey->min[k] / 2 + survey->max[k] / 2;
+        ingest->longest = fmax(ingest->longest, survey->max[k] - survey->min[k]);
+    }
     for (int k = 0; k < 3; k++)
         ingest->origin[k] = floor(survey->min[k] / ingest->step) * ingest->step;
     while (extent / ingest->step + 2 >= ldexp(1, 21 + (int)ingest->curve_shift))

@@ -62,6 +62,8 @@ static bool same_vertex(const welding *weld, uint32_t vertex, const strl_soup_co
 static uint16_t weld_corner(welding *weld, const strl_soup_corner *corner, uint32_t palette)
 {
     uint64_t hash = strl__mix64(corner->position[0] ^ strl__mix64((uint64_t)corner->position[1] << 32 | corner->position[2]));
+    uint64_t normal = (uint64_t)corner->normal[0] << 16 | corner->normal[1];
+    hash = strl__mix64(hash ^ (normal << 32 | (corner->colour ^ corner->texcoord)));
     uint32_t at = (uint32_t)hash & weld->mask;
     while (weld->slot[at] && !same_vertex(weld, weld->slot[at] - 1, corner, palette))
         at = (at + 1) & weld->mask;

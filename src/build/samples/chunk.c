@@ -27,6 +27,7 @@ typedef struct made_bucket {
 typedef struct chunk_job {
     strl_sample_stage *stage;
     made_bucket *slots;
+    uint64_t first; /* bucket */
 } chunk_job;
 
 void strl_chunks_deinit(strl_chunks *chunks)
@@ -59,8 +60,11 @@ strl_status strl_octree_prepare(strl_octree *octree, const strl_sample_stage *st
 
 /* ---- from records to triangles in the order of the curve */
 
-static strl_status sort_triangles(const strl_sample_stage *stage, const uint8_t *records, strl_octree *octree, strl_error *err)
+static strl_status sort_triangles(const strl_sample_stage *stage, uint32_t index, const uint8_t *records, strl_octree *octree,
+                                  strl_error *err)
 {
+    uint64_t low, high;
+    strl__bucket_range(stage->buckets, index, &low, &high);
     uint32_t count = octree->triangle_count;
     size_t bytes = strl__soup_bucket_bytes(stage->ingest);
     strl_keyed *keys = strl__alloc(count, sizeof *keys), *other = strl__alloc(count, sizeof *keys);
@@ -76,9 +80,8 @@ static strl_status sort_triangles(const strl_sample_stage *stage, const uint8_t 
         strl__soup_unpack(stage->ingest, records + keys[i].index * bytes, &octree->triangle[i]);
         octree->key[i] = keys[i].key;
         octree->limit[i] = strl_octree_limit(stage->ingest, &octree->triangle[i], keys[i].key);
-        if (octree->triangle[i].palette >= stage->ingest->palette_count)
-            status = strl__fail(err, STRL_ERR_INTERNAL, "a triangle has the part and material %u of %zu",
-                                octree->triangle[i].palette, stage->ingest->palette_count);
+        if (!strl__soup_is_sound(stage->ingest, &octree->triangle[i]) || keys[i].key < low || keys[i].key > high)
+            status = strl__fail(err, STRL_ERR_INTERNAL, "a triangle of a bucket is not one that lies there");
     }
     strl__free(keys);
     strl__free(other);
@@ -113,7 +116,7 @@ static strl_status load_bucket(const strl_sample_stage *stage, uint32_t index, s
     if (!status)
         status = strl_spill_read(spill, 0, records, bytes, err);
     if (!status)
-        status = sort_triangles(stage, records, octree, err);
+        status = sort_triangles(stage, index, records, octree, err);
     strl__free(records);
     return status ? status : fill_normals(stage->ingest, octree, err);
 }
@@ -270,10 +273,10 @@ static void bound_what_rises(const strl_sample_stage *stage, made_bucket *made)
 static strl_status work(void *context, uint64_t index, unsigned slot, unsigned worker, strl_error *err)
 {
     const chunk_job *job = context;
-    const strl_buckets *buckets = job->stage->buckets;
     strl_octree octree = {0};
     strl_arena arena = {0};
     (void)worker;
+    index += job->first;
     release(&job->slots[slot]);
     bound_what_rises(job->stage, &job->slots[slot]);
     strl_status status = load_bucket(job->stage, (uint32_t)index, &octree, err);
@@ -282,8 +285,8 @@ static strl_status work(void *context, uint64_t index, unsigned slot, unsigned w
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory to sample %u triangles", octree.triangle_count);
     for (uint32_t i = 0; i < octree.triangle_count && !status; i++)
         order[i] = i;
-    cutting c = {&job->slots[slot], &octree, order, index ? buckets->splitter[index - 1] : 0,
-                 index + 1 < buckets->count ? buckets->splitter[index] - 1 : UINT64_MAX, &arena};
+    cutting c = {.made = &job->slots[slot], .octree = &octree, .order = order, .arena = &arena};
+    strl__bucket_range(job->stage->buckets, (uint32_t)index, &c.low, &c.high);
     if (!status)
         status = cut(&c, 0, octree.triangle_count, 0, 0, err);
     strl__free(order);
@@ -334,7 +337,9 @@ static strl_status finish(void *context, uint64_t index, unsigned slot, unsigned
     strl_sample_stage *stage = job->stage;
     made_bucket *made = &job->slots[slot];
     strl_chunks *all = &stage->chunks;
+    size_t pieces = made->chunks.count, risen = made->chunks.risen_count;
     (void)worker;
+    index += job->first;
     stage->done += strl_spill_bytes(stage->buckets->spill[index]) / strl__soup_bucket_bytes(stage->ingest);
     strl_status status = strl_spill_close_and_delete(stage->buckets->spill[index], err);
     stage->buckets->spill[index] = NULL;
@@ -358,6 +363,8 @@ static strl_status finish(void *context, uint64_t index, unsigned slot, unsigned
         made->chunks.count = 0; /* theirs now */
     }
     release(made);
+    if (!status)
+        status = strl_samples_note(stage, pieces, risen, err);
     return status ? status : strl__build_report(stage->context, stage->done, stage->ingest->triangle_count, err);
 }
 
@@ -365,20 +372,18 @@ strl_status strl_chunks_make(strl_sample_stage *stage, strl_error *err)
 {
     uint64_t largest = 0;
     strl_status status = STRL_OK;
-    for (uint32_t i = 0; i < stage->buckets->count && !status; i++) {
+    for (uint32_t i = stage->finished; i < stage->buckets->count && !status; i++) {
         uint64_t bytes = strl_spill_bytes(stage->buckets->spill[i]);
         largest = bytes > largest ? bytes : largest;
         status = strl_spill_flush(stage->buckets->spill[i], err);
     }
     unsigned window = strl__ingest_window(stage->context, TIMES_OF_BUCKET * largest);
     unsigned slots = strl_pool_window(stage->context->pool, window);
-    chunk_job job = {stage, strl__alloc_zero(slots, sizeof *job.slots)};
+    chunk_job job = {stage, strl__alloc_zero(slots, sizeof *job.slots), stage->finished};
     if (!status && !job.slots)
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory to sample");
     if (!status)
-        status = strl_spill_open(stage->context->spills, "bricks", 0, &stage->bricks, err);
-    if (!status)
-        status = strl_pool_ordered(stage->context->pool, stage->buckets->count, window, work, finish, &job, NULL, err);
+        status = strl_pool_ordered(stage->context->pool, stage->buckets->count - stage->finished, window, work, finish, &job, NULL, err);
     for (unsigned i = 0; job.slots && i < slots; i++)
         release(&job.slots[i]);
     strl__free(job.slots);

@@ -53,15 +53,26 @@ typedef struct strl_sample_stage {
     const strl_ingest *ingest;
     strl_buckets *buckets;
     double coupons;
-    strl_spill *bricks;
+    strl_spill *bricks, *pieces; /* pieces: what buckets have handed up, for a checkpoint; NULL where none is made */
     strl_chunks chunks;
+    uint32_t finished, saved;    /* buckets, and as of the last checkpoint */
+    uint64_t saved_at_ns;
     uint64_t done, triangles, vertices;
 } strl_sample_stage;
 
-/* All pieces: stage "sort". Uses up the buckets. */
+/* All pieces, from the first bucket that is not finished: stage "sort". Uses up the buckets. */
 strl_status strl_chunks_make(strl_sample_stage *stage, strl_error *err);
 /* What is above them, and the container. */
 strl_status strl_samples_write(strl_sample_stage *stage, strl_error *err);
+
+/* ---- checkpoints (samples_save.c); nothing where the context keeps none */
+/* After ingest: opens the streams of bricks and pieces, and saves. */
+strl_status strl_samples_begin(strl_sample_stage *stage, strl_error *err);
+/* One more bucket is finished: the last `pieces` and `risen` of all are what it has handed up. Saves from time to time. */
+strl_status strl_samples_note(strl_sample_stage *stage, size_t pieces, size_t risen, strl_error *err);
+/* Ingest, buckets and what finished buckets have handed up, from the checkpoint that the context goes on with. */
+strl_status strl_samples_restore(strl_sample_stage *stage, strl_ingest *ingest, strl_error *err);
+
 strl_status strl_octree_prepare(strl_octree *octree, const strl_sample_stage *stage, uint32_t triangles, strl_error *err);
 
 #endif

@@ -4,6 +4,8 @@
 
 #include "base/fail.h"
 
+#define CELLS (STRL_OCTANT_MAX_CHILDREN - 1)
+
 typedef struct top {
     const strl_chunks *chunks;
     strl_octree octree; /* its triangles: the items of all pieces, then those that have risen */
@@ -128,6 +130,16 @@ static cell_range cut_child(const top *t, cell_range *range, uint32_t depth)
     return child;
 }
 
+/* Pieces of one of the smallest cells, which nothing divides but their number: some of them, that those left may be one of `places`. */
+static cell_range cut_share(cell_range *range, uint32_t places)
+{
+    cell_range share = *range;
+    share.chunk_end = share.chunk + (range->chunk_end - range->chunk + places - 1) / places;
+    share.risen_end = share.risen;
+    range->chunk = share.chunk_end;
+    return share;
+}
+
 /* Moves those to the front that no smaller cell holds; all keep their order. Returns their end. */
 static uint32_t part_large(top *t, const cell_range *range, uint32_t depth)
 {
@@ -149,7 +161,8 @@ static strl_status add_children(top *t, cell_range range, strl_octant *cell, str
     strl_status status = STRL_OK;
     range.risen = large;
     while (!status && (range.chunk < range.chunk_end || range.risen < range.risen_end)) {
-        cell_range child = cut_child(t, &range, cell->depth);
+        cell_range child = cell->depth < STRL_OCTREE_DEPTH ? cut_child(t, &range, cell->depth)
+                                                           : cut_share(&range, CELLS - cell->child_count);
         status = add_cell(t, child, &cell->child[cell->child_count++], err);
     }
     if (!status && first < large) {

@@ -104,19 +104,31 @@ static strl_status write_head(writing *w, const strl_brick *entry, uint32_t run,
     return add_node(w, &record, entry->depth + run, payload, head->payload_bytes, err);
 }
 
+/* What comes from scratch names only what is there. */
+static bool fits_runs(const strl_chunk *chunk, uint32_t run, const strl_stored_brick *head)
+{
+    uint32_t below = run + 1 < chunk->run_count ? chunk->run[run + 1].count : 0, children = head->record.child_count;
+    return (run == 0 || head->parent < chunk->run[run - 1].count) &&
+           (children == 0 || (children <= below && head->first_child <= below - children));
+}
+
 static strl_status write_run(writing *w, const strl_brick *entry, uint32_t index, strl_error *err)
 {
-    const strl_stored_run *run = &w->stage->chunks.chunk[entry->chunk].run[index];
+    const strl_chunk *chunk = &w->stage->chunks.chunk[entry->chunk];
+    const strl_stored_run *run = &chunk->run[index];
     if (!strl__grow(&w->buffer, &w->capacity, run->bytes, 1))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for bricks of %" PRIu64 " bytes", run->bytes);
     strl_status status = strl_spill_read(w->stage->bricks, run->at, w->buffer, run->bytes, err);
-    size_t at = 0;
+    strl_cursor cursor = strl_cursor_make(w->buffer, run->bytes);
     for (uint32_t i = 0; i < run->count && !status; i++) {
-        strl_stored_brick head;
-        memcpy(&head, w->buffer + at, sizeof head);
-        at += sizeof head;
-        status = write_head(w, entry, index, &head, w->buffer + at, err);
-        at += head.payload_bytes;
+        strl_stored_brick head = {0};
+        const uint8_t *bytes = strl_cursor_take(&cursor, sizeof head);
+        if (bytes)
+            memcpy(&head, bytes, sizeof head);
+        const uint8_t *payload = strl_cursor_take(&cursor, head.payload_bytes);
+        status = payload && fits_runs(chunk, index, &head)
+                     ? write_head(w, entry, index, &head, payload, err)
+                     : strl__fail(err, STRL_ERR_INTERNAL, "a brick of %u bytes does not fit its piece", head.payload_bytes);
     }
     strl_spill_drop(w->stage->bricks, run->at, run->bytes);
     return status;
