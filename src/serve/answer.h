@@ -33,7 +33,7 @@ typedef struct strl__answer {
     unsigned retry_s; /* 0 = not said */
     bool is_later;    /* there is none yet: ask again when others have ended, */
     bool goes_on;     /* or have had their turn */
-    double work;      /* what it cost beyond a plain request, in requests */
+    double work;      /* what it, or this turn, cost beyond a plain request, in requests */
     char etag[STRL__ETAG_BYTES], modified[STRL__DATE_BYTES], range[72]; /* "" = not said */
     char location[3 * STRL__PATH_BYTES + 8];
 } strl__answer;

@@ -131,6 +131,14 @@ static strl_status work(strl__pending *self, strl__model *model, const strl__que
     return *is_done ? STRL_OK : status;
 }
 
+/* So far, in requests. */
+static double cost_of(const strl__pending *self)
+{
+    if (!self->selecting)
+        return 0;
+    return strl__selecting_visited(self->selecting) / NODES_A_REQUEST + (double)self->read_bytes / BYTES_A_REQUEST;
+}
+
 /* Takes the file and the selection out of pending. */
 static void finish(strl__pending *self, const strl_container_info *info, uint32_t tree, strl__answer *answer)
 {
@@ -149,6 +157,7 @@ static bool take_turn(strl__pending *self, const strl__query *query, strl__answe
     strl__model *model = NULL;
     bool is_done = false;
     strl_container_info info;
+    double before = cost_of(self);
     strl_status status = strl__models_borrow(&self->site->models, self->file, &self->info, &model, &err);
     if (status == STRL_OK)
         status = work(self, model, query, &is_done, &err);
@@ -156,12 +165,11 @@ static bool take_turn(strl__pending *self, const strl__query *query, strl__answe
         info = *strl_container_get_info(model->container);
     strl__models_return(&self->site->models, model);
     atomic_fetch_add(&self->site->metrics.query_turns, status != STRL_ERR_CANCELLED);
+    answer->work = cost_of(self) - before;
     if (status == STRL_OK && !is_done) {
         answer->is_later = answer->goes_on = true;
         return false;
     }
-    if (self->selecting)
-        answer->work = strl__selecting_visited(self->selecting) / NODES_A_REQUEST + (double)self->read_bytes / BYTES_A_REQUEST;
     if (status == STRL_OK)
         finish(self, &info, query->tree, answer);
     else

@@ -135,9 +135,14 @@ static void wait_a_while(strl__exchange *exchange, struct MHD_Connection *handle
         MHD_resume_connection(handle);
 }
 
-/* The library asks again as soon as it has looked after the other connections of its thread. */
-static void let_others_go_first(struct MHD_Connection *handle)
+/* goes_on: a turn was had, and the library asks again as soon as it has looked after the other connections of its thread. */
+static void put_off(strl__exchange *exchange, struct MHD_Connection *handle, bool goes_on)
 {
+    if (!goes_on) {
+        wait_a_while(exchange, handle);
+        return;
+    }
+    strl__connection_progress(exchange->connection);
     MHD_suspend_connection(handle);
     MHD_resume_connection(handle);
 }
@@ -314,14 +319,11 @@ enum MHD_Result strl__exchange_answer(void *cls, struct MHD_Connection *connecti
         self->is_admitted = true;
         strcpy(self->target, self->shown); /* an earlier try has taken it apart */
         strl__answer_request(&self->server->site, &self->request, &answer);
+        strl__rates_charge(&self->server->rates, &self->connection->peer, answer.work, strl_clock_ns());
         if (answer.is_later) {
-            if (answer.goes_on)
-                let_others_go_first(connection);
-            else
-                wait_a_while(self, connection);
+            put_off(self, connection, answer.goes_on);
             return MHD_YES;
         }
-        strl__rates_charge(&self->server->rates, &self->connection->peer, answer.work, strl_clock_ns());
     }
     answer.close |= self->request.has_body;
     return strl__exchange_send(self, connection, &answer);

@@ -77,7 +77,7 @@ unsigned strl__rates_take(strl__rates *rates, const strl_peer *peer, uint64_t no
 
 void strl__rates_charge(strl__rates *rates, const strl_peer *peer, double requests, uint64_t now_ns)
 {
-    if (rates->per_second <= 0)
+    if (rates->per_second <= 0 || requests <= 0)
         return;
     double full = full_of(rates);
     const strl__rate_slot key = key_of(peer);

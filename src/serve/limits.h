@@ -31,7 +31,7 @@ void strl__rates_deinit(strl__rates *rates);
 /* 0 = the request may go on, else the whole seconds to wait. A full bucket holds two seconds' worth, at least 1. */
 unsigned strl__rates_take(strl__rates *rates, const strl_peer *peer, uint64_t now_ns);
 
-/* What a request cost beyond one, afterwards: it is paid back before the next one. Debts are two seconds' worth at most. */
+/* What a request, or a turn of it, cost beyond one: it is paid back before the next one. Debts are two seconds' worth at most. */
 void strl__rates_charge(strl__rates *rates, const strl_peer *peer, double requests, uint64_t now_ns);
 
 typedef struct strl__flow {
