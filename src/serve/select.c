@@ -260,26 +260,6 @@ void strl__selecting_take(strl__selecting *self, strl__selection *selection)
     self->out = (strl__selection){.next_node = STRL_NONE};
 }
 
-strl_status strl__select(strl_container *container, const strl__query *query, uint64_t most_bytes,
-                         strl__selection *selection, strl_error *err)
-{
-    strl__selecting *self;
-    bool is_done = false;
-    *selection = (strl__selection){.next_node = STRL_NONE};
-    strl_status status = strl__selecting_create(container, query, most_bytes, &self, err);
-    if (status != STRL_OK)
-        return status;
-    status = strl__selecting_step(self, container, UINT32_MAX, &is_done, err);
-    if (status == STRL_ERR_LIMIT && strl__selecting_cut(self))
-        status = STRL_OK;
-    if (status == STRL_OK)
-        strl__selecting_take(self, selection);
-    else
-        selection->visited = self->out.visited;
-    strl__selecting_destroy(self);
-    return status;
-}
-
 void strl__selection_deinit(strl__selection *selection)
 {
     strl__free(selection->pieces);

@@ -23,7 +23,7 @@ typedef struct strl__selection {
 /* A selection in the making, which may pause between any two nodes. */
 typedef struct strl__selecting strl__selecting;
 
-/* STRL_ERR_ARGUMENT: the query asks for what there is not. */
+/* most_bytes: of the answer; the first node is always answered. STRL_ERR_ARGUMENT: the query asks for what there is not. */
 strl_status strl__selecting_create(const strl_container *container, const strl__query *query, uint64_t most_bytes,
                                    strl__selecting **selecting, strl_error *err);
 void strl__selecting_destroy(strl__selecting *selecting); /* NULL is legal */
@@ -37,9 +37,6 @@ uint32_t strl__selecting_visited(const strl__selecting *selecting); /* nodes so 
 /* Once it is done or cut; the selection is the caller's. */
 void strl__selecting_take(strl__selecting *selecting, strl__selection *selection);
 
-/* All of it at once. most_bytes: of the answer; the first node is always answered. STRL_ERR_ARGUMENT: the query asks for what there is not. */
-strl_status strl__select(strl_container *container, const strl__query *query, uint64_t most_bytes,
-                         strl__selection *selection, strl_error *err);
 void strl__selection_deinit(strl__selection *selection);
 /* The head of the answer. */
 void strl__selection_head(const strl__selection *selection, const strl_container_info *info, uint32_t tree,

@@ -70,13 +70,32 @@ static strl__query *query_of(uint32_t node, uint32_t depth)
     return &query;
 }
 
+/* In one go; where no more may be read what is there is all. */
+static strl_status select_all(strl_container *container, const strl__query *query, uint64_t most_bytes, strl__selection *selection,
+                              strl_error *err)
+{
+    strl__selecting *selecting;
+    bool is_done;
+    *selection = (strl__selection){.next_node = STRL_NONE};
+    strl_status status = strl__selecting_create(container, query, most_bytes, &selecting, err);
+    if (status != STRL_OK)
+        return status;
+    status = strl__selecting_step(selecting, container, UINT32_MAX, &is_done, err);
+    if (status == STRL_ERR_LIMIT && strl__selecting_cut(selecting))
+        status = STRL_OK;
+    if (status == STRL_OK)
+        strl__selecting_take(selecting, selection);
+    strl__selecting_destroy(selecting);
+    return status;
+}
+
 static strl_status select_one(served *self, uint32_t node, uint32_t depth, strl__selection *selection, strl_error *err)
 {
     strl__model *model;
     *selection = (strl__selection){0};
     strl_status status = strl__models_borrow(&self->models, self->file, &self->info, &model, err);
     if (status == STRL_OK)
-        status = strl__select(model->container, query_of(node, depth), UINT64_C(1) << 40, selection, err);
+        status = select_all(model->container, query_of(node, depth), UINT64_C(1) << 40, selection, err);
     strl__models_return(&self->models, model);
     return status;
 }
@@ -162,7 +181,7 @@ static void a_query_that_may_read_no_more_goes_on_next_time(void **state)
     for (; status == STRL_ERR_LIMIT && tries < 1000; tries++) {
         assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &model, &err), STRL_OK);
         model->left_bytes = STRL__MAX_TREELET_BYTES;
-        status = strl__select(model->container, query_of(self->fixture.node_count - 1, 0), 1 << 20, &selection, &err);
+        status = select_all(model->container, query_of(self->fixture.node_count - 1, 0), 1 << 20, &selection, &err);
         strl__models_return(&self->models, model);
     }
     assert_int_equal(status, STRL_OK);
@@ -188,7 +207,7 @@ static void a_query_that_may_read_no_more_is_cut(void **state)
         for (query->count = 0; first + query->count < self->fixture.node_count && query->count < STRL__QUERY_ITEMS;
              query->count++)
             query->items[query->count] = (strl__query_item){first + query->count, 0};
-        assert_int_equal(strl__select(model->container, query, UINT64_C(1) << 40, &selection, &err), STRL_OK);
+        assert_int_equal(select_all(model->container, query, UINT64_C(1) << 40, &selection, &err), STRL_OK);
         strl__models_return(&self->models, model);
         assert_true(selection.node_count > 0 && selection.cut == (selection.next_node != STRL_NONE));
         nodes += selection.node_count;
@@ -241,7 +260,7 @@ static void a_selection_in_steps_is_that_of_one_go(void **state)
         strl_error err = {0};
         uint64_t most = cut ? 20000 : UINT64_C(1) << 40;
         assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &model, &err), STRL_OK);
-        assert_int_equal(strl__select(model->container, query, most, &whole, &err), STRL_OK);
+        assert_int_equal(select_all(model->container, query, most, &whole, &err), STRL_OK);
         strl__models_return(&self->models, model);
         assert_int_equal(whole.cut, cut);
         for (uint32_t step = 1; step < 10000; step = step * 7 + 1) {
