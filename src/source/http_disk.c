@@ -157,14 +157,14 @@ static bool trim_some(strl__http *http)
 }
 
 /* Room first, in steps, so that no read waits behind looking a large folder through. Meanwhile what was to be written may have been
- * forgotten. */
+ * forgotten: what comes after it may need more room than was made. */
 static void keep_some(strl__http *http)
 {
-    uint32_t size = (uint32_t)http->kept->size;
+    size_t size = http->kept->size;
     strl_mutex_unlock(&http->mutex);
-    bool more = strl__cache_room_step(http->cache, size);
+    bool more = strl__cache_room_step(http->cache, (uint32_t)size);
     strl_mutex_lock(&http->mutex);
-    if (!more && http->kept)
+    if (!more && http->kept && http->kept->size <= size)
         write_one(http);
 }
 
