@@ -11,6 +11,7 @@
 #define LOOK_NS 1000000000u /* between two looks: this part of the time for which the source has been away, */
 #define LOOK_SHARE 4u
 #define MOST_LOOK_NS 60000000000u /* so much at most */
+#define LASTING_NS 1000000000u    /* of an outage, in which nothing at all came */
 
 void strl__note_fault(strl_walk *walk, const strl_error *error)
 {
@@ -35,7 +36,7 @@ bool strl__is_waiting(const strl_walk *walk, const strl__retry *retry)
 {
     if (retry->frame <= walk->frame)
         return false;
-    bool is_called = retry->returns < walk->returns && !retry->was_early;
+    bool is_called = retry->returns < (retry->was_early ? walk->lasting_return : walk->returns);
     return !(retry->is_unread && (walk->is_looking || is_called));
 }
 
@@ -46,10 +47,16 @@ void strl__retry_asked(const strl_walk *walk, strl__retry *retry)
 
 /* ---- of the source */
 
+/* Where some reads fail and others do not, the source seems to come back all the time: what fails once more when it was called
+ * is not called by that. */
 void strl__source_answers(strl_walk *walk)
 {
-    walk->returns += walk->is_away;
+    if (!walk->is_away)
+        return;
     walk->is_away = false;
+    walk->returns++;
+    if (strl_clock_ns() - walk->away_ns >= LASTING_NS)
+        walk->lasting_return = walk->returns;
 }
 
 void strl__source_fails(strl_walk *walk)

@@ -36,7 +36,7 @@ typedef struct strl__retry {
     uint64_t frame;    /* not before this frame, */
     bool is_unread;    /* unless it was the source that failed, and it has come back: */
     uint64_t returns;  /* the walk's, when it failed */
-    bool was_early;    /* it was asked for before that frame; once for each wait */
+    bool was_early;    /* the last time it was asked for before its frame: only the end of a lasting outage calls it again */
 } strl__retry;
 
 /* A decoded node: one block of at most strl__node_bytes, which `vertices` begins. indices[k]
@@ -347,7 +347,8 @@ struct strl_walk {
     uint32_t requests_in_flight, requests_pending;
     bool is_away, is_looking; /* the source's last answer was a failure; in this frame one thing that waits may be asked for */
     uint64_t away_ns, look_ns; /* since when; when to look next */
-    uint64_t returns;          /* how often it came back */
+    uint64_t returns;          /* how often it came back, */
+    uint64_t lasting_return;   /* the last of these that ended a lasting outage; 0 = none did */
     uint64_t room; /* bytes that the source still has room for in this frame */
     strl__job **jobs; /* owned, in order of submission */
     size_t job_count, job_capacity;

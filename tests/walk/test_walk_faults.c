@@ -101,6 +101,39 @@ static void what_failed_is_asked_for_again_once_the_source_is_back(void **state)
     strl_walk_close(sound);
 }
 
+/* While a read fails and others do not, the source comes back again and again. */
+static void what_fails_once_more_is_called_by_the_end_of_another_outage(void **state)
+{
+    (void)state;
+    strl_walk *walk = strl__alloc_zero(1, sizeof *walk);
+    strl__retry retry = {0};
+    assert_non_null(walk);
+    for (unsigned outage = 0; outage < 3; outage++) {
+        strl__source_fails(walk);
+        if (outage == 0)
+            strl__back_off(walk, &retry, true);
+        assert_true(strl__is_waiting(walk, &retry));
+        walk->away_ns -= outage * UINT64_C(2000000000);
+        strl__source_answers(walk);
+        assert_false(strl__is_waiting(walk, &retry));
+        strl__retry_asked(walk, &retry);
+        for (unsigned i = 0; i < 3; i++) {
+            strl__source_fails(walk);
+            strl__back_off(walk, &retry, true);
+            strl__source_answers(walk);
+            assert_true(strl__is_waiting(walk, &retry));
+        }
+    }
+    walk->frame = retry.frame;
+    assert_false(strl__is_waiting(walk, &retry));
+    strl__retry_asked(walk, &retry); /* it has waited, and whatever returns may call it */
+    strl__source_fails(walk);
+    strl__back_off(walk, &retry, true);
+    strl__source_answers(walk);
+    assert_false(strl__is_waiting(walk, &retry));
+    strl__free(walk);
+}
+
 static strl_node record_of(const uint8_t *data, uint32_t node)
 {
     strl_container *container;
@@ -258,6 +291,7 @@ int main(void)
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(a_source_that_fails_now_and_then_heals),
         cmocka_unit_test(what_failed_is_asked_for_again_once_the_source_is_back),
+        cmocka_unit_test(what_fails_once_more_is_called_by_the_end_of_another_outage),
         cmocka_unit_test(a_damaged_page_keeps_its_nodes_coarse_until_it_is_repaired),
         cmocka_unit_test(a_file_damaged_anywhere_is_refused_or_walked_without_a_crack),
         cmocka_unit_test(a_node_that_two_others_name_as_their_child_is_drawn_once),
