@@ -99,7 +99,7 @@ static void note_foreign(strl_walk *walk, const strl__node *parent, strl__node *
 /* Pages are the unit of reading: of one that is read now, what may be seen after the next step need not be read again. */
 static void leave_out(strl__descent *c, strl__node *child)
 {
-    bool may_come = c->cut->kind == STRL__CUT_FRONT && child->residency == STRL__ABSENT && child->retry.frame <= c->walk->frame;
+    bool may_come = c->cut->kind == STRL__CUT_FRONT && child->residency == STRL__ABSENT && !strl__is_waiting(c->walk, &child->retry);
     c->turned_away++;
     if (may_come) /* without memory it does not */
         strl__add_candidate(&c->walk->along, child, STRL_NONE, 0);
