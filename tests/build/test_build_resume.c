@@ -465,6 +465,59 @@ static void any_word_of_what_samples_keep_may_lie(void **state)
     lie_in("bucket-001.spill", &saved, false);
     free_folder(&saved);
 }
+
+static void must_refuse_the_pieces(const saved_folder *saved)
+{
+    strl_build_result result;
+    strl_error err;
+    put_folder(saved);
+    assert_int_equal(build(true, 1, NULL, &result, &err), STRL_ERR_FORMAT);
+    if (!strstr(err.message, "the pieces of the tree"))
+        fail_msg("%s", err.message);
+}
+
+/* A stream of so many zeros, of one step, with the length and the checksum that it then has. */
+static void put_zeros(saved_folder *saved, const char *name, size_t size)
+{
+    char file[64];
+    snprintf(file, sizeof file, "%s.spill", name);
+    saved_file *checkpoint = find(saved, "checkpoint"), *stream = find(saved, file);
+    size_t length = strlen(name), steps = (stream->size + STEP_BYTES - 1) / STEP_BYTES;
+    uint8_t *at = checkpoint->bytes + HEAD_BYTES, *end = checkpoint->bytes + checkpoint->size;
+    while (at[0] != length || memcmp(at + 1, name, length) || strl__load_le(at + 1 + length, 8) != stream->size)
+        assert_true(++at + 9 + length < end);
+    assert_true(size <= stream->size && size <= STEP_BYTES);
+    memset(stream->bytes, 0, size);
+    stream->size = size;
+    at += 1 + length;
+    strl__store_le(at, 8, size);
+    strl__store_le(at + 8, 2, 0);
+    strl__store_le(at + 10, 8, strl__checksum(stream->bytes, size));
+    memmove(at + 18, at + 8 + 10 * steps, (size_t)(end - (at + 8 + 10 * steps)));
+    checkpoint->size -= 10 * (steps - 1);
+    reseal(checkpoint);
+}
+
+static void pieces_without_all_triangles_are_refused(void **state)
+{
+    (void)state;
+    enum { TOTAL_AT = 8 + 15 }; /* behind the counts of the bucket and what the cell of its first piece begins with */
+    saved_folder saved;
+    samples = true;
+    make_input(TWO_LEVELS);
+    stop_in("write", 1, &saved);
+    saved_file *checkpoint = find(&saved, "checkpoint"), *pieces = find(&saved, "pieces.spill");
+    size_t step = pieces->size < STEP_BYTES ? pieces->size : STEP_BYTES;
+    uint32_t buckets = (uint32_t)strl__load_le(find(&saved, "buckets.spill")->bytes, 4);
+    assert_true(strl__load_le(pieces->bytes, 4) > 0);
+    uint64_t before = strl__checksum(pieces->bytes, step);
+    pieces->bytes[TOTAL_AT] ^= 1;
+    reseal_step(checkpoint, before, strl__checksum(pieces->bytes, step));
+    must_refuse_the_pieces(&saved);
+    put_zeros(&saved, "pieces", 8 * buckets); /* all buckets are finished, and have handed up nothing */
+    must_refuse_the_pieces(&saved);
+    free_folder(&saved);
+}
 #endif
 
 int main(void)
@@ -485,6 +538,7 @@ int main(void)
         cmocka_unit_test_setup_teardown(a_sample_tree_loses_nothing_without_memory_or_reads, built_setup, clean_up),
         cmocka_unit_test_setup_teardown(any_byte_of_a_checkpoint_of_samples_may_lie, built_setup, clean_up),
         cmocka_unit_test_setup_teardown(any_word_of_what_samples_keep_may_lie, built_setup, clean_up),
+        cmocka_unit_test_setup_teardown(pieces_without_all_triangles_are_refused, built_setup, clean_up),
 #endif
     };
     return cmocka_run_group_tests(tests, NULL, NULL);

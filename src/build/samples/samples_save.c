@@ -333,13 +333,23 @@ static bool are_in_order(const strl_chunks *all)
     return true;
 }
 
+/* No triangle is lost or told twice; so there is something to make a tree of once all buckets are finished. */
+static bool are_all_there(const strl_sample_stage *stage)
+{
+    const strl_chunks *all = &stage->chunks;
+    uint64_t count = all->risen_count;
+    for (size_t i = 0; i < all->count; i++)
+        count += all->chunk[i].root.total;
+    return count == stage->done;
+}
+
 static strl_status read_pieces(strl_sample_stage *stage, strl_error *err)
 {
     strl_saved_reader saved = {.spill = stage->pieces};
     strl_status status = STRL_OK;
     for (uint32_t i = 0; i < stage->finished && !status; i++)
         status = read_bucket(stage, &saved, err);
-    if (!status && (strl_saved_left(&saved) || !are_in_order(&stage->chunks)))
+    if (!status && (strl_saved_left(&saved) || !are_all_there(stage) || !are_in_order(&stage->chunks)))
         status = strl_saved_fail("the pieces of the tree", err);
     strl_saved_reader_deinit(&saved);
     return status;
