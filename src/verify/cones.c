@@ -1,6 +1,7 @@
 /* Cones of normals: docs/format.md, "Cones". A triangle must lie in the cones of its node and of all nodes above. */
 #include <math.h>
 
+#include "base/fail.h"
 #include "verify/mesh.h"
 
 #define COSINE_ONE 65535.0
@@ -24,41 +25,55 @@ static void find_normal(const strl__vmesh *mesh, const uint16_t corner[3], doubl
     normal[2] = minor(from[0][0], from[1][1], from[0][1], from[1][0]);
 }
 
-/* True of a triangle without area. */
-static bool holds(const strl__vnode *n, const double normal[3])
+typedef struct normal {
+    double of[3], length;
+} normal;
+
+/* Each is compared with the cones of many nodes. NULL without memory. */
+static normal *find_normals(const strl__vmesh *mesh, strl_arena *scratch)
 {
-    double along = 0, square = 0, axis = 0;
-    for (unsigned k = 0; k < 3; k++) {
-        along += normal[k] * n->cone_axis[k];
-        square += normal[k] * normal[k];
-        axis += (double)n->cone_axis[k] * n->cone_axis[k];
+    normal *normals = strl_arena_alloc(scratch, mesh->triangle_count, sizeof *normals);
+    for (uint32_t t = 0; normals && t < mesh->triangle_count; t++) {
+        double *of = normals[t].of;
+        find_normal(mesh, mesh->triangle[t], of);
+        normals[t].length = sqrt(of[0] * of[0] + of[1] * of[1] + of[2] * of[2]);
     }
-    return square == 0 || along >= (n->cone_cosine / COSINE_ONE - ROUNDING) * sqrt(square) * sqrt(axis);
+    return normals;
 }
 
-/* The triangle that lies outside; triangle_count = none. */
-static uint32_t find_outside(const strl__vnode *n, const strl__vmesh *mesh)
+/* The triangle that lies outside; count = none. One without area lies in every cone. */
+static uint32_t find_outside(const strl__vnode *n, const normal *normals, uint32_t count)
 {
-    for (uint32_t t = 0; t < mesh->triangle_count; t++) {
-        double normal[3];
-        find_normal(mesh, mesh->triangle[t], normal);
-        if (!holds(n, normal))
+    double axis = 0;
+    for (unsigned k = 0; k < 3; k++)
+        axis += (double)n->cone_axis[k] * n->cone_axis[k];
+    double least = (n->cone_cosine / COSINE_ONE - ROUNDING) * sqrt(axis);
+    for (uint32_t t = 0; t < count; t++) {
+        double along = 0;
+        for (unsigned k = 0; k < 3; k++)
+            along += normals[t].of[k] * n->cone_axis[k];
+        if (normals[t].length > 0 && along < least * normals[t].length)
             return t;
     }
-    return mesh->triangle_count;
+    return count;
 }
 
-void strl__v_check_cones(strl__model *model, const strl__vtree *tree, uint32_t id, const strl__vmesh *mesh)
+strl_status strl__v_check_cones(strl__model *model, const strl__vtree *tree, uint32_t id, const strl__vmesh *mesh,
+                                strl_arena *scratch, strl_error *err)
 {
+    const normal *normals = NULL;
     for (uint32_t above = id; above != STRL__NO_NODE; above = tree->nodes[above].parent) {
         const strl__vnode *n = &tree->nodes[above];
         if (n->cone_cosine == 0)
             continue;
+        if (!normals && !(normals = find_normals(mesh, scratch)))
+            return strl__fail(err, STRL_ERR_MEMORY, "no memory for the normals of %u triangles", mesh->triangle_count);
         strl__v_checked(model->checks, STRL_VERIFY_CONES, 1);
-        uint32_t outside = find_outside(n, mesh);
+        uint32_t outside = find_outside(n, normals, mesh->triangle_count);
         if (outside < mesh->triangle_count)
             strl__v_flaw(model->checks, STRL_VERIFY_CONES, strl__key(tree, id),
                          "tree %u node %u: its triangle %u does not lie in the cone of node %u (about %d %d %d, cosine %u)", tree->index,
                          id, outside, above, n->cone_axis[0], n->cone_axis[1], n->cone_axis[2], n->cone_cosine);
     }
+    return STRL_OK;
 }

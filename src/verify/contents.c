@@ -120,8 +120,8 @@ static strl_status check_node(contents *self, uint32_t id, const uint8_t *bytes,
     }
     check_box(self, id, &mesh);
     check_claims(self, id, &mesh);
-    strl__v_check_cones(self->model, self->tree, id, &mesh);
-    return take_hashes(self, id, &mesh, worker, err);
+    status = strl__v_check_cones(self->model, self->tree, id, &mesh, &worker->scratch, err);
+    return status != STRL_OK ? status : take_hashes(self, id, &mesh, worker, err);
 }
 
 static strl_status check_page(void *context, uint64_t index, unsigned worker_index, strl_error *err)

@@ -143,8 +143,9 @@ strl_status strl__v_load_mesh(strl__model *model, const strl__vtree *tree, uint3
 /* The main pass over all payloads: checksums, decoding, mesh rules, counts, boxes, errors; fills in the nodes'
  * hashes. */
 strl_status strl__v_check_contents(strl__model *model, strl__vtree *tree, strl_error *err);
-/* Whether the triangles lie in the cones of their node and of those above. */
-void strl__v_check_cones(strl__model *model, const strl__vtree *tree, uint32_t id, const strl__vmesh *mesh);
+/* Whether the triangles lie in the cones of their node and of those above. Fails without memory alone. */
+strl_status strl__v_check_cones(strl__model *model, const strl__vtree *tree, uint32_t id, const strl__vmesh *mesh,
+                                strl_arena *scratch, strl_error *err);
 /* Unions, from these hashes. */
 void strl__v_check_unions(strl__model *model, const strl__vtree *tree, uint64_t *exempt);
 
