@@ -15,7 +15,7 @@
  * Invariants: (1) an accepted read is in `reads` until it is DONE, then in `finished` (or its waiter's hands)
  * until it is taken, so it is answered exactly once; (2) everything under `mutex` is touched with it held, and
  * nothing waits while it is; (3) while the network thread runs only it calls libcurl,
- * but for curl_multi_wakeup. */
+ * but for curl_multi_wakeup, and only it touches what is said to be its own, with the mutex or without. */
 #ifndef STRL_SOURCE_HTTP_H
 #define STRL_SOURCE_HTTP_H
 
@@ -101,7 +101,7 @@ typedef struct strl__http {
     strl_thread *network, *disk;
     CURLM *multi;       /* the network thread's, once it runs */
     strl__cache *cache; /* the disk thread's; NULL = none */
-    /* The network thread's. */
+    /* The network thread's own. */
     strl__http_transfer transfers[STRL__HTTP_MOST_CONNECTIONS + 1]; /* desc.connections for reads, and one that looks */
     uint64_t heard_ns;    /* when bytes that a read wants came last */
     uint64_t answered_ns; /* when the latest of the requests that were answered was begun */

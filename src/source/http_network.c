@@ -181,7 +181,7 @@ static strl__http_transfer *looker(strl__http *http)
     return &http->transfers[http->desc.connections];
 }
 
-/* Mutex held. Since when nothing has come of what is asked for; UINT64_MAX where nothing is. */
+/* Since when nothing has come of what is asked for; UINT64_MAX where nothing is. */
 static uint64_t silent_since(const strl__http *http)
 {
     uint64_t since_ns = UINT64_MAX;
