@@ -202,12 +202,12 @@ static void a_waiting_read_that_comes_back_finds_what_was_near(void **state)
     fault_server_destroy(server);
 }
 
-enum { MANY = 60, MANY_BYTES = 3000 };
+enum { MANY = 60, MANY_BYTES = 3000, FAR = 17000, NEAR = 5000 }; /* so near that on any link one request brings several */
 
-static void many_spans(strl_source_span *spans, uint8_t *data)
+static void many_spans(strl_source_span *spans, uint8_t *data, size_t apart)
 {
     for (size_t i = 0; i < MANY; i++)
-        spans[i] = (strl_source_span){.offset = i * 7 % MANY * 17000, .size = i == 9 ? 0 : MANY_BYTES, .data = data + i * MANY_BYTES};
+        spans[i] = (strl_source_span){.offset = i * 7 % MANY * apart, .size = i == 9 ? 0 : MANY_BYTES, .data = data + i * MANY_BYTES};
 }
 
 static void reads_together_give_what_each_would_alone(void **state)
@@ -220,12 +220,13 @@ static void reads_together_give_what_each_would_alone(void **state)
     const fault_rule cut = {.cut = true, .after = 1000};
     fault_server *server = fault_server_create(&good, by_number, LISTED(well, well, cut, well));
     strl_source *source = must_open(fault_server_url(server, "/model"), &quick);
-    many_spans(spans, data);
+    many_spans(spans, data, NEAR);
     assert_int_equal(strl_source_read_many(source, spans, MANY, &err), STRL_OK);
     for (size_t i = 0; i < MANY; i++)
         assert_memory_equal(data + i * MANY_BYTES, content + spans[i].offset, spans[i].size);
     unsigned requests = fault_server_asked(server, asked, MANY);
-    assert_true(requests <= 1 + MANY);
+    /* Six or more in each, as long as nothing lies between two that are on their way: 21 at most; the head, and what was cut off. */
+    assert_true(requests <= MANY / 2);
     spans[20].offset = BYTES - 10;
     assert_int_equal(strl_source_read_many(source, spans, MANY, &err), STRL_ERR_FORMAT);
     assert_int_equal(fault_server_asked(server, NULL, 0), requests);
@@ -248,7 +249,7 @@ static void of_reads_together_the_first_that_failed_is_told(void **state)
     strl_error err = {0};
     fault_server *server = fault_server_create(&good, refuse_the_end, NULL);
     strl_source *source = must_open(fault_server_url(server, "/model"), &quick);
-    many_spans(spans, data);
+    many_spans(spans, data, FAR);
     assert_int_equal(strl_source_read_many(source, spans, MANY, &err), STRL_ERR_NETWORK);
     assert_non_null(strstr(err.message, "refuses access (403)"));
     assert_int_equal(strl_source_read_many(source, spans, 4, &err), STRL_OK); /* of the first half of the file */
@@ -261,7 +262,7 @@ static void read_many_of(void *context)
 {
     static uint8_t data[MANY * MANY_BYTES];
     strl_source_span spans[MANY];
-    many_spans(spans, data);
+    many_spans(spans, data, FAR);
     assert_int_equal(strl_source_read_many(context, spans, MANY, NULL), STRL_ERR_NETWORK);
 }
 
