@@ -62,7 +62,7 @@ def twice(bench, container, frames):
 
 def part_chessboard(bench, models):
     """The field of view stays, the fields of the board become smaller. The first turn loads what the second one shows."""
-    settings = {"frames": bench.options.frames, "size": bench.options.size, "models": list(models)}
+    settings = {"frames": bench.options.frames, "turns": 2, "size": bench.options.size, "models": list(models)}
     if all([bench.kept("chessboard", model, settings) for model in models]):
         return
     for model in models:

@@ -140,11 +140,32 @@ typedef struct strl__bound_level {
 
 #define STRL__BOUND_LEVELS 4u /* for 2^24 placements */
 
+/* Of splats: shares of the allowed size, a cell being as a rule half as large as the one above; then those that close holes,
+ * STRL__MOST_POINT_PX and halves of it, two for each. */
+#define STRL__POINT_SHARES 4u
+#define STRL__MISSING_SIZES 8u
+#define STRL__POINT_SIZES (STRL__POINT_SHARES + STRL__MISSING_SIZES)
+
+/* The finest splats that a brick shows. */
+typedef struct strl__splat_run {
+    const strl_node *record;
+    const strl_splat *splats;
+    uint32_t count;
+    uint8_t least_side; /* UINT8_MAX where there is none */
+} strl__splat_run;
+
+/* Points of a placement that has items of its own. */
+typedef struct strl__placed_points {
+    size_t active; /* the first of the front's items that are of it */
+    uint32_t count[STRL__POINT_SIZES];
+} strl__placed_points;
+
 typedef struct strl__walk_tree {
     const strl_tree *tree; /* borrowed from the container */
     strl__node *root;      /* NULL where no placement uses the tree */
     bool used, shared;     /* by a placement; by several. Where there are many placements both are taken to be so. */
     strl_far far;
+    strl__splat_run preview; /* of the root, which stays */
 } strl__walk_tree;
 
 /* Points of one size, for what is not drawn itself. */
@@ -155,11 +176,6 @@ typedef struct strl__far_points {
     double px; /* the largest box that one of them stands for, in pixels */
 } strl__far_points;
 
-/* Of splats: shares of the allowed size, a cell being as a rule half as large as the one above; then those that close holes,
- * STRL__MOST_POINT_PX and halves of it, two for each. */
-#define STRL__POINT_SHARES 4u
-#define STRL__MISSING_SIZES 8u
-#define STRL__POINT_SIZES (STRL__POINT_SHARES + STRL__MISSING_SIZES)
 #define STRL__FAR_SIZES 7u /* 0: the size of the allowed error; k: 2^k pixels, for runs that are not there yet */
 
 /* A page's bytes, shared by the decode jobs of its nodes. */
@@ -367,6 +383,9 @@ struct strl_walk {
     size_t item_capacity;
     strl_vertex *points; /* splats of the frame */
     size_t point_count, point_capacity;
+    uint64_t hole_work; /* of the frame: left, see points.h */
+    strl__placed_points *placed_points; /* of the frame */
+    size_t placed_count, placed_capacity;
     float scattered[256]; /* of a splat's coverage: 0 = the faces are a wall, 1 = there is nearly none */
     strl__far_points far[STRL__FAR_SIZES]; /* of the frame */
     strl__far_points merged[STRL__POINT_SIZES]; /* splats of placements that show few, of the frame */
@@ -379,6 +398,8 @@ struct strl_walk {
 /* mesh.c: thread-safe. */
 /* What a decoded node takes at most, known before anything is fetched. */
 uint64_t strl__node_bytes(const strl_node *record, bool labels);
+/* How much of that the splats of a root turned out not to take. */
+uint64_t strl__spare_bytes(const strl_node *record, const strl__mesh *mesh);
 strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size,
                               const strl_payload_reference *reference, bool labels, bool shared, strl__mesh *mesh, strl_error *err);
 /* The finest state of a node's mesh, for the payload of another node. */
@@ -494,6 +515,10 @@ void strl__refine_front(strl_walk *walk);
 /* brick.c: thread-safe. Vertices and labels are the caller's to fill in. */
 strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const strl_brick_head *head, bool labels,
                                strl__mesh *mesh, strl_error *err);
+
+/* splats.c */
+strl__splat_run strl__finest_splats(const strl__node *node);
+void strl__points_prepare(strl_walk *walk);
 
 /* points.c: behind the other items of the list. */
 strl_status strl__draw_splats(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err);

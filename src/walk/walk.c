@@ -107,9 +107,14 @@ static strl_status take_root(strl_walk *walk, uint32_t tree, const strl_source_s
         status = strl_page_far(record, span->data, span->size, &own->far, err);
     if (status == STRL_OK)
         status = strl__mesh_create(record, span->data, span->size, NULL, walk->labels, own->shared, &mesh, err);
-    if (status == STRL_OK)
-        strl__node_install(walk, own->root, &mesh);
-    return status;
+    if (status != STRL_OK)
+        return status;
+    strl__node_install(walk, own->root, &mesh);
+    own->preview = strl__finest_splats(own->root);
+    uint64_t spare = strl__spare_bytes(record, &own->root->mesh); /* a root is never evicted */
+    walk->resident_bytes -= spare;
+    walk->root_bytes -= spare;
+    return STRL_OK;
 }
 
 /* Of all trees that are used; some MiB at a time, so that it takes no more memory than that. */
@@ -159,9 +164,6 @@ static strl_status load_trees(strl_walk *walk, strl_error *err)
     return status ? status : strl__placements_bound(walk, err);
 }
 
-/* By measure: less turns more transparent what is seen from the side, and opens pixels between splats; more leaves foliage too dense. */
-#define SCATTERED 0.25f
-
 static void apply_desc(strl_walk *walk, const strl_walk_desc *desc, strl_source *source)
 {
     const strl_walk_desc defaults = {0};
@@ -178,8 +180,7 @@ static void apply_desc(strl_walk *walk, const strl_walk_desc *desc, strl_source 
     strl_walk_set_error_px(walk, desc->error_px);
     walk->splat_ratio = isfinite(desc->splat_px) && desc->splat_px > 0 ? desc->splat_px / walk->error_px : 1;
     walk->stats.allowed_error_px = walk->error_px;
-    for (unsigned coverage = 0; coverage < 256; coverage++)
-        walk->scattered[coverage] = powf(1 - (float)coverage / 255, SCATTERED);
+    strl__points_prepare(walk);
 }
 
 strl_status strl_walk_open(strl_source *source, const strl_walk_desc *desc, strl_walk **out, strl_error *err)
@@ -235,6 +236,7 @@ void strl_walk_close(strl_walk *walk)
                            walk->front.items,
                            walk->items,
                            walk->points,
+                           walk->placed_points,
                            walk->wanted_runs.items,
                            walk->numbers,
                            walk};
