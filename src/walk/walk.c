@@ -24,7 +24,8 @@ typedef struct root_reads {
     uint64_t bytes;
 } root_reads;
 
-typedef strl_status (*take_fn)(strl_walk *walk, uint32_t tree, const strl_source_span *span, strl_error *err);
+/* May take the span's data over; then it is NULL. */
+typedef strl_status (*take_fn)(strl_walk *walk, uint32_t tree, strl_source_span *span, strl_error *err);
 
 /* The container has bounded the size. */
 static strl_status add_read(root_reads *reads, uint32_t tree, uint64_t offset, uint32_t size, strl_error *err)
@@ -69,7 +70,7 @@ static strl_status ask_for_records(strl_walk *walk, root_reads *reads, uint32_t 
     return add_read(reads, tree, ref.offset, ref.bytes, err);
 }
 
-static strl_status take_records(strl_walk *walk, uint32_t tree, const strl_source_span *span, strl_error *err)
+static strl_status take_records(strl_walk *walk, uint32_t tree, strl_source_span *span, strl_error *err)
 {
     strl__treelet *treelet = strl__treelets_find(&walk->treelets, tree, 0);
     strl_status status = strl__treelet_load(walk, treelet, span->data, span->size, err);
@@ -95,7 +96,18 @@ static strl_status ask_for_root(strl_walk *walk, root_reads *reads, uint32_t tre
     return add_read(reads, tree, page->offset, page->bytes, err);
 }
 
-static strl_status take_root(strl_walk *walk, uint32_t tree, const strl_source_span *span, strl_error *err)
+/* The first frames want what lies beside the root. Without memory it is read again. */
+static void keep_page(strl_walk *walk, const strl_page_ref *ref, strl_source_span *span)
+{
+    strl__page *page = strl__page_create(ref, span->data);
+    if (!page)
+        return;
+    span->data = NULL;
+    strl__page_keep(walk, page);
+    strl__page_release(page);
+}
+
+static strl_status take_root(strl_walk *walk, uint32_t tree, strl_source_span *span, strl_error *err)
 {
     strl__walk_tree *own = &walk->trees[tree];
     const strl_node *record = own->root->record;
@@ -107,8 +119,10 @@ static strl_status take_root(strl_walk *walk, uint32_t tree, const strl_source_s
         status = strl_page_far(record, span->data, span->size, &own->far, err);
     if (status == STRL_OK)
         status = strl__mesh_create(record, span->data, span->size, NULL, walk->labels, own->shared, &mesh, err);
-    if (status == STRL_OK)
+    if (status == STRL_OK) {
         strl__node_install(walk, own->root, &mesh);
+        keep_page(walk, &record->page, span);
+    }
     return status;
 }
 
@@ -212,6 +226,8 @@ void strl_walk_close(strl_walk *walk)
     if (!walk)
         return;
     strl__jobs_abandon(walk);
+    while (strl__page_drop_oldest(walk))
+        ;
     strl__placements_deinit(walk);
     strl__treelets_deinit(&walk->treelets);
     strl_container_close(walk->container);
