@@ -49,20 +49,29 @@ static void judge(strl__http_transfer *transfer)
         learn_identity(transfer);
 }
 
+/* Mutex held. A read from the first byte on has come. */
+static void learn_head(strl__http *http, const strl__http_read *read)
+{
+    size_t bytes = (size_t)(read->end - read->begin);
+    http->head_bytes = bytes < STRL__HTTP_HEAD_BYTES ? bytes : STRL__HTTP_HEAD_BYTES;
+    memcpy(http->head, read->result.data, http->head_bytes);
+    strl__cache_model(http->head, http->head_bytes, http->identity.total, http->model);
+}
+
 /* Mutex held. */
 static void deliver(strl__http_transfer *transfer, strl__http_read *read)
 {
     strl__http *http = transfer->http;
     read->result.status = STRL_OK;
     if (transfer->opening) {
-        memcpy(http->head, read->result.data, read->size);
-        http->head_bytes = read->size;
-        strl__cache_model(http->head, http->head_bytes, http->identity.total, http->model);
+        learn_head(http, read);
         http->opened = true;
     } else {
         bool alone = read->begin <= transfer->begin && read->end >= transfer->end;
         http->stats.reads++;
         http->stats.merged_reads += !alone;
+        if (http->head_bytes == 0 && read->begin == 0)
+            learn_head(http, read); /* it was doubted */
         strl__http_keep(http, read->offset, read->result.data + (read->offset - read->begin), read->size);
     }
     strl__http_read_finish(http, read);

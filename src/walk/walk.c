@@ -28,13 +28,13 @@ typedef struct root_reads {
 typedef strl_status (*take_fn)(strl_walk *walk, uint32_t tree, strl_source_span *span, strl_error *err);
 
 /* The container has bounded the size. */
-static strl_status add_read(root_reads *reads, uint32_t tree, uint64_t offset, uint32_t size, strl_error *err)
+static strl_status add_read(root_reads *reads, uint32_t tree, uint64_t offset, uint32_t size, uint64_t checksum, strl_error *err)
 {
     void *data = strl__alloc(size, 1);
     if (!data)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a page of %" PRIu32 " bytes", size);
     reads->trees[reads->count] = tree;
-    reads->spans[reads->count++] = (strl_source_span){offset, size, data};
+    reads->spans[reads->count++] = (strl_source_span){offset, size, data, checksum};
     reads->bytes += size;
     return STRL_OK;
 }
@@ -67,7 +67,7 @@ static strl_status ask_for_records(strl_walk *walk, root_reads *reads, uint32_t 
                           "the root records of tree %" PRIu32 " do not fit into the memory for walking, %" PRIu64
                           " bytes",
                           tree, walk->memory_bytes);
-    return add_read(reads, tree, ref.offset, ref.bytes, err);
+    return add_read(reads, tree, ref.offset, ref.bytes, ref.checksum, err);
 }
 
 static strl_status take_records(strl_walk *walk, uint32_t tree, strl_source_span *span, strl_error *err)
@@ -93,7 +93,7 @@ static strl_status ask_for_root(strl_walk *walk, root_reads *reads, uint32_t tre
                           tree, bytes, walk->memory_bytes);
     strl__node_reserve(walk, root);
     walk->root_bytes += bytes;
-    return add_read(reads, tree, page->offset, page->bytes, err);
+    return add_read(reads, tree, page->offset, page->bytes, page->checksum, err);
 }
 
 /* The first frames want what lies beside the root. Without memory it is read again. */
