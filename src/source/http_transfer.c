@@ -307,6 +307,13 @@ static const struct {
     {CURLE_SSL_CONNECT_ERROR, STRL__HTTP_AGAIN, "there is no secure connection"},
 };
 
+/* Such as the end of an answer that was longer than it said, on a connection that is used again. After a redirect the code is of where
+ * that leads to. */
+static bool is_no_answer(const strl__http_transfer *transfer, CURLcode code)
+{
+    return code == CURLE_UNSUPPORTED_PROTOCOL && transfer->fields.status / 100 != 3;
+}
+
 /* What libcurl's code means, where nothing of ours has said it already. */
 static void explain(strl__http_transfer *transfer, CURLcode code)
 {
@@ -314,6 +321,10 @@ static void explain(strl__http_transfer *transfer, CURLcode code)
     if (transfer->error.message[0])
         return;
     transfer->verdict = STRL__HTTP_AGAIN;
+    if (is_no_answer(transfer, code)) {
+        strl__fail(&transfer->error, STRL_ERR_NETWORK, "the server sends more than it says, or what is no answer: %s", reason);
+        return;
+    }
     for (size_t i = 0; i < sizeof failures / sizeof *failures; i++)
         if (failures[i].code == code) {
             transfer->verdict = failures[i].verdict;
@@ -430,7 +441,7 @@ static void fail(strl__http_transfer *transfer, CURLcode code)
 {
     strl__http *http = transfer->http;
     uint64_t now_ns = strl_clock_ns();
-    bool reached = transfer->fields.status != 0;
+    bool reached = transfer->fields.status != 0 || is_no_answer(transfer, code);
     explain(transfer, code);
     strl__http_name_error(http, &transfer->error);
     if (transfer->verdict == STRL__HTTP_CHANGED) {

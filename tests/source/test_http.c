@@ -849,6 +849,21 @@ static void an_attempt_at_opening_has_nothing_of_the_one_before(void **state)
     fault_server_destroy(server);
 }
 
+static void more_than_an_answer_says_is_an_attempt_that_failed(void **state)
+{
+    (void)state;
+    const fault_rule late = {.late_excess = true};
+    fault_server *server = fault_server_create(&good, by_number, LISTED(well, late, late, well, late));
+    strl_source *source = must_open(fault_server_url(server, "/model"), &quick);
+    check_read(source, 100000, 60000);
+    assert_int_equal(stats_of(source).retries, 2);
+    assert_int_equal(fault_server_asked(server, NULL, 0), 4);
+    check_read_fails(source, 400000, 60000, "the server sends more than it says, or what is no answer");
+    assert_int_equal(fault_server_asked(server, NULL, 0), 4 + quick.attempts);
+    strl_source_close(source);
+    fault_server_destroy(server);
+}
+
 /* ---- addresses */
 
 static void what_is_no_address_is_refused(void **state)
@@ -1255,6 +1270,7 @@ int main(void)
         cmocka_unit_test(a_model_that_is_swapped_under_way_is_recognised),
         cmocka_unit_test(an_attempt_at_opening_has_nothing_of_the_one_before),
         cmocka_unit_test(what_is_no_address_is_refused),
+        cmocka_unit_test(more_than_an_answer_says_is_an_attempt_that_failed),
         cmocka_unit_test(opening_says_what_is_wrong),
         cmocka_unit_test(a_password_or_a_query_is_in_no_sentence),
         cmocka_unit_test(an_address_that_is_none_keeps_its_secrets),
