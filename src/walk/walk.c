@@ -24,16 +24,17 @@ typedef struct root_reads {
     uint64_t bytes;
 } root_reads;
 
-typedef strl_status (*take_fn)(strl_walk *walk, uint32_t tree, const strl_source_span *span, strl_error *err);
+/* May take the span's data over; then it is NULL. */
+typedef strl_status (*take_fn)(strl_walk *walk, uint32_t tree, strl_source_span *span, strl_error *err);
 
 /* The container has bounded the size. */
-static strl_status add_read(root_reads *reads, uint32_t tree, uint64_t offset, uint32_t size, strl_error *err)
+static strl_status add_read(root_reads *reads, uint32_t tree, uint64_t offset, uint32_t size, uint64_t checksum, strl_error *err)
 {
     void *data = strl__alloc(size, 1);
     if (!data)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a page of %" PRIu32 " bytes", size);
     reads->trees[reads->count] = tree;
-    reads->spans[reads->count++] = (strl_source_span){offset, size, data};
+    reads->spans[reads->count++] = (strl_source_span){offset, size, data, checksum};
     reads->bytes += size;
     return STRL_OK;
 }
@@ -66,10 +67,10 @@ static strl_status ask_for_records(strl_walk *walk, root_reads *reads, uint32_t 
                           "the root records of tree %" PRIu32 " do not fit into the memory for walking, %" PRIu64
                           " bytes",
                           tree, walk->memory_bytes);
-    return add_read(reads, tree, ref.offset, ref.bytes, err);
+    return add_read(reads, tree, ref.offset, ref.bytes, ref.checksum, err);
 }
 
-static strl_status take_records(strl_walk *walk, uint32_t tree, const strl_source_span *span, strl_error *err)
+static strl_status take_records(strl_walk *walk, uint32_t tree, strl_source_span *span, strl_error *err)
 {
     strl__treelet *treelet = strl__treelets_find(&walk->treelets, tree, 0);
     strl_status status = strl__treelet_load(walk, treelet, span->data, span->size, err);
@@ -92,10 +93,21 @@ static strl_status ask_for_root(strl_walk *walk, root_reads *reads, uint32_t tre
                           tree, bytes, walk->memory_bytes);
     strl__node_reserve(walk, root);
     walk->root_bytes += bytes;
-    return add_read(reads, tree, page->offset, page->bytes, err);
+    return add_read(reads, tree, page->offset, page->bytes, page->checksum, err);
 }
 
-static strl_status take_root(strl_walk *walk, uint32_t tree, const strl_source_span *span, strl_error *err)
+/* The first frames want what lies beside the root. Without memory it is read again. */
+static void keep_page(strl_walk *walk, const strl_page_ref *ref, strl_source_span *span)
+{
+    strl__page *page = strl__page_create(ref, span->data);
+    if (!page)
+        return;
+    span->data = NULL;
+    strl__page_keep(walk, page);
+    strl__page_release(page);
+}
+
+static strl_status take_root(strl_walk *walk, uint32_t tree, strl_source_span *span, strl_error *err)
 {
     strl__walk_tree *own = &walk->trees[tree];
     const strl_node *record = own->root->record;
@@ -114,6 +126,7 @@ static strl_status take_root(strl_walk *walk, uint32_t tree, const strl_source_s
     uint64_t spare = strl__spare_bytes(record, &own->root->mesh); /* a root is never evicted */
     walk->resident_bytes -= spare;
     walk->root_bytes -= spare;
+    keep_page(walk, &record->page, span);
     return STRL_OK;
 }
 
@@ -213,6 +226,8 @@ void strl_walk_close(strl_walk *walk)
     if (!walk)
         return;
     strl__jobs_abandon(walk);
+    while (strl__page_drop_oldest(walk))
+        ;
     strl__placements_deinit(walk);
     strl__treelets_deinit(&walk->treelets);
     strl_container_close(walk->container);
