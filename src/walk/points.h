@@ -26,7 +26,7 @@ typedef struct strl__points {
     bool failed;           /* there was no memory to merge */
 } strl__points;
 
-#define STRL__HOLE_WORK ((uint64_t)8 << 20) /* of a frame: at most a million points */
+#define STRL__HOLE_WORK ((uint64_t)4 << 20) /* of a frame: at most half a million points */
 
 /* splats.c: the points of the front's items [first, end), which are of one placement. */
 void strl__points_take(strl__points *self, size_t first, size_t end);

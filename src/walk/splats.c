@@ -7,6 +7,7 @@
 
 #include "geometry/octahedral.h"
 
+#define COARSE_PX 16.0  /* cells that close holes need not be smaller: they are there for moments */
 #define MOST_PARTS 32.0 /* along a side of a cell that is larger than any point */
 /* By measure: less turns more transparent what is seen from the side, and opens pixels between splats; more leaves foliage too dense. */
 #define SCATTERED 0.25f
@@ -140,15 +141,19 @@ static void take_shown(strl__points *self, const strl__active *active)
 
 /* ---- what is not there yet */
 
-strl__splat_run strl__finest_splats(const strl__node *node)
+static strl__splat_run splats_of_state(const strl__node *node, uint32_t state)
 {
     const strl__mesh *mesh = &node->mesh;
-    uint32_t states = mesh->splat_end ? mesh->step_count : 0;
-    uint32_t first = states > 1 ? mesh->splat_end[states - 2] : 0, end = states ? mesh->splat_end[states - 1] : 0;
-    strl__splat_run run = {node->record, mesh->splats + first, end - first, UINT8_MAX};
+    uint32_t first = state ? mesh->splat_end[state - 1] : 0;
+    strl__splat_run run = {node->record, mesh->splats + first, mesh->splat_end[state] - first, UINT8_MAX};
     for (uint32_t i = 0; i < run.count; i++)
         run.least_side = run.splats[i].side < run.least_side ? run.splats[i].side : run.least_side;
     return run;
+}
+
+strl__splat_run strl__finest_splats(const strl__node *node)
+{
+    return node->mesh.splat_end ? splats_of_state(node, node->mesh.step_count - 1) : (strl__splat_run){.least_side = UINT8_MAX};
 }
 
 /* The least size that is not less than px, as far as there is one. */
@@ -241,18 +246,24 @@ static void take_cell(strl__points *self, const strl__active *active, const strl
     }
 }
 
-/* The finest splats of the brick, or those of the tree's preview that lie in it, where these are finer. A frame does so much of this and no
- * more, whatever a file says. */
+/* The coarsest splats of the brick whose cells are no more than a few pixels, else the finest, or those of the tree's preview that lie in the
+ * brick, where these are finer. A frame does so much of this and no more, whatever a file says. */
 static void take_missing(strl__points *self, const strl__active *active)
 {
     const strl__node *node = active->node;
+    const strl__mesh *mesh = &node->mesh;
+    uint32_t state = 0;
+    if (active->state < mesh->step_count || active->open || node->record->child_count == 0)
+        return;
+    while (state + 1 < mesh->step_count &&
+           strl_sight_error_px(&active->sight, (double)mesh->errors[state] * active->placed->length_scale) > COARSE_PX)
+        state++;
+    const strl__splat_run own = splats_of_state(node, state), *preview = &self->walk->trees[active->placed->tree].preview;
+    bool is_coarse = strl_sight_error_px(&active->sight, (double)mesh->errors[state] * active->placed->length_scale) > COARSE_PX;
+    bool is_finer = is_coarse && preview->least_side < own.least_side;
+    const strl__splat_run run = is_finer ? *preview : own;
     self->unit_share = 1;
     find_sight(self, active);
-    if (active->state < node->mesh.step_count || active->open || node->record->child_count == 0)
-        return;
-    const strl__splat_run own = strl__finest_splats(node), *preview = &self->walk->trees[active->placed->tree].preview;
-    bool is_finer = preview->least_side < own.least_side;
-    const strl__splat_run run = is_finer ? *preview : own;
     for (uint32_t i = 0; i < run.count && self->work > 0; i++, self->work--)
         if (!is_finer || is_within(node->record, run.record, &run.splats[i]))
             take_cell(self, active, run.record, &run.splats[i]);
