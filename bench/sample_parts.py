@@ -122,7 +122,7 @@ def compare_splats(bench, model, path, frames):
 
 
 def part_splats(bench, model):
-    settings = {"frames": min(SPLAT_FRAMES, bench.options.frames), "size": bench.options.size, "splats": list(SPLATS)}
+    settings = {"frames": min(SPLAT_FRAMES, bench.options.frames), "size": bench.options.size, "splats": list(SPLATS), "smooth": True}
     if bench.kept("splats", model, settings):
         return
     bench.log.add("splats", model, settings,

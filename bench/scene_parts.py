@@ -14,7 +14,7 @@ SAMPLED = ("isosurface_1m", "isosurface_10m", "dragon_scans", "boxes_1m", "chess
 STRUCTURES = {"samples": SAMPLES, "clusters": ()}
 LARGE = ("landscape_400m samples", "landscape_2g_placed samples", "landscape_2g_placed clusters", "dragon_scans_x10000 samples",
          "dragon_scans_x10000 clusters")
-ROOMY = ("--memory", "4G", "--gpu-memory", "4G")  # the size of the splats decides, not a budget
+ROOMY = ("--memory", "12G", "--gpu-memory", "4G")  # the size of the splats decides, not a budget
 COLUMNS = ("frame_ms", "select_ms", "triangles", "splats", "draws", "requests", "missing_nodes")
 
 
@@ -62,7 +62,7 @@ def twice(bench, container, frames):
 
 def part_chessboard(bench, models):
     """The field of view stays, the fields of the board become smaller. The first turn loads what the second one shows."""
-    settings = {"frames": bench.options.frames, "size": bench.options.size, "models": list(models)}
+    settings = {"frames": bench.options.frames, "turns": 2, "memory": ROOMY[1], "size": bench.options.size, "models": list(models)}
     if all([bench.kept("chessboard", model, settings) for model in models]):
         return
     for model in models:

@@ -59,7 +59,7 @@ typedef struct strl_walk_stats {
     uint32_t requests;         /* reads submitted in this frame */
     uint32_t requests_pending;
     uint64_t bytes_read;       /* answered in this frame */
-    uint64_t resident_bytes;   /* decoded nodes and node records held, reads under way included */
+    uint64_t resident_bytes;   /* decoded nodes, node records and some pages held, reads under way included */
     uint64_t splits, collapses;           /* of nodes, in this frame */
     uint64_t dependent_splits; /* those that only another member of the dependency group asked for */
     uint64_t dependent_collapses; /* those of nodes that had stayed split for another member alone */

@@ -1,5 +1,5 @@
 /* Placements into the container: those that are near each other lie together, so that what bounds a run of them is small. Where some are
- * large beside the rest (the ground under a forest), these come first of all: who reads over a slow link sees them with the first page. */
+ * large beside the rest (the ground under a forest), these come first of their window: who reads over a slow link sees them with the first page. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

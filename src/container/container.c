@@ -16,10 +16,14 @@ static strl_status read_header(strl_container *container, strl_error *err)
         return strl__fail(err, STRL_ERR_FORMAT,
                           "the file has %" PRIu64 " bytes, expected at least the %u of a container's header",
                           source_bytes, STRL__HEADER_BYTES);
-    strl_status status = strl_source_read(container->source, 0, bytes, sizeof bytes, err);
-    if (status != STRL_OK)
-        return status;
-    return strl__header_decode(bytes, source_bytes, &container->header, err);
+    strl_status status;
+    unsigned attempt = 1;
+    do {
+        status = strl_source_read(container->source, 0, bytes, sizeof bytes, err);
+        if (status == STRL_OK)
+            status = strl__header_decode(bytes, source_bytes, &container->header, err);
+    } while (status == STRL_ERR_FORMAT && strl_source_ask_again(container->source, &attempt, 0, sizeof bytes));
+    return status;
 }
 
 static strl_status decode_trees(strl_container *container, const uint8_t *bytes, strl_error *err)
@@ -41,7 +45,8 @@ static strl_status read_trees(strl_container *container, strl_error *err)
     uint8_t *bytes = strl__alloc(ref->bytes, 1); /* the header's check bounds it by 512 records */
     if (!bytes)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for the %" PRIu32 " bytes of the trees section", ref->bytes);
-    strl_status status = strl_source_read(container->source, ref->offset, bytes, ref->bytes, err);
+    const strl_source_span span = {ref->offset, ref->bytes, bytes, ref->checksum};
+    strl_status status = strl_source_read_known(container->source, &span, err);
     uint64_t found = status == STRL_OK ? strl__checksum(bytes, ref->bytes) : 0;
     if (status == STRL_OK && found != ref->checksum) {
         strl_source_doubt(container->source, ref->offset, ref->bytes);

@@ -21,8 +21,9 @@ static strl_status load_page(strl_container *container, const strl_page_ref *pag
                             STRL__MAX_PAGE_BYTES);
     if (status == STRL_OK && !strl__grow(&container->page, &container->page_capacity, page->bytes, 1))
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a page of %" PRIu32 " bytes", page->bytes);
+    const strl_source_span span = {page->offset, page->bytes, container->page, page->checksum};
     if (status == STRL_OK)
-        status = strl_source_read(container->source, page->offset, container->page, page->bytes, err);
+        status = strl_source_read_known(container->source, &span, err);
     if (status == STRL_OK)
         status = strl_page_check(page, container->page, page->bytes, err);
     if (status == STRL_ERR_FORMAT)

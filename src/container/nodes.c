@@ -44,7 +44,8 @@ static strl_status read_treelet(strl_container *container, uint32_t tree, uint32
     uint8_t *bytes = strl__alloc(ref->bytes, 1); /* at most STRL__MAX_TREELET_BYTES, checked where it was read */
     if (!bytes)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for treelet %" PRIu32, index);
-    strl_status status = strl_source_read(container->source, ref->offset, bytes, ref->bytes, err);
+    const strl_source_span span = {ref->offset, ref->bytes, bytes, ref->checksum};
+    strl_status status = strl_source_read_known(container->source, &span, err);
     if (status == STRL_OK)
         status = strl_treelet_decode(container, tree, index, ref, bytes, ref->bytes, treelet, err);
     if (status == STRL_ERR_FORMAT)

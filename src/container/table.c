@@ -71,7 +71,8 @@ static strl_status load(strl__table *table, unsigned depth, strl_source *source,
         page->data = strl__alloc(STRL__TABLE_PAGE_BYTES, 1);
     if (!page->data)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a page of the table of %s", table->name);
-    status = strl_source_read(source, ref->offset, page->data, ref->bytes, err);
+    const strl_source_span span = {ref->offset, ref->bytes, page->data, ref->checksum};
+    status = strl_source_read_known(source, &span, err);
     if (status != STRL_OK)
         return status;
     strl__page_table_page candidate = {page->data, *ref, first, end};

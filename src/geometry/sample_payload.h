@@ -24,6 +24,9 @@ typedef struct strl_splat {
 /* Of a cell: a 32nd of it is what 32 bits can say. */
 #define STRL_SPLAT_MOST_SIDE 36u
 
+/* A cell of side 1 covers at most sqrt(3) of an image, as much as a square of this side: the size of a cell is its side times this. */
+#define STRL_SQUARE_OF_CUBE 1.3160741
+
 /* Centres are stored in units of 2^this, a 32nd of the cell's side. */
 static inline unsigned strl_splat_shift(unsigned side)
 {

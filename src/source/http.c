@@ -338,6 +338,8 @@ static void http_doubt(strl_source *source, uint64_t offset, size_t size)
         ahead->data = NULL;
     }
     strl__http_forget(http, offset, size);
+    if (offset < http->head_bytes)
+        http->head_bytes = 0; /* what comes in its place tells which model it is */
     strl_mutex_unlock(&http->mutex);
 }
 

@@ -49,20 +49,29 @@ static void judge(strl__http_transfer *transfer)
         learn_identity(transfer);
 }
 
+/* Mutex held. A read from the first byte on has come. */
+static void learn_head(strl__http *http, const strl__http_read *read)
+{
+    size_t bytes = (size_t)(read->end - read->begin);
+    http->head_bytes = bytes < STRL__HTTP_HEAD_BYTES ? bytes : STRL__HTTP_HEAD_BYTES;
+    memcpy(http->head, read->result.data, http->head_bytes);
+    strl__cache_model(http->head, http->head_bytes, http->identity.total, http->model);
+}
+
 /* Mutex held. */
 static void deliver(strl__http_transfer *transfer, strl__http_read *read)
 {
     strl__http *http = transfer->http;
     read->result.status = STRL_OK;
     if (transfer->opening) {
-        memcpy(http->head, read->result.data, read->size);
-        http->head_bytes = read->size;
-        strl__cache_model(http->head, http->head_bytes, http->identity.total, http->model);
+        learn_head(http, read);
         http->opened = true;
     } else {
         bool alone = read->begin <= transfer->begin && read->end >= transfer->end;
         http->stats.reads++;
         http->stats.merged_reads += !alone;
+        if (http->head_bytes == 0 && read->begin == 0)
+            learn_head(http, read); /* it was doubted */
         strl__http_keep(http, read->offset, read->result.data + (read->offset - read->begin), read->size);
     }
     strl__http_read_finish(http, read);
@@ -298,6 +307,13 @@ static const struct {
     {CURLE_SSL_CONNECT_ERROR, STRL__HTTP_AGAIN, "there is no secure connection"},
 };
 
+/* Such as the end of an answer that was longer than it said, on a connection that is used again. After a redirect the code is of where
+ * that leads to. */
+static bool is_no_answer(const strl__http_transfer *transfer, CURLcode code)
+{
+    return code == CURLE_UNSUPPORTED_PROTOCOL && transfer->fields.status / 100 != 3;
+}
+
 /* What libcurl's code means, where nothing of ours has said it already. */
 static void explain(strl__http_transfer *transfer, CURLcode code)
 {
@@ -305,6 +321,10 @@ static void explain(strl__http_transfer *transfer, CURLcode code)
     if (transfer->error.message[0])
         return;
     transfer->verdict = STRL__HTTP_AGAIN;
+    if (is_no_answer(transfer, code)) {
+        strl__fail(&transfer->error, STRL_ERR_NETWORK, "the server sends more than it says, or what is no answer: %s", reason);
+        return;
+    }
     for (size_t i = 0; i < sizeof failures / sizeof *failures; i++)
         if (failures[i].code == code) {
             transfer->verdict = failures[i].verdict;
@@ -421,7 +441,7 @@ static void fail(strl__http_transfer *transfer, CURLcode code)
 {
     strl__http *http = transfer->http;
     uint64_t now_ns = strl_clock_ns();
-    bool reached = transfer->fields.status != 0;
+    bool reached = transfer->fields.status != 0 || is_no_answer(transfer, code);
     explain(transfer, code);
     strl__http_name_error(http, &transfer->error);
     if (transfer->verdict == STRL__HTTP_CHANGED) {

@@ -5,6 +5,10 @@
 #include <string.h>
 
 #include "base/fail.h"
+#include "base/hash.h"
+#include "base/memory.h"
+
+#define MOST_ATTEMPTS 8u /* at bytes that come wrong: where every other answer is, one read in 256 fails */
 
 static strl_status check_range(const strl_source *source, uint64_t offset, size_t size, strl_error *err)
 {
@@ -39,15 +43,63 @@ strl_status strl_source_read(strl_source *source, uint64_t offset, void *data, s
     return status == STRL_OK ? source->klass->read(source, offset, data, size, err) : status;
 }
 
+bool strl_source_ask_again(strl_source *source, unsigned *attempt, uint64_t offset, size_t size)
+{
+    if (!source->klass->doubt || ++*attempt > MOST_ATTEMPTS)
+        return false;
+    strl_source_doubt(source, offset, size);
+    return true;
+}
+
+static bool is_wrong(const strl_source_span *span)
+{
+    return strl__checksum(span->data, span->size) != span->checksum;
+}
+
+strl_status strl_source_read_known(strl_source *source, const strl_source_span *span, strl_error *err)
+{
+    strl_status status;
+    unsigned attempt = 1;
+    do {
+        status = strl_source_read(source, span->offset, span->data, span->size, err);
+    } while (status == STRL_OK && source->klass->doubt && is_wrong(span) &&
+             strl_source_ask_again(source, &attempt, span->offset, span->size));
+    return status;
+}
+
+/* Those that came wrong, together again. */
+static strl_status mend(strl_source *source, const strl_source_span *spans, size_t count, strl_error *err)
+{
+    strl_source_span *wrong = strl__alloc(count, sizeof *wrong);
+    if (!wrong)
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu reads", count);
+    strl_status status = STRL_OK;
+    for (unsigned attempt = 1; status == STRL_OK; attempt++) {
+        size_t wrong_count = 0;
+        for (size_t i = 0; i < count; i++) {
+            unsigned own = attempt;
+            if (is_wrong(&spans[i]) && strl_source_ask_again(source, &own, spans[i].offset, spans[i].size))
+                wrong[wrong_count++] = spans[i];
+        }
+        if (wrong_count == 0)
+            break;
+        status = source->klass->read_many(source, wrong, wrong_count, err);
+    }
+    strl__free(wrong);
+    return status;
+}
+
 strl_status strl_source_read_many(strl_source *source, const strl_source_span *spans, size_t count, strl_error *err)
 {
     strl_status status = STRL_OK;
     for (size_t i = 0; status == STRL_OK && i < count; i++)
         status = check_range(source, spans[i].offset, spans[i].size, err);
-    if (status == STRL_OK && source->klass->read_many)
-        return source->klass->read_many(source, spans, count, err);
+    if (status == STRL_OK && count > 0 && source->klass->read_many) {
+        status = source->klass->read_many(source, spans, count, err);
+        return status == STRL_OK ? mend(source, spans, count, err) : status;
+    }
     for (size_t i = 0; status == STRL_OK && i < count; i++)
-        status = source->klass->read(source, spans[i].offset, spans[i].data, spans[i].size, err);
+        status = strl_source_read_known(source, &spans[i], err);
     return status;
 }
 

@@ -23,6 +23,7 @@ typedef struct strl_source_span {
     uint64_t offset;
     size_t size;
     void *data; /* the caller's, of `size` bytes */
+    uint64_t checksum; /* that they should have, as strl__checksum */
 } strl_source_span;
 
 /* Implementations fill this in as the first member of their own struct. */
@@ -59,8 +60,14 @@ bool strl_source_poll(strl_source *source, strl_source_result *result);
 void strl_source_cancel(strl_source *source, uint64_t token);
 /* Reads and waits: for opening a container and for tools, never for a frame. */
 strl_status strl_source_read(strl_source *source, uint64_t offset, void *data, size_t size, strl_error *err);
-/* The same of several ranges, which a network brings in a few round trips. The failure is that of the first of them that failed. */
+/* The same of bytes whose checksum is known. Over a network they are asked for again while they have another; after some attempts it
+ * succeeds all the same, and who looks at them says what is wrong. */
+strl_status strl_source_read_known(strl_source *source, const strl_source_span *span, strl_error *err);
+/* The same of several of them, which a network brings in a few round trips. The failure is that of the first of them that failed. */
 strl_status strl_source_read_many(strl_source *source, const strl_source_span *spans, size_t count, strl_error *err);
+/* Whether to read once more what was not what it should be, this having been attempt 1, 2, ...: counts it, and doubts the bytes. Never of what
+ * is no network's. */
+bool strl_source_ask_again(strl_source *source, unsigned *attempt, uint64_t offset, size_t size);
 /* How many bytes may be asked for now so that they come soon, and that what is more urgent a moment later does not have
  * to wait behind them: follows bandwidth and latency. UINT64_MAX where there is nothing to wait for. What is submitted
  * beyond it is served all the same. */

@@ -9,7 +9,7 @@
  * of all members are resident, so that the front is a cut without cracks whatever is resident; (2)
  * nodes of the wanted cut and all their ancestors carry wanted_frame = this frame and are not
  * evicted, so that collapsing never waits; (3) resident_bytes counts meshes, records,
- * placements and reservations of reads under way, and never exceeds memory_bytes; (4) a run of placements whose page is not there is
+ * placements, pages kept and reservations of reads under way, and never exceeds memory_bytes; (4) a run of placements whose page is not there is
  * drawn as a point; a page that the front points into carries wanted_frame = this frame. */
 #ifndef STRL_WALK_INTERNAL_H
 #define STRL_WALK_INTERNAL_H
@@ -21,7 +21,6 @@
 #include "frame/view.h"
 #include "stroll/walk.h"
 
-#define STRL__REQUEST_NODES 32u /* most nodes that one page is read for at a time */
 #define STRL__MAX_REQUESTS 256u
 #define STRL__SPLAT_ROOM 2048u /* bytes that a decoded node may take beside what its record says: splats of an empty brick */
 #define STRL__PREVIEW_ROOM (STRL_BRICK_SPLATS * sizeof(strl_splat)) /* the same of the first node of a tree */
@@ -69,6 +68,7 @@ typedef struct strl__node {
     struct strl__treelet *treelet;
     struct strl__node *older, *newer; /* residency list; resident nodes only */
     struct strl__request *request;    /* while pending */
+    struct strl__node *next_asked;    /* while the request is not answered */
     struct strl__node *decoded_by;    /* while pending: the node whose mesh the payload is told by, or NULL */
     uint32_t decoding;                /* pending nodes that are decoded by this one: it is not evicted */
     strl__mesh mesh;                  /* resident nodes only */
@@ -140,11 +140,32 @@ typedef struct strl__bound_level {
 
 #define STRL__BOUND_LEVELS 4u /* for 2^24 placements */
 
+/* Of splats: shares of the allowed size, a cell being as a rule half as large as the one above; then those that close holes,
+ * STRL__MOST_POINT_PX and halves of it, two for each. */
+#define STRL__POINT_SHARES 4u
+#define STRL__MISSING_SIZES 8u
+#define STRL__POINT_SIZES (STRL__POINT_SHARES + STRL__MISSING_SIZES)
+
+/* The finest splats that a brick shows. */
+typedef struct strl__splat_run {
+    const strl_node *record;
+    const strl_splat *splats;
+    uint32_t count;
+    uint8_t least_side; /* UINT8_MAX where there is none */
+} strl__splat_run;
+
+/* Points of a placement that has items of its own. */
+typedef struct strl__placed_points {
+    size_t active; /* the first of the front's items that are of it */
+    uint32_t count[STRL__POINT_SIZES];
+} strl__placed_points;
+
 typedef struct strl__walk_tree {
     const strl_tree *tree; /* borrowed from the container */
     strl__node *root;      /* NULL where no placement uses the tree */
     bool used, shared;     /* by a placement; by several. Where there are many placements both are taken to be so. */
     strl_far far;
+    strl__splat_run preview; /* of the root, which stays */
 } strl__walk_tree;
 
 /* Points of one size, for what is not drawn itself. */
@@ -155,19 +176,16 @@ typedef struct strl__far_points {
     double px; /* the largest box that one of them stands for, in pixels */
 } strl__far_points;
 
-/* Of splats: shares of the allowed size, a cell being as a rule half as large as the one above; then those that close holes,
- * STRL__MOST_POINT_PX and halves of it, two for each. */
-#define STRL__POINT_SHARES 4u
-#define STRL__MISSING_SIZES 8u
-#define STRL__POINT_SIZES (STRL__POINT_SHARES + STRL__MISSING_SIZES)
 #define STRL__FAR_SIZES 7u /* 0: the size of the allowed error; k: 2^k pixels, for runs that are not there yet */
 
-/* A page's bytes, shared by the decode jobs of its nodes. */
+/* A page's bytes, shared by the decode jobs of its nodes. They have the checksum that `ref` tells. */
 typedef struct strl__page {
     atomic_uint references;
-    uint8_t *data; /* owned */
-    size_t size;
+    strl_page_ref ref;
+    uint8_t *data; /* owned; ref.bytes of them */
 } strl__page;
+
+#define STRL__KEPT_PAGES 64u
 
 enum { STRL__JOB_QUEUED, STRL__JOB_RUNNING, STRL__JOB_DONE, STRL__JOB_ABANDONED };
 
@@ -195,7 +213,7 @@ typedef struct strl__request {
     strl__treelet *treelet; /* records asked for, or */
     strl__run *run;         /* placements; both NULL = a page for nodes */
     uint32_t node_count;    /* asked for; after the answer: not decoded yet */
-    strl__node *nodes[STRL__REQUEST_NODES];
+    strl__node *first_asked, *last_asked; /* until the answer */
 } strl__request;
 
 /* Something to read: a node's mesh, the treelet with the children of a node, or the page of a run. */
@@ -340,8 +358,11 @@ struct strl_walk {
     strl__treelets treelets;
     uint64_t treelet_bytes; /* part of resident_bytes */
     uint64_t placement_bytes; /* the same: what stays of placements; 0 where there are few */
+    uint64_t kept_bytes;      /* the same: pages that came a moment ago */
     uint64_t resident_bytes;
     strl__node *oldest, *newest;
+    strl__page *kept[STRL__KEPT_PAGES]; /* the oldest first */
+    size_t kept_count;
 
     strl__request requests[STRL__MAX_REQUESTS];
     uint32_t requests_in_flight, requests_pending;
@@ -368,6 +389,9 @@ struct strl_walk {
     size_t item_capacity;
     strl_vertex *points; /* splats of the frame */
     size_t point_count, point_capacity;
+    uint64_t hole_work; /* of the frame: left, see points.h */
+    strl__placed_points *placed_points; /* of the frame */
+    size_t placed_count, placed_capacity;
     float scattered[256]; /* of a splat's coverage: 0 = the faces are a wall, 1 = there is nearly none */
     strl__far_points far[STRL__FAR_SIZES]; /* of the frame */
     strl__far_points merged[STRL__POINT_SIZES]; /* splats of placements that show few, of the frame */
@@ -380,6 +404,8 @@ struct strl_walk {
 /* mesh.c: thread-safe. */
 /* What a decoded node takes at most, known before anything is fetched. */
 uint64_t strl__node_bytes(const strl_node *record, bool labels);
+/* How much of that the splats of a root turned out not to take. */
+uint64_t strl__spare_bytes(const strl_node *record, const strl__mesh *mesh);
 strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size,
                               const strl_payload_reference *reference, bool labels, bool shared, strl__mesh *mesh, strl_error *err);
 /* The finest state of a node's mesh, for the payload of another node. */
@@ -445,10 +471,20 @@ bool strl__treelets_insert(strl__treelets *treelets, strl__treelet *treelet); /*
 void strl__treelets_remove(strl__treelets *treelets, strl__treelet *treelet); /* and releases it */
 void strl__treelets_deinit(strl__treelets *treelets);
 
+/* pages.c */
+/* Of bytes that have been checked, which it owns from then on; its one reference is the caller's. NULL without memory: then data still is. */
+strl__page *strl__page_create(const strl_page_ref *ref, uint8_t *data);
+strl__page *strl__page_share(strl__page *page); /* a further reference; NULL is legal */
+void strl__page_release(strl__page *page); /* thread-safe; NULL is legal */
+void strl__page_keep(strl_walk *walk, strl__page *page); /* for a while, where there is room for it */
+strl__page *strl__page_find(strl_walk *walk, const strl_page_ref *ref); /* a kept one; borrowed; NULL = there is none */
+bool strl__page_drop_oldest(strl_walk *walk); /* false: none is kept */
+
 /* residency.c */
 /* Evicts what has waited longest and that this frame does not need until `bytes` fit; evict_before:
  * only what was touched before that frame. False where it does not fit. */
 bool strl__make_room(strl_walk *walk, uint64_t bytes, uint64_t evict_before);
+uint64_t strl__idle_since(const strl_walk *walk); /* what was touched before this frame is needed for nothing soon */
 /* A treelet without content yet, its bytes reserved; NULL where there is no room or no memory. */
 strl__treelet *strl__treelet_reserve(strl_walk *walk, uint32_t tree, uint32_t index, const strl_treelet_ref *ref);
 strl_status strl__treelet_load(strl_walk *walk, strl__treelet *treelet, const void *data, size_t size, strl_error *err);
@@ -495,6 +531,10 @@ void strl__refine_front(strl_walk *walk);
 /* brick.c: thread-safe. Vertices and labels are the caller's to fill in. */
 strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const strl_brick_head *head, bool labels,
                                strl__mesh *mesh, strl_error *err);
+
+/* splats.c */
+strl__splat_run strl__finest_splats(const strl__node *node);
+void strl__points_prepare(strl_walk *walk);
 
 /* points.c: behind the other items of the list. */
 strl_status strl__draw_splats(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err);

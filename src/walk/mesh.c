@@ -42,9 +42,20 @@ static void make_labels(const strl_pm *pm, strl_vertex_label *labels)
 
 /* ---- layout */
 
+static bool has_preview(const strl_node *record)
+{
+    return record->rung == STRL_RUNG_SAMPLED && record->parent == STRL_NONE && record->child_count > 0;
+}
+
+uint64_t strl__spare_bytes(const strl_node *record, const strl__mesh *mesh)
+{
+    uint64_t splats = mesh->splat_end ? mesh->splat_end[mesh->step_count - 1] * sizeof(strl_splat) : 0;
+    return has_preview(record) && splats < STRL__PREVIEW_ROOM ? STRL__PREVIEW_ROOM - splats : 0;
+}
+
 uint64_t strl__node_bytes(const strl_node *record, bool labels)
 {
-    uint64_t splats = record->rung != STRL_RUNG_SAMPLED ? 0 : record->parent == STRL_NONE && record->child_count ? STRL__PREVIEW_ROOM : STRL__SPLAT_ROOM;
+    uint64_t splats = has_preview(record) ? STRL__PREVIEW_ROOM : record->rung == STRL_RUNG_SAMPLED ? STRL__SPLAT_ROOM : 0;
     return strl_node_decoded_bytes(record) + splats + (labels ? record->vertex_count * sizeof(strl_vertex_label) : 0);
 }
 

@@ -82,7 +82,7 @@ static size_t count_points(strl_walk *walk, const strl_view *view, size_t first,
 {
     const strl__placement *placed = walk->front.items[first].placed;
     size_t all = 0;
-    *counted = (strl__points){.walk = walk, .view = view, .placed = placed, .tree = walk->trees[placed->tree].tree};
+    *counted = (strl__points){.walk = walk, .view = view, .placed = placed, .tree = walk->trees[placed->tree].tree, .work = walk->hole_work};
     strl__points_take(counted, first, end);
     for (unsigned k = 0; k < STRL__POINT_SIZES; k++)
         all += counted->at[k];
@@ -95,28 +95,45 @@ static bool is_merged(const strl_walk *walk, size_t points)
     return points <= MOST_MERGED && walk->placement_count > 1;
 }
 
+static strl_status merge_points(strl__points *made, size_t first, size_t end, strl_error *err)
+{
+    made->purpose = STRL__POINTS_MERGE;
+    find_turn(made->placed->transform, made->turn);
+    strl__points_take(made, first, end);
+    return made->failed ? strl__fail(err, STRL_ERR_MEMORY, "no memory for splats of many placements") : STRL_OK;
+}
+
+static strl_status make_points(strl__points *made, size_t all, size_t first, size_t end, strl_error *err)
+{
+    strl_walk *walk = made->walk;
+    size_t at = walk->point_count;
+    if (!strl__grow(&walk->points, &walk->point_capacity, at + all, sizeof *walk->points) ||
+        !strl__grow(&walk->placed_points, &walk->placed_capacity, walk->placed_count + 1, sizeof *walk->placed_points))
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu splats", at + all);
+    strl__placed_points *placed = &walk->placed_points[walk->placed_count++];
+    placed->active = first;
+    for (unsigned k = 0; k < STRL__POINT_SIZES; k++) {
+        placed->count[k] = (uint32_t)made->at[k];
+        made->at[k] = at;
+        at += placed->count[k];
+    }
+    made->purpose = STRL__POINTS_MAKE;
+    strl__points_take(made, first, end);
+    walk->point_count = at;
+    return STRL_OK;
+}
+
+/* Counted first, then made; both end alike, because both begin with the same work left. */
 static strl_status add_points(strl_walk *walk, const strl_view *view, size_t first, size_t end, strl_error *err)
 {
     strl__points made;
-    size_t all = count_points(walk, view, first, end, &made), at = walk->point_count;
-    if (!all)
-        return STRL_OK;
-    made.purpose = is_merged(walk, all) ? STRL__POINTS_MERGE : STRL__POINTS_MAKE;
-    if (made.purpose == STRL__POINTS_MERGE) {
-        find_turn(made.placed->transform, made.turn);
-        strl__points_take(&made, first, end);
-        return made.failed ? strl__fail(err, STRL_ERR_MEMORY, "no memory for splats of many placements") : STRL_OK;
-    }
-    for (unsigned k = 0; k < STRL__POINT_SIZES; k++) {
-        size_t count = made.at[k];
-        made.at[k] = at;
-        at += count;
-    }
-    if (!strl__grow(&walk->points, &walk->point_capacity, at, sizeof *walk->points))
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu splats", at);
-    strl__points_take(&made, first, end);
-    walk->point_count = at;
-    return STRL_OK;
+    size_t all = count_points(walk, view, first, end, &made);
+    strl_status status = STRL_OK;
+    made.work = walk->hole_work;
+    if (all)
+        status = is_merged(walk, all) ? merge_points(&made, first, end, err) : make_points(&made, all, first, end, err);
+    walk->hole_work = all ? made.work : walk->hole_work;
+    return status;
 }
 
 /* ---- items */
@@ -172,21 +189,17 @@ static strl_draw_item shape_of(const strl_walk *walk, const strl__active *active
 }
 
 /* Items are made when all points are there: the array has its place only then. */
-static strl_status list_splats(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err)
+static strl_status list_splats(strl_walk *walk, strl_draw_list *list, strl_error *err)
 {
-    const strl__front *front = &walk->front;
     strl_status status = STRL_OK;
     size_t at = 0;
-    for (size_t i = 0, next; i < front->count && !status; i = next) {
-        strl__points counted;
-        next = end_of_placement(front, i);
-        if (is_merged(walk, count_points(walk, view, i, next, &counted)))
-            continue;
-        for (unsigned k = 0; k < STRL__POINT_SIZES && !status; at += counted.at[k++]) {
-            if (!counted.at[k])
+    for (size_t i = 0; i < walk->placed_count && !status; i++) {
+        const strl__placed_points *placed = &walk->placed_points[i];
+        for (unsigned k = 0; k < STRL__POINT_SIZES && !status; at += placed->count[k++]) {
+            if (!placed->count[k])
                 continue;
-            const strl_draw_item shape = shape_of(walk, &front->items[i], strl__points_px(walk, k));
-            status = add_items(walk, &shape, walk->points + at, NULL, counted.at[k], list, err);
+            const strl_draw_item shape = shape_of(walk, &walk->front.items[placed->active], strl__points_px(walk, k));
+            status = add_items(walk, &shape, walk->points + at, NULL, placed->count[k], list, err);
         }
     }
     return status;
@@ -202,7 +215,8 @@ static strl_status list_far(strl_walk *walk, const strl__far_points *points, dou
 strl_status strl__draw_splats(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err)
 {
     strl_status status = STRL_OK;
-    walk->point_count = 0;
+    walk->point_count = walk->placed_count = 0;
+    walk->hole_work = STRL__HOLE_WORK;
     for (unsigned size = 0; size < STRL__POINT_SIZES; size++)
         walk->merged[size].count = 0, walk->merged[size].px = strl__points_px(walk, size);
     for (size_t i = 0, next; i < walk->front.count && !status; i = next) {
@@ -218,7 +232,7 @@ strl_status strl__draw_splats(strl_walk *walk, const strl_view *view, strl_draw_
         return status;
     if (!fill_numbers(walk))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for splats");
-    status = list_splats(walk, view, list, err);
+    status = list_splats(walk, list, err);
     for (unsigned size = 0; size < STRL__POINT_SIZES && !status; size++)
         status = list_far(walk, &walk->merged[size], walk->merged[size].px, list, err);
     for (unsigned size = 0; size < STRL__FAR_SIZES && !status; size++)

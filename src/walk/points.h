@@ -21,9 +21,12 @@ typedef struct strl__points {
     float sight[3];        /* direction to the brick in the tree's space, of length 1 */
     double unit_share;     /* of a point, what the side of a cell of one lattice unit takes */
     size_t at[STRL__POINT_SIZES]; /* how many so far, or where the next goes */
+    uint64_t work;         /* that may still be done to close holes, see splats.c */
     double turn[9];        /* of normals, row-major; to be merged */
     bool failed;           /* there was no memory to merge */
 } strl__points;
+
+#define STRL__HOLE_WORK ((uint64_t)4 << 20) /* of a frame: at most half a million points */
 
 /* splats.c: the points of the front's items [first, end), which are of one placement. */
 void strl__points_take(strl__points *self, size_t first, size_t end);

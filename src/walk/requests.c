@@ -8,23 +8,14 @@
 #include "platform/thread.h"
 
 #define FORGET_FRAMES 16u /* a read that nothing has wanted for this long is cancelled */
-#define SPARE_FRAMES 60u  /* prefetching evicts only what has been idle for longer */
 #define ABANDON_WAIT_NS 50000u
 
 /* ---- jobs */
 
-static void release_page(strl__page *page)
-{
-    if (page && atomic_fetch_sub_explicit(&page->references, 1, memory_order_acq_rel) == 1) {
-        strl__free(page->data);
-        strl__free(page);
-    }
-}
-
 static void destroy_job(strl__job *job)
 {
     strl__mesh_deinit(&job->mesh);
-    release_page(job->page);
+    strl__page_release(job->page);
     strl__free(job);
 }
 
@@ -38,7 +29,7 @@ static void run_job(void *context)
         return;
     }
     const strl_payload_reference *reference = job->record.decode_parent != STRL_NONE ? &job->reference : NULL;
-    job->status = strl__mesh_create(&job->record, job->page->data, job->page->size, reference, job->labels, job->shared, &job->mesh,
+    job->status = strl__mesh_create(&job->record, job->page->data, job->page->ref.bytes, reference, job->labels, job->shared, &job->mesh,
                                     &job->error);
     atomic_store_explicit(&job->phase, STRL__JOB_DONE, memory_order_release);
 }
@@ -165,7 +156,7 @@ static strl_status start_job(strl_walk *walk, strl__node *node, strl__page *page
     strl__job *job = strl__alloc_zero(1, sizeof *job);
     if (!job || !strl__grow(&walk->jobs, &walk->job_capacity, walk->job_count + 1, sizeof *walk->jobs)) {
         strl__free(job);
-        release_page(page);
+        strl__page_release(page);
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to decode a node");
     }
     job->page = page;
@@ -202,39 +193,38 @@ static void request_failed(strl_walk *walk, strl__request *request, const strl_e
         free_slot(walk, request);
         return;
     }
-    for (uint32_t i = request->node_count; i-- > 0;) {
+    for (strl__node *next, *node = request->first_asked; node; node = next) {
+        next = node->next_asked;
         if (is_fault)
-            strl__back_off(walk, &request->nodes[i]->retry, is_unread);
-        drop_node(walk, request, request->nodes[i]);
+            strl__back_off(walk, &node->retry, is_unread);
+        drop_node(walk, request, node);
     }
 }
 
 static void receive_page(strl_walk *walk, strl__request *request, strl_source_result *result)
 {
     strl_error error = {0};
-    uint32_t count = request->node_count;
     strl__page *page = NULL;
-    const strl_page_ref *ref = &request->nodes[0]->record->page;
+    strl__node *node = request->first_asked;
+    const strl_page_ref *ref = &node->record->page;
     strl_status status = strl_page_check(ref, result->data, result->size, &error);
     if (status != STRL_OK)
         strl_source_doubt(walk->source, ref->offset, ref->bytes);
-    if (status == STRL_OK && !(page = strl__alloc_zero(1, sizeof *page)))
+    if (status == STRL_OK && !(page = strl__page_create(ref, result->data)))
         status = strl__fail(&error, STRL_ERR_MEMORY, "no memory for a page");
     if (status != STRL_OK) {
         request_failed(walk, request, &error, false);
         return;
     }
-    page->data = result->data, page->size = result->size;
     result->data = NULL;
-    atomic_init(&page->references, count + 1);
     request->answered = true;
-    strl__node *nodes[STRL__REQUEST_NODES];
-    for (uint32_t i = 0; i < count; i++)
-        nodes[i] = request->nodes[i];
-    for (uint32_t i = 0; i < count; i++)
-        if (start_job(walk, nodes[i], page, &error) != STRL_OK)
-            node_failed(walk, request, nodes[i], &error);
-    release_page(page);
+    for (strl__node *next; node; node = next) {
+        next = node->next_asked; /* the last one takes the request along where it fails */
+        if (start_job(walk, node, strl__page_share(page), &error) != STRL_OK)
+            node_failed(walk, request, node, &error);
+    }
+    strl__page_keep(walk, page);
+    strl__page_release(page);
 }
 
 static void receive_treelet(strl_walk *walk, strl__request *request, const strl_source_result *result)
@@ -306,12 +296,13 @@ static int by_urgency(const void *left, const void *right)
     return at_a < at_b ? -1 : at_a > at_b;
 }
 
-static strl__request *unanswered_page(strl_walk *walk, uint64_t offset)
+/* Of which more nodes can be asked for. answered: the page is here, and nodes of it are being decoded. */
+static strl__request *request_of(strl_walk *walk, uint64_t offset, bool answered)
 {
     for (uint32_t i = 0; i < walk->requests_in_flight; i++) {
         strl__request *request = &walk->requests[i];
-        if (request->used && !request->answered && !request->cancelled && !request->treelet && !request->run &&
-            request->offset == offset && request->node_count < STRL__REQUEST_NODES)
+        if (request->used && request->answered == answered && !request->cancelled && !request->treelet && !request->run &&
+            request->offset == offset)
             return request;
     }
     return NULL;
@@ -347,16 +338,35 @@ static strl_status submit(strl_walk *walk, strl__request *request, uint64_t offs
     return status;
 }
 
-static void submit_page(strl_walk *walk, strl__request *request, strl__node *node, float urgency)
+static void add_node(strl_walk *walk, strl__request *request, strl__node *node)
 {
-    const strl_page_ref *page = &node->record->page;
-    strl_error error = {0};
-    request->offset = page->offset;
-    request->nodes[request->node_count++] = node;
     strl__node_reserve(walk, node);
     strl__retry_asked(walk, &node->retry);
     node->request = request;
-    if (submit(walk, request, page->offset, page->bytes, urgency, &error) != STRL_OK)
+    node->next_asked = NULL;
+    *(request->node_count++ > 0 && !request->answered ? &request->last_asked->next_asked : &request->first_asked) = node;
+    request->last_asked = node;
+    request->touched_frame = walk->frame;
+}
+
+/* The node's, whose room is there; NULL request: a new one. page: it is here already, and this reference of it is taken over. */
+static void ask_for_page(strl_walk *walk, strl__request *request, strl__node *node, strl__page *page, float urgency)
+{
+    const strl_page_ref *ref = &node->record->page;
+    strl_error error = {0};
+    bool is_new = !request;
+    if (is_new) {
+        request = take_slot(walk);
+        request->offset = ref->offset;
+        request->answered = page != NULL;
+    }
+    add_node(walk, request, node);
+    strl_status status = STRL_OK;
+    if (page)
+        status = start_job(walk, node, page, &error);
+    else if (is_new)
+        status = submit(walk, request, ref->offset, ref->bytes, urgency, &error);
+    if (status != STRL_OK)
         node_failed(walk, request, node, &error);
 }
 
@@ -366,25 +376,19 @@ static bool ask_for_node(strl_walk *walk, const strl__candidate *candidate, uint
     strl__node *node = candidate->node;
     if (node->residency != STRL__ABSENT)
         return true;
-    strl__request *request = unanswered_page(walk, node->record->page.offset);
-    if (!request && !has_slot(walk, in_flight))
+    strl__page *page = strl__page_find(walk, &node->record->page);
+    strl__request *request = request_of(walk, node->record->page.offset, page != NULL);
+    if (!request && (page ? walk->requests_pending >= in_flight : !has_slot(walk, in_flight)))
         return true;
     if (!strl__node_hold(walk, node))
         return true;
+    strl__page_share(page); /* what makes room may let go of it */
     if (!strl__make_room(walk, strl__node_bytes(node->record, walk->labels), evict_before)) {
         strl__node_let_go(node);
+        strl__page_release(page);
         return false;
     }
-    if (!request) {
-        request = take_slot(walk);
-        submit_page(walk, request, node, candidate->urgency);
-        return true;
-    }
-    strl__node_reserve(walk, node);
-    strl__retry_asked(walk, &node->retry);
-    node->request = request;
-    request->nodes[request->node_count++] = node;
-    request->touched_frame = walk->frame;
+    ask_for_page(walk, request, node, page, candidate->urgency);
     return true;
 }
 
@@ -462,7 +466,7 @@ void strl__requests_submit(strl_walk *walk)
     uint32_t in_flight = walk->is_looking ? 1 : walk->requests_in_flight;
     walk->room = strl_source_room(walk->source);
     ask_for_all(walk, &walk->missing, in_flight, walk->frame + 1);
-    uint64_t idle_since = walk->frame > SPARE_FRAMES ? walk->frame - SPARE_FRAMES : 0;
+    uint64_t idle_since = strl__idle_since(walk); /* prefetching evicts only what has been idle for longer */
     ask_for_all(walk, &walk->along, 0, idle_since); /* no slot is theirs */
     if (walk->missing.count == 0)
         ask_for_all(walk, &walk->prefetch, (in_flight + 1) / 2, idle_since);

@@ -1,9 +1,10 @@
-/* What is in memory, under one budget: treelets, meshes and placements (runs.c), and the reservations of those on their
- * way. */
+/* What is in memory, under one budget: treelets, meshes, placements (runs.c) and pages (pages.c), and the reservations of those on
+ * their way. */
 #include "walk/internal.h"
 
 /* Ids are breadth first, so the children of 128 nodes fill at most this many treelets. */
 #define MAX_CHILD_TREELETS (STRL_NODE_MAX_CHILDREN + 1)
+#define SPARE_FRAMES 60u /* what has been idle for longer makes room for what is only likely to be wanted */
 
 /* ---- meshes */
 
@@ -89,29 +90,41 @@ static void evict(strl_walk *walk, strl__node *node)
     strl__node_release(walk, node);
 }
 
-bool strl__make_room(strl_walk *walk, uint64_t bytes, uint64_t evict_before)
+/* False where nothing may go. */
+static bool evict_oldest(strl_walk *walk, uint64_t evict_before)
 {
-    if (bytes > walk->memory_bytes)
-        return false;
-    while (walk->resident_bytes > walk->memory_bytes - bytes) {
-        /* What is wanted is touched last of all, so the oldest one tells for the rest. */
-        strl__node *oldest = walk->oldest;
-        strl__run *run = walk->oldest_run;
-        bool may_go = oldest && oldest->wanted_frame != walk->frame && oldest->touched_frame < evict_before;
-        if (run && run->wanted_frame != walk->frame && run->touched_frame < evict_before &&
-            (!may_go || run->touched_frame < oldest->touched_frame)) {
-            strl__run_evict(walk, run);
-            continue;
-        }
-        if (!may_go)
-            break;
-        if (oldest->decoding) { /* as good as wanted */
-            oldest->wanted_frame = walk->frame;
-            strl__node_touch(walk, oldest);
-            continue;
-        }
+    /* What is wanted is touched last of all, so the oldest one tells for the rest. */
+    strl__node *oldest = walk->oldest;
+    strl__run *run = walk->oldest_run;
+    bool may_go = oldest && oldest->wanted_frame != walk->frame && oldest->touched_frame < evict_before;
+    if (run && run->wanted_frame != walk->frame && run->touched_frame < evict_before &&
+        (!may_go || run->touched_frame < oldest->touched_frame)) {
+        strl__run_evict(walk, run);
+        return true;
+    }
+    if (may_go && oldest->decoding) { /* as good as wanted */
+        oldest->wanted_frame = walk->frame;
+        strl__node_touch(walk, oldest);
+    } else if (may_go) {
         evict(walk, oldest);
     }
+    return may_go;
+}
+
+uint64_t strl__idle_since(const strl_walk *walk)
+{
+    return walk->frame > SPARE_FRAMES ? walk->frame - SPARE_FRAMES : 0;
+}
+
+bool strl__make_room(strl_walk *walk, uint64_t bytes, uint64_t evict_before)
+{
+    uint64_t idle_since = strl__idle_since(walk);
+    if (bytes > walk->memory_bytes)
+        return false;
+    while (walk->resident_bytes > walk->memory_bytes - bytes)
+        if (!evict_oldest(walk, evict_before < idle_since ? evict_before : idle_since) && !strl__page_drop_oldest(walk) &&
+            !evict_oldest(walk, evict_before))
+            break;
     if (walk->resident_bytes > walk->memory_bytes - bytes)
         strl__treelet_evict_cold(walk, evict_before < walk->frame ? evict_before : walk->frame);
     return walk->resident_bytes <= walk->memory_bytes - bytes;

@@ -7,8 +7,12 @@
 
 #include "geometry/octahedral.h"
 
-#define SQUARE_OF_CUBE 1.3160741 /* a cube of side 1 covers at most as much as a square of this side */
+#define COARSE_PX 16.0  /* cells that close holes need not be smaller: they are there for moments */
 #define MOST_PARTS 32.0 /* along a side of a cell that is larger than any point */
+/* By measure: less turns more transparent what is seen from the side, and opens pixels between splats; more leaves foliage too dense. */
+#define SCATTERED 0.25f
+/* What a point that closes a hole takes of the work of a frame (points.h), looking at a splat being 1. */
+#define WORK_OF_POINT 8u
 
 /* ---- points */
 
@@ -26,12 +30,24 @@ static void place_point(const strl__points *self, const strl_node *record, const
         point->position[k] = (int32_t)(uint32_t)((uint64_t)record->anchor[k] - (uint64_t)self->tree->box_min[k] + (uint64_t)(int64_t)place[k]);
 }
 
+static void encode_line(const strl_splat *splat, uint16_t code[2])
+{
+    for (int k = 0; k < 2; k++)
+        code[k] = (uint16_t)(splat->normal[k] * STRL_OCT_MAX / 255u);
+}
+
+static void find_line(const strl_splat *splat, float line[3])
+{
+    uint16_t code[2];
+    encode_line(splat, code);
+    strl_oct_decode(code, line);
+}
+
 /* How much of a direction, of length 1, lies along the splat's line. */
 static float along_line(const strl_splat *splat, const float direction[3])
 {
-    const uint16_t code[2] = {(uint16_t)(splat->normal[0] * STRL_OCT_MAX / 255u), (uint16_t)(splat->normal[1] * STRL_OCT_MAX / 255u)};
     float normal[3];
-    strl_oct_decode(code, normal);
+    find_line(splat, normal);
     return fabsf(normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2]);
 }
 
@@ -51,8 +67,7 @@ static strl_vertex point_of_splat(const strl__points *self, const strl_node *rec
 {
     strl_vertex point;
     place_point(self, record, splat->centre, &point);
-    for (int k = 0; k < 2; k++)
-        point.normal[k] = (uint16_t)(splat->normal[k] * 1023u / 255u);
+    encode_line(splat, point.normal);
     point.normal[0] |= (uint16_t)(spread_of(splat) << STRL_SPREAD_SHIFT);
     for (int k = 0; k < 3; k++)
         point.rgba[k] = (uint8_t)(splat->rgba >> 8 * k);
@@ -70,6 +85,12 @@ static void take_splats(strl__points *self, const strl_node *record, const strl_
             self->walk->points[self->at[size] + i] = point;
     }
     self->at[size] += count;
+}
+
+void strl__points_prepare(strl_walk *walk)
+{
+    for (unsigned coverage = 0; coverage < 256; coverage++)
+        walk->scattered[coverage] = powf(1 - (float)coverage / 255, SCATTERED);
 }
 
 /* ---- what is there */
@@ -120,22 +141,19 @@ static void take_shown(strl__points *self, const strl__active *active)
 
 /* ---- what is not there yet */
 
-typedef struct splat_run {
-    const strl_node *record;
-    const strl_splat *splats;
-    uint32_t count;
-    uint8_t least_side;
-} splat_run;
-
-static splat_run finest_splats(const strl__node *node)
+static strl__splat_run splats_of_state(const strl__node *node, uint32_t state)
 {
     const strl__mesh *mesh = &node->mesh;
-    uint32_t states = mesh->splat_end ? mesh->step_count : 0;
-    uint32_t first = states > 1 ? mesh->splat_end[states - 2] : 0, end = states ? mesh->splat_end[states - 1] : 0;
-    splat_run run = {node->record, mesh->splats + first, end - first, UINT8_MAX};
+    uint32_t first = state ? mesh->splat_end[state - 1] : 0;
+    strl__splat_run run = {node->record, mesh->splats + first, mesh->splat_end[state] - first, UINT8_MAX};
     for (uint32_t i = 0; i < run.count; i++)
         run.least_side = run.splats[i].side < run.least_side ? run.splats[i].side : run.least_side;
     return run;
+}
+
+strl__splat_run strl__finest_splats(const strl__node *node)
+{
+    return node->mesh.splat_end ? splats_of_state(node, node->mesh.step_count - 1) : (strl__splat_run){.least_side = UINT8_MAX};
 }
 
 /* The least size that is not less than px, as far as there is one. */
@@ -176,10 +194,9 @@ static void cross(const float a[3], const float b[3], float product[3])
 /* Two directions in the mean plane of what lies in the cell, at right angles, of length 1. */
 static void find_plane(const strl_splat *splat, float across[3], float up[3])
 {
-    const uint16_t code[2] = {(uint16_t)(splat->normal[0] * STRL_OCT_MAX / 255u), (uint16_t)(splat->normal[1] * STRL_OCT_MAX / 255u)};
     float normal[3], axis[3] = {0};
     int least = 0;
-    strl_oct_decode(code, normal);
+    find_line(splat, normal);
     for (int k = 1; k < 3; k++)
         least = fabsf(normal[k]) < fabsf(normal[least]) ? k : least;
     axis[least] = 1;
@@ -193,9 +210,15 @@ static void find_plane(const strl_splat *splat, float across[3], float up[3])
 /* A cell larger than any point is covered by several, in that plane. */
 static void take_plane(strl__points *self, const strl_node *record, const strl_splat *splat, double px)
 {
-    const int parts = (int)fmin(ceil(px / STRL__MOST_POINT_PX), MOST_PARTS);
-    const double side = ldexp(SQUARE_OF_CUBE, splat->side) / parts;
+    const double affordable = sqrt((double)(self->work / WORK_OF_POINT));
+    const int parts = (int)fmin(ceil(px / STRL__MOST_POINT_PX), fmin(MOST_PARTS, affordable));
+    const double side = ldexp(STRL_SQUARE_OF_CUBE, splat->side) / fmax(parts, 1);
     float across[3], up[3];
+    self->work -= (uint64_t)(parts * parts) * WORK_OF_POINT;
+    if (self->purpose == STRL__POINTS_COUNT)
+        self->at[STRL__POINT_SHARES] += (size_t)(parts * parts);
+    if (parts == 0 || self->purpose == STRL__POINTS_COUNT)
+        return;
     find_plane(splat, across, up);
     for (int i = 0; i < parts * parts; i++) {
         strl_splat part = *splat;
@@ -211,28 +234,37 @@ static void take_plane(strl__points *self, const strl_node *record, const strl_s
 static void take_cell(strl__points *self, const strl__active *active, const strl_node *record, const strl_splat *splat)
 {
     const strl_sight sight = sight_of(self, active, record, splat);
-    const double size = ldexp(SQUARE_OF_CUBE, splat->side) * active->placed->length_scale;
+    const double size = ldexp(STRL_SQUARE_OF_CUBE, splat->side) * active->placed->length_scale;
     const double px = strl_sight_error_px(&sight, size);
     if (!sight.seen)
         return;
-    if (px > STRL__MOST_POINT_PX)
+    if (px > STRL__MOST_POINT_PX) {
         take_plane(self, record, splat, px);
-    else
+    } else if (self->work >= WORK_OF_POINT) {
+        self->work -= WORK_OF_POINT;
         take_splats(self, record, splat, 1, missing_size(px));
+    }
 }
 
-/* The finest splats of the brick, or those of the tree's preview that lie in it, where these are finer. */
+/* The coarsest splats of the brick whose cells are no more than a few pixels, else the finest, or those of the tree's preview that lie in the
+ * brick, where these are finer. A frame does so much of this and no more, whatever a file says. */
 static void take_missing(strl__points *self, const strl__active *active)
 {
     const strl__node *node = active->node;
+    const strl__mesh *mesh = &node->mesh;
+    uint32_t state = 0;
+    if (active->state < mesh->step_count || active->open || node->record->child_count == 0)
+        return;
+    while (state + 1 < mesh->step_count &&
+           strl_sight_error_px(&active->sight, (double)mesh->errors[state] * active->placed->length_scale) > COARSE_PX)
+        state++;
+    const strl__splat_run own = splats_of_state(node, state), *preview = &self->walk->trees[active->placed->tree].preview;
+    bool is_coarse = strl_sight_error_px(&active->sight, (double)mesh->errors[state] * active->placed->length_scale) > COARSE_PX;
+    bool is_finer = is_coarse && preview->least_side < own.least_side;
+    const strl__splat_run run = is_finer ? *preview : own;
     self->unit_share = 1;
     find_sight(self, active);
-    if (active->state < node->mesh.step_count || active->open || node->record->child_count == 0)
-        return;
-    splat_run own = finest_splats(node), preview = finest_splats(self->walk->trees[active->placed->tree].root);
-    bool is_finer = preview.least_side < own.least_side;
-    splat_run run = is_finer ? preview : own;
-    for (uint32_t i = 0; i < run.count; i++)
+    for (uint32_t i = 0; i < run.count && self->work > 0; i++, self->work--)
         if (!is_finer || is_within(node->record, run.record, &run.splats[i]))
             take_cell(self, active, run.record, &run.splats[i]);
 }

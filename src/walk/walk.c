@@ -24,16 +24,17 @@ typedef struct root_reads {
     uint64_t bytes;
 } root_reads;
 
-typedef strl_status (*take_fn)(strl_walk *walk, uint32_t tree, const strl_source_span *span, strl_error *err);
+/* May take the span's data over; then it is NULL. */
+typedef strl_status (*take_fn)(strl_walk *walk, uint32_t tree, strl_source_span *span, strl_error *err);
 
 /* The container has bounded the size. */
-static strl_status add_read(root_reads *reads, uint32_t tree, uint64_t offset, uint32_t size, strl_error *err)
+static strl_status add_read(root_reads *reads, uint32_t tree, uint64_t offset, uint32_t size, uint64_t checksum, strl_error *err)
 {
     void *data = strl__alloc(size, 1);
     if (!data)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a page of %" PRIu32 " bytes", size);
     reads->trees[reads->count] = tree;
-    reads->spans[reads->count++] = (strl_source_span){offset, size, data};
+    reads->spans[reads->count++] = (strl_source_span){offset, size, data, checksum};
     reads->bytes += size;
     return STRL_OK;
 }
@@ -66,10 +67,10 @@ static strl_status ask_for_records(strl_walk *walk, root_reads *reads, uint32_t 
                           "the root records of tree %" PRIu32 " do not fit into the memory for walking, %" PRIu64
                           " bytes",
                           tree, walk->memory_bytes);
-    return add_read(reads, tree, ref.offset, ref.bytes, err);
+    return add_read(reads, tree, ref.offset, ref.bytes, ref.checksum, err);
 }
 
-static strl_status take_records(strl_walk *walk, uint32_t tree, const strl_source_span *span, strl_error *err)
+static strl_status take_records(strl_walk *walk, uint32_t tree, strl_source_span *span, strl_error *err)
 {
     strl__treelet *treelet = strl__treelets_find(&walk->treelets, tree, 0);
     strl_status status = strl__treelet_load(walk, treelet, span->data, span->size, err);
@@ -92,10 +93,21 @@ static strl_status ask_for_root(strl_walk *walk, root_reads *reads, uint32_t tre
                           tree, bytes, walk->memory_bytes);
     strl__node_reserve(walk, root);
     walk->root_bytes += bytes;
-    return add_read(reads, tree, page->offset, page->bytes, err);
+    return add_read(reads, tree, page->offset, page->bytes, page->checksum, err);
 }
 
-static strl_status take_root(strl_walk *walk, uint32_t tree, const strl_source_span *span, strl_error *err)
+/* The first frames want what lies beside the root. Without memory it is read again. */
+static void keep_page(strl_walk *walk, const strl_page_ref *ref, strl_source_span *span)
+{
+    strl__page *page = strl__page_create(ref, span->data);
+    if (!page)
+        return;
+    span->data = NULL;
+    strl__page_keep(walk, page);
+    strl__page_release(page);
+}
+
+static strl_status take_root(strl_walk *walk, uint32_t tree, strl_source_span *span, strl_error *err)
 {
     strl__walk_tree *own = &walk->trees[tree];
     const strl_node *record = own->root->record;
@@ -107,9 +119,15 @@ static strl_status take_root(strl_walk *walk, uint32_t tree, const strl_source_s
         status = strl_page_far(record, span->data, span->size, &own->far, err);
     if (status == STRL_OK)
         status = strl__mesh_create(record, span->data, span->size, NULL, walk->labels, own->shared, &mesh, err);
-    if (status == STRL_OK)
-        strl__node_install(walk, own->root, &mesh);
-    return status;
+    if (status != STRL_OK)
+        return status;
+    strl__node_install(walk, own->root, &mesh);
+    own->preview = strl__finest_splats(own->root);
+    uint64_t spare = strl__spare_bytes(record, &own->root->mesh); /* a root is never evicted */
+    walk->resident_bytes -= spare;
+    walk->root_bytes -= spare;
+    keep_page(walk, &record->page, span);
+    return STRL_OK;
 }
 
 /* Of all trees that are used; some MiB at a time, so that it takes no more memory than that. */
@@ -159,9 +177,6 @@ static strl_status load_trees(strl_walk *walk, strl_error *err)
     return status ? status : strl__placements_bound(walk, err);
 }
 
-/* By measure: less turns more transparent what is seen from the side, and opens pixels between splats; more leaves foliage too dense. */
-#define SCATTERED 0.25f
-
 static void apply_desc(strl_walk *walk, const strl_walk_desc *desc, strl_source *source)
 {
     const strl_walk_desc defaults = {0};
@@ -178,8 +193,7 @@ static void apply_desc(strl_walk *walk, const strl_walk_desc *desc, strl_source 
     strl_walk_set_error_px(walk, desc->error_px);
     walk->splat_ratio = isfinite(desc->splat_px) && desc->splat_px > 0 ? desc->splat_px / walk->error_px : 1;
     walk->stats.allowed_error_px = walk->error_px;
-    for (unsigned coverage = 0; coverage < 256; coverage++)
-        walk->scattered[coverage] = powf(1 - (float)coverage / 255, SCATTERED);
+    strl__points_prepare(walk);
 }
 
 strl_status strl_walk_open(strl_source *source, const strl_walk_desc *desc, strl_walk **out, strl_error *err)
@@ -212,6 +226,8 @@ void strl_walk_close(strl_walk *walk)
     if (!walk)
         return;
     strl__jobs_abandon(walk);
+    while (strl__page_drop_oldest(walk))
+        ;
     strl__placements_deinit(walk);
     strl__treelets_deinit(&walk->treelets);
     strl_container_close(walk->container);
@@ -235,6 +251,7 @@ void strl_walk_close(strl_walk *walk)
                            walk->front.items,
                            walk->items,
                            walk->points,
+                           walk->placed_points,
                            walk->wanted_runs.items,
                            walk->numbers,
                            walk};

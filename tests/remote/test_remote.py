@@ -163,6 +163,22 @@ class Test:
         self.same("wrong bytes do not come out of the cache", out, self.local, result)
         self.check("and without a fault", lines[-1]["faults"] == 0, lines[-1])
 
+    def test_opening_asks_again_for_wrong_bytes(self, server):
+        def wrong(when):
+            server.fault = lambda number, path: "wrong" if when(number) else None
+            server.asked.clear()
+        for words in ((), ("--full",)):
+            wrong(lambda number: number % 2 == 0 and number < 10)
+            out, _, result = self.render(server.url("model.stroll"), "--no-cache", *words)
+            self.same(f"at first every other answer is wrong: it opens all the same {words}", out, self.render(self.model, *words)[0], result)
+        wrong(lambda number: number < 4)
+        result = self.run("info", server.url("model.stroll"), "--no-cache")
+        self.check("the first four are: so does it", result.returncode == 0, result.stderr)
+        wrong(lambda number: number > 0)
+        self.refused("checksum is", "info", server.url("model.stroll"), "--no-cache")
+        self.check("and gives up after some times", 4 < len(server.asked) < 12, server.asked)
+        server.fault = None
+
     def test_restart(self, server):
         """The server dies when some of it has been read, and comes back half a second later."""
         server.bits_per_second = 20e6

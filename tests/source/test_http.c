@@ -47,6 +47,13 @@ static strl_source *must_open(const char *url, const strl_http_desc *desc)
     return source;
 }
 
+static strl_source *must_open_memory(void)
+{
+    strl_source *source = NULL;
+    assert_int_equal(strl_source_open_memory(content, BYTES, &source, NULL), STRL_OK);
+    return source;
+}
+
 static void must_not_open(const char *url, strl_status status, const char *words)
 {
     strl_source *source = NULL;
@@ -204,10 +211,15 @@ static void a_waiting_read_that_comes_back_finds_what_was_near(void **state)
 
 enum { MANY = 60, MANY_BYTES = 3000, FAR = 17000, NEAR = 5000 }; /* so near that on any link one request brings several */
 
+static strl_source_span known_span(uint64_t offset, size_t size, void *data)
+{
+    return (strl_source_span){offset, size, data, strl__checksum(content + offset, size)};
+}
+
 static void many_spans(strl_source_span *spans, uint8_t *data, size_t apart)
 {
     for (size_t i = 0; i < MANY; i++)
-        spans[i] = (strl_source_span){.offset = i * 7 % MANY * apart, .size = i == 9 ? 0 : MANY_BYTES, .data = data + i * MANY_BYTES};
+        spans[i] = known_span(i * 7 % MANY * apart, i == 9 ? 0 : MANY_BYTES, data + i * MANY_BYTES);
 }
 
 static void reads_together_give_what_each_would_alone(void **state)
@@ -231,6 +243,55 @@ static void reads_together_give_what_each_would_alone(void **state)
     assert_int_equal(strl_source_read_many(source, spans, MANY, &err), STRL_ERR_FORMAT);
     assert_int_equal(fault_server_asked(server, NULL, 0), requests);
     assert_int_equal(strl_source_read_many(source, spans, 0, &err), STRL_OK);
+    strl_source_close(source);
+    fault_server_destroy(server);
+}
+
+/* Every other answer is wrong. */
+static fault_rule wrong_at_times(void *context, unsigned number, const fault_asked *asked)
+{
+    (void)context, (void)asked;
+    return (fault_rule){.wrong_bytes = number % 2 == 1};
+}
+
+static void bytes_that_come_wrong_are_asked_for_again(void **state)
+{
+    (void)state;
+    static uint8_t data[MANY * MANY_BYTES];
+    strl_source_span spans[MANY];
+    strl_error err = {0};
+    fault_server *server = fault_server_create(&good, wrong_at_times, NULL);
+    strl_source *source = must_open(fault_server_url(server, "/model"), &quick);
+    strl_source_span one = known_span(500000, MANY_BYTES, data);
+    assert_int_equal(strl_source_read_known(source, &one, &err), STRL_OK);
+    assert_memory_equal(data, content + 500000, MANY_BYTES);
+    assert_int_equal(fault_server_asked(server, NULL, 0), 3);
+    many_spans(spans, data, FAR);
+    assert_int_equal(strl_source_read_many(source, spans, MANY, &err), STRL_OK);
+    for (size_t i = 0; i < MANY; i++)
+        assert_memory_equal(data + i * MANY_BYTES, content + spans[i].offset, spans[i].size);
+    strl_source_close(source);
+    fault_server_destroy(server);
+}
+
+static void bytes_that_are_always_wrong_are_asked_for_some_times(void **state)
+{
+    (void)state;
+    uint8_t data[100];
+    strl_source *source = must_open_memory();
+    strl_source_span span = known_span(500000, sizeof data, data);
+    span.checksum++;
+    assert_int_equal(strl_source_read_known(source, &span, NULL), STRL_OK); /* nobody is asked twice for what is in memory */
+    strl_source_close(source);
+    const fault_rule wrong = {.wrong_bytes = true};
+    fault_server *server = fault_server_create(&good, by_number, LISTED(well, wrong));
+    source = must_open(fault_server_url(server, "/model"), &quick);
+    assert_int_equal(strl_source_read_known(source, &span, NULL), STRL_OK);
+    assert_memory_not_equal(data, content + 500000, sizeof data); /* who has asked looks himself */
+    assert_int_equal(fault_server_asked(server, NULL, 0), 1 + 8);
+    strl_source_doubt(source, span.offset, span.size);
+    assert_int_equal(strl_source_read_many(source, &span, 1, NULL), STRL_OK);
+    assert_int_equal(fault_server_asked(server, NULL, 0), 1 + 8 + 8);
     strl_source_close(source);
     fault_server_destroy(server);
 }
@@ -789,6 +850,21 @@ static void an_attempt_at_opening_has_nothing_of_the_one_before(void **state)
     fault_server_destroy(server);
 }
 
+static void more_than_an_answer_says_is_an_attempt_that_failed(void **state)
+{
+    (void)state;
+    const fault_rule late = {.late_excess = true};
+    fault_server *server = fault_server_create(&good, by_number, LISTED(well, late, late, well, late));
+    strl_source *source = must_open(fault_server_url(server, "/model"), &quick);
+    check_read(source, 100000, 60000);
+    assert_int_equal(stats_of(source).retries, 2);
+    assert_int_equal(fault_server_asked(server, NULL, 0), 4);
+    check_read_fails(source, 400000, 60000, "the server sends more than it says, or what is no answer");
+    assert_int_equal(fault_server_asked(server, NULL, 0), 4 + quick.attempts);
+    strl_source_close(source);
+    fault_server_destroy(server);
+}
+
 /* ---- addresses */
 
 static void what_is_no_address_is_refused(void **state)
@@ -1035,6 +1111,33 @@ static void wrong_bytes_that_somebody_doubts_do_not_come_out_of_the_cache(void *
     strl_path_remove_directory(desc.cache, NULL);
 }
 
+static void a_head_that_is_doubted_comes_anew_and_names_the_model(void **state)
+{
+    (void)state;
+    const strl_http_desc desc = cached("head");
+    const fault_rule wrong = {.wrong_bytes = true};
+    fault_server *server = fault_server_create(&good, by_number, LISTED(wrong, wrong, well));
+    strl_source *source = must_open(fault_server_url(server, "/model"), &desc);
+    static uint8_t data[HEAD];
+    for (unsigned wrongs = 1; wrongs <= 2; wrongs++) {
+        assert_int_equal(strl_source_read(source, 0, data, HEAD, NULL), STRL_OK);
+        assert_memory_not_equal(data, content, HEAD);
+        strl_source_doubt(source, 0, HEAD);
+        assert_int_equal(fault_server_asked(server, NULL, 0), wrongs);
+    }
+    check_read(source, 0, HEAD);
+    check_read(source, 100, 1000);
+    assert_int_equal(fault_server_asked(server, NULL, 0), 3);
+    check_read(source, 100000, 20000);
+    strl_source_close(source);
+    source = must_open(fault_server_url(server, "/model"), &desc); /* of the same model */
+    check_read(source, 100000, 20000);
+    assert_int_equal(stats_of(source).cache_hits, 1);
+    strl_source_close(source);
+    fault_server_destroy(server);
+    strl_path_remove_directory(desc.cache, NULL);
+}
+
 /* While the cache makes room for what was read nobody watches for what comes in. */
 static void a_doubt_at_any_moment_leaves_no_read_behind(void **state)
 {
@@ -1098,7 +1201,7 @@ static strl_status use_source(const char *url, const strl_http_desc *desc)
     uint8_t together[4][1000];
     strl_source_span spans[4];
     for (size_t i = 0; i < 4; i++)
-        spans[i] = (strl_source_span){200000 + 100000 * i, sizeof together[i], together[i]};
+        spans[i] = known_span(200000 + 100000 * i, sizeof together[i], together[i]);
     if (source && first == STRL_OK)
         first = strl_source_read_many(source, spans, 4, &err);
     strl_source_close(source);
@@ -1143,6 +1246,8 @@ int main(void)
         cmocka_unit_test(a_waiting_read_gives_its_bytes_and_brings_what_is_near),
         cmocka_unit_test(a_waiting_read_that_comes_back_finds_what_was_near),
         cmocka_unit_test(reads_together_give_what_each_would_alone),
+        cmocka_unit_test(bytes_that_come_wrong_are_asked_for_again),
+        cmocka_unit_test(bytes_that_are_always_wrong_are_asked_for_some_times),
         cmocka_unit_test(of_reads_together_the_first_that_failed_is_told),
         cmocka_unit_test(reads_together_are_asked_for_together),
         cmocka_unit_test(ranges_outside_are_not_accepted_and_small_files_open),
@@ -1166,6 +1271,7 @@ int main(void)
         cmocka_unit_test(a_model_that_is_swapped_under_way_is_recognised),
         cmocka_unit_test(an_attempt_at_opening_has_nothing_of_the_one_before),
         cmocka_unit_test(what_is_no_address_is_refused),
+        cmocka_unit_test(more_than_an_answer_says_is_an_attempt_that_failed),
         cmocka_unit_test(opening_says_what_is_wrong),
         cmocka_unit_test(a_password_or_a_query_is_in_no_sentence),
         cmocka_unit_test(an_address_that_is_none_keeps_its_secrets),
@@ -1175,6 +1281,7 @@ int main(void)
         cmocka_unit_test(a_second_run_reads_nothing_but_the_header),
         cmocka_unit_test(damaged_entries_heal),
         cmocka_unit_test(wrong_bytes_that_somebody_doubts_do_not_come_out_of_the_cache),
+        cmocka_unit_test(a_head_that_is_doubted_comes_anew_and_names_the_model),
         cmocka_unit_test(a_doubt_at_any_moment_leaves_no_read_behind),
         cmocka_unit_test(a_cache_that_cannot_be_used_is_done_without),
         cmocka_unit_test(every_failed_allocation_is_a_clean_failure),

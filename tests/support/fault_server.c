@@ -220,6 +220,8 @@ static bool answer_model(fault_server *server, int socket, fault_request *reques
         struct pollfd wait = {.fd = socket, .events = POLLRDHUP};
         poll(&wait, 1, (int)rule.delay_ms); /* a client that goes, or the server's end, ends it */
     }
+    if (rule.late_excess && !send_text(socket, "bytes behind the end of an answer\n"))
+        return false;
     if (rule.status)
         return send_status(socket, rule.status, rule.field);
     if (!condition_holds(&content, request))

@@ -25,6 +25,7 @@ typedef struct fault_rule {
     unsigned delay_ms;   /* before the answer */
     int shift;           /* of the range that is said and sent */
     int longer;          /* bytes behind the range that is asked for */
+    bool late_excess;    /* before the answer comes more of the answer before it than that had said */
     bool wrong_bytes;    /* every byte is another */
     bool no_range_field; /* Content-Range is left out */
     bool endless_header;

@@ -7,6 +7,7 @@
 
 #include "base/memory.h"
 #include "walk/grid_model.h"
+#include "walk/internal.h"
 #include "walk/walk_checks.h"
 
 static uint8_t *model;
@@ -114,6 +115,33 @@ static void a_slow_path_under_a_tight_budget_does_not_swing(void **state)
     strl_walk_close(walk);
 }
 
+static void all_nodes_that_are_wanted_of_a_page_share_its_read(void **state)
+{
+    (void)state;
+    watched_source *source = watched_source_open(memory_source(model, model_bytes));
+    strl_walk *walk = open_walk(&source->base, &(strl_walk_desc){.memory_bytes = 400 << 20, .error_px = 1e-3});
+    strl_camera camera = flight_camera(500);
+    settle(walk, &camera, 1000);
+    assert_true(walk->front.count > 150 && source->offset_count < 20);
+    assert_int_equal(source->repeats, 0);
+    strl_walk_close(walk);
+}
+
+static void pages_that_are_kept_go_before_anything_else_and_are_few(void **state)
+{
+    (void)state;
+    strl_walk *walk = open_walk(memory_source(model, model_bytes), &(strl_walk_desc){.memory_bytes = 40 << 20, .error_px = 0.25});
+    strl_camera camera = flight_camera(500);
+    settle(walk, &camera, 1000);
+    assert_true(walk->kept_bytes > 100 << 10 && walk->kept_bytes <= walk->memory_bytes / 32);
+    uint64_t resident = walk->resident_bytes - walk->kept_bytes;
+    assert_true(strl__make_room(walk, walk->memory_bytes - resident, 0)); /* no node may go */
+    assert_int_equal(walk->kept_bytes, 0);
+    assert_int_equal(walk->resident_bytes, resident);
+    assert_false(strl__make_room(walk, walk->memory_bytes - resident + 1, 0));
+    strl_walk_close(walk);
+}
+
 static void a_budget_too_small_for_the_root_is_refused_in_one_sentence(void **state)
 {
     (void)state;
@@ -147,6 +175,8 @@ int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(resident_bytes_never_pass_the_budget),
+        cmocka_unit_test(all_nodes_that_are_wanted_of_a_page_share_its_read),
+        cmocka_unit_test(pages_that_are_kept_go_before_anything_else_and_are_few),
         cmocka_unit_test(a_tight_budget_raises_the_allowed_error_and_comes_to_rest),
         cmocka_unit_test(a_slow_path_under_a_tight_budget_does_not_swing),
         cmocka_unit_test(a_budget_too_small_for_the_root_is_refused_in_one_sentence),

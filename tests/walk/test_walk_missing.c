@@ -65,7 +65,7 @@ static strl_camera camera_at(double distance)
     return (strl_camera){.eye = {distance, 0, 0}, .up = {0, 0, 1}, .fov_y_deg = FOV, .width = WIDTH, .height = HEIGHT};
 }
 
-/* ---- an image of what is covered */
+/* ---- an image of what is covered: by points that are drawn as every second pixel at least, and by triangles */
 
 typedef struct pixel_place {
     double x, y, depth;
@@ -95,7 +95,7 @@ static void cover_point(const strl_draw_item *item, const strl_vertex *vertex, d
 {
     pixel_place p = project(item, vertex, distance);
     double half = (double)item->point_px / 2;
-    if (!is_before(&p, distance))
+    if (!is_before(&p, distance) || vertex->rgba[3] < 128)
         return;
     for (int y = bounded(ceil(p.y - half - 0.5), HEIGHT); y < bounded(p.y + half + 0.5, HEIGHT); y++)
         for (int x = bounded(ceil(p.x - half - 0.5), WIDTH); x < bounded(p.x + half + 0.5, WIDTH); x++)

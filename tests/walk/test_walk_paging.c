@@ -297,7 +297,7 @@ static void what_is_no_longer_wanted_gives_its_room_back(void **state)
     uint64_t pages = 0;
     for (uint32_t i = 0; i < RUNS; i++)
         pages += walk->runs[i].page ? strl__run_bytes(walk->runs[i].page->count) : 0;
-    assert_int_equal(walk->resident_bytes, walk->placement_bytes + walk->treelet_bytes + walk->root_bytes + pages);
+    assert_int_equal(walk->resident_bytes, walk->placement_bytes + walk->treelet_bytes + walk->kept_bytes + walk->root_bytes + pages);
     strl_walk_close(walk);
 }
 

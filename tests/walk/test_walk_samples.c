@@ -340,6 +340,21 @@ static void little_memory_coarsens_and_settles(void **state)
     }
 }
 
+/* Many nodes share a page, and a level is wanted when the one above it is there. */
+static void no_page_is_read_twice(void **state)
+{
+    (void)state;
+    watched_source *source = watched_source_open(memory_source(bytes, size));
+    strl_walk *walk = open_walk(&source->base, &(strl_walk_desc){.error_px = 2});
+    source->walking = true;
+    const strl_camera cameras[] = {camera_at(0.5, -1.5, 0.5), camera_at(0.5, -0.2, 0.5), camera_at(0.4, 0.3, 0.5)};
+    for (unsigned i = 0; i < 3; i++)
+        settle(walk, &cameras[i], 1000);
+    assert_true(source->offset_count > 5 && source->came_bytes > size / 2);
+    assert_int_equal(source->repeats, 0);
+    strl_walk_close(walk);
+}
+
 static void a_late_source_shows_what_is_there(void **state)
 {
     (void)state;
@@ -409,6 +424,7 @@ int main(void)
         cmocka_unit_test(what_is_near_is_open),
         cmocka_unit_test(settled_lists_are_the_same_from_wherever_one_comes),
         cmocka_unit_test(little_memory_coarsens_and_settles),
+        cmocka_unit_test(no_page_is_read_twice),
         cmocka_unit_test(a_late_source_shows_what_is_there),
         cmocka_unit_test(without_memory_calls_fail_and_the_walk_goes_on),
     };

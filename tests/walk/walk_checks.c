@@ -15,12 +15,24 @@
 
 /* ---- source */
 
+static void note_offset(watched_source *self, uint64_t offset)
+{
+    for (unsigned i = 0; i < self->offset_count; i++)
+        if (self->offsets[i] == offset) {
+            self->repeats++;
+            return;
+        }
+    if (self->offset_count < sizeof self->offsets / sizeof *self->offsets)
+        self->offsets[self->offset_count++] = offset;
+}
+
 static strl_status watched_submit(strl_source *source, uint64_t token, uint64_t offset, size_t size, float urgency,
                                   strl_error *err)
 {
     watched_source *self = (watched_source *)source;
     strl_status status = strl_source_submit(self->inner, token, offset, size, urgency, err);
     if (status == STRL_OK) {
+        note_offset(self, offset);
         self->asked[token % 256] = (uint32_t)size;
         self->wanted_bytes += size;
     }
@@ -71,6 +83,7 @@ static strl_status watched_read(strl_source *source, uint64_t offset, void *data
     watched_source *self = (watched_source *)source;
     if (self->walking)
         fail_msg("a frame waits for a read");
+    note_offset(self, offset);
     self->read_bytes += size;
     return strl_source_read(self->inner, offset, data, size, err);
 }

@@ -24,6 +24,8 @@ typedef struct watched_source {
     uint32_t asked[256]; /* bytes, by the token's last byte, which is the walk's slot */
     uint64_t came_bytes;
     uint64_t read_bytes; /* while somebody waited */
+    uint64_t offsets[512]; /* that were read, those waited for included */
+    unsigned offset_count, repeats; /* of them; reads of one of them */
     strl_source_result held; /* waits for the link */
     bool holds;
 } watched_source;

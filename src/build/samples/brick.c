@@ -12,8 +12,6 @@
 #include "geometry/payload.h"
 #include "geometry/sample_payload.h"
 
-/* A cube of side s covers at most sqrt(3) s^2 of an image, as much as a square of this side. */
-#define SQUARE_OF_CUBE 1.3160741f
 #define LEAVES_BESIDE 7u
 
 /* A cell whose triangles are no more goes into one brick as a whole. */
@@ -243,7 +241,7 @@ static void find_centre(const strl_octree *octree, const strl_octant *octant, in
 
 static float size_of(const strl_octree *octree, const strl_octant *octant)
 {
-    float side = (float)strl_octree_side(octree->ingest, octant->depth) * SQUARE_OF_CUBE;
+    float side = (float)strl_octree_side(octree->ingest, octant->depth) * (float)STRL_SQUARE_OF_CUBE;
     return fmaxf(side, octant->extent);
 }
 
