@@ -226,11 +226,7 @@ static void without_a_cone_or_an_inverse_nothing_faces_away(void **state)
 
 /* ---- a closed model: a sphere of radius 1, in three places of which one mirrors and one is neither round nor upright */
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define RINGS 120u
-#else
 #define RINGS 240u
-#endif
 #define CAMERAS 16u
 #define WIDTH 320u
 #define HEIGHT 240u

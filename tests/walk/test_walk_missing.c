@@ -13,11 +13,7 @@
 #include "build/sample_tree.h"
 #include "walk/walk_checks.h"
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define RINGS 150u
-#else
 #define RINGS 300u
-#endif
 #define SECTORS (2 * RINGS)
 #define RADIUS 0.5
 #define WIDTH 640
