@@ -23,7 +23,8 @@ BUILD = ROOT / "build"
 SLOW_UNDER_TSAN = ("test_build_certify", "test_build_faults", "test_build_root", "test_build_cuts", "test_certify",
                    "test_simplify", "test_simplify_shape", "test_pm_spill", "test_verify_payload", "test_container_hostile",
                    "test_walk_built", "test_walk_remote", "test_build_resume", "test_build_texcoords", "test_container",
-                   "test_samples_draws", "test_samples_faults", "test_verify_samples", "test_walk_samples")
+                   "test_samples_draws", "test_samples_faults", "test_verify_samples", "test_walk_samples", "test_walk_cones",
+                   "test_walk_missing")
 # What AddressSanitizer's stage leaves to the first one: what runs the program from outside as others do that stay, and long
 # builds whose code shorter ones run too.
 NOT_UNDER_ASAN = ("test_outputs", "test_guide", "test_curve", "test_view_review", "test_view_window", "test_sentences", "test_failures",
