@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
+#include "base/affine.h"
 #include "base/fail.h"
 #include "readers/gltf.h"
 
@@ -227,18 +228,7 @@ strl__gltf_matrix strl__gltf_compose(const double translation[3], const double r
 /* The cofactors are the inverse transpose but for a factor, the determinant, whose sign matters. */
 void strl__gltf_derive(strl__gltf_pass *pass)
 {
-    const double *m = pass->placement.m;
-    double determinant = 0;
-    for (unsigned row = 0; row < 3; row++)
-        for (unsigned column = 0; column < 3; column++) {
-            unsigned r1 = (row + 1) % 3, r2 = (row + 2) % 3;
-            unsigned c1 = (column + 1) % 3, c2 = (column + 2) % 3;
-            pass->normal_matrix[3 * row + column] =
-                m[4 * r1 + c1] * m[4 * r2 + c2] - m[4 * r1 + c2] * m[4 * r2 + c1];
-        }
-    for (unsigned column = 0; column < 3; column++)
-        determinant += m[column] * pass->normal_matrix[column];
-    pass->flips = determinant < 0;
+    pass->flips = strl_affine_cofactors(pass->placement.m, pass->normal_matrix) < 0;
     for (unsigned i = 0; i < 9 && pass->flips; i++)
         pass->normal_matrix[i] = -pass->normal_matrix[i];
 }

@@ -7,6 +7,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "base/affine.h"
 #include "base/hash.h"
 #include "render/style.h"
 
@@ -14,30 +15,20 @@
 /* Reference cells stay this close to the lattice's origin, so that differences fit 64 bits. */
 #define MOST_CELL 0x1p61
 
-static void cofactors(const double m[12], double out[3][3])
-{
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
-            out[i][j] = m[i1 * 4 + j1] * m[i2 * 4 + j2] - m[i1 * 4 + j2] * m[i2 * 4 + j1];
-        }
-}
-
 /* The cell that the eye is in; 0 where the placement is flat and the eye has no model point. */
-static void find_reference(strl_gl_placing *placing, const double cofactor[3][3], const double eye[3])
+static void find_reference(strl_gl_placing *placing, const double cofactor[9], double determinant, const double eye[3])
 {
     const double *m = placing->transform;
-    double determinant = m[0] * cofactor[0][0] + m[1] * cofactor[0][1] + m[2] * cofactor[0][2];
     for (int j = 0; j < 3; j++) {
         double point = 0;
         for (int i = 0; i < 3; i++)
-            point += cofactor[i][j] * (eye[i] - m[i * 4 + 3]);
+            point += cofactor[3 * i + j] * (eye[i] - m[i * 4 + 3]);
         double cell = round((point / determinant - placing->origin[j]) / placing->step);
         placing->reference[j] = isfinite(cell) ? (int64_t)fmax(-MOST_CELL, fmin(MOST_CELL, cell)) : 0;
     }
 }
 
-static void make_rows(strl_gl_placing *placing, const strl_view *view, const double cofactor[3][3])
+static void make_rows(strl_gl_placing *placing, const strl_view *view, const double cofactor[9])
 {
     const double *m = placing->transform;
     const double *axes[3] = {view->right, view->up, view->forward};
@@ -52,7 +43,7 @@ static void make_rows(strl_gl_placing *placing, const strl_view *view, const dou
         float *to_view = placing->shared.rows[row], *normal = placing->shared.rows[3 + row];
         for (int j = 0; j < 3; j++) {
             to_view[j] = (float)(scale * (axis[0] * m[j] + axis[1] * m[4 + j] + axis[2] * m[8 + j]));
-            normal[j] = (float)(axis[0] * cofactor[0][j] + axis[1] * cofactor[1][j] + axis[2] * cofactor[2][j]);
+            normal[j] = (float)(axis[0] * cofactor[j] + axis[1] * cofactor[3 + j] + axis[2] * cofactor[6 + j]);
         }
         to_view[3] = (float)(axis[0] * offset[0] + axis[1] * offset[1] + axis[2] * offset[2]);
     }
@@ -60,13 +51,13 @@ static void make_rows(strl_gl_placing *placing, const strl_view *view, const dou
 
 /* A placement that mirrors has cofactors that point to the other side, which lighting from both sides does not see.
  * Cofactors grow with the square of a placement's scale: normals are brought near unit length here. */
-static void scale_cofactors(double cofactor[3][3])
+static void scale_cofactors(double cofactor[9])
 {
     double largest = 0;
     for (int k = 0; k < 9; k++)
-        largest = fmax(largest, fabs(cofactor[k / 3][k % 3]));
+        largest = fmax(largest, fabs(cofactor[k]));
     for (int k = 0; largest > 0 && k < 9; k++)
-        cofactor[k / 3][k % 3] /= largest;
+        cofactor[k] /= largest;
 }
 
 static void place(strl_gl_placing *placing, const strl_view *view, const strl_draw_item *item)
@@ -80,11 +71,10 @@ static void place(strl_gl_placing *placing, const strl_view *view, const strl_dr
     placing->step = item->step;
     memcpy(placing->origin, item->origin, sizeof item->origin);
     memcpy(placing->transform, item->transform, sizeof item->transform);
-    double cofactor[3][3];
-    cofactors(item->transform, cofactor);
-    placing->mirrors = item->transform[0] * cofactor[0][0] + item->transform[1] * cofactor[0][1] + item->transform[2] * cofactor[0][2] < 0;
+    double cofactor[9], determinant = strl_affine_cofactors(item->transform, cofactor);
+    placing->mirrors = determinant < 0;
     if (item->positions == STRL_POSITIONS_LATTICE)
-        find_reference(placing, cofactor, view->eye);
+        find_reference(placing, cofactor, determinant, view->eye);
     scale_cofactors(cofactor);
     make_rows(placing, view, cofactor);
 }
