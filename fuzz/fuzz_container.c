@@ -69,7 +69,7 @@ static void read_runs(strl_container *container)
         if (strl_container_run(container, run, &facts, NULL) != STRL_OK)
             continue;
         require(facts.far.area >= 0 && facts.far.normal[0] < 1024 && facts.far.normal[1] < 1024 &&
-                facts.far.spread <= STRL_FAR_SPREAD_MOST);
+                facts.far.spread <= STRL_SPREAD_MOST);
         for (int axis = 0; axis < 3; axis++)
             require(facts.box_min[axis] <= facts.box_max[axis]);
         require(facts.page.bytes >= 112 && facts.page.bytes <= STRL__TABLE_PAGE_BYTES);

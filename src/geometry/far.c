@@ -5,6 +5,11 @@
 #include "geometry/colour.h"
 #include "geometry/octahedral.h"
 
+double strl_hidden_share(double area, double seen, double along)
+{
+    return along * fmin(seen, 1) + (1 - along) * (1 - exp(-area / 2));
+}
+
 /* normal: as long as the faces are parallel. */
 static void add_face(strl_far_sums *sums, double area, uint32_t rgba, const double normal[3])
 {
@@ -21,7 +26,7 @@ void strl_far_add(strl_far_sums *sums, const strl_far *far)
 {
     float normal[3];
     strl_oct_decode(far->normal, normal);
-    double length = 1 - 0.5 * far->spread / STRL_FAR_SPREAD_MOST;
+    double length = 1 - 0.5 * far->spread / STRL_SPREAD_MOST;
     add_face(sums, (double)far->area, far->rgba,
              (const double[3]){length * (double)normal[0], length * (double)normal[1], length * (double)normal[2]});
 }
@@ -37,7 +42,7 @@ strl_far strl_far_end(const strl_far_sums *sums)
         normal[k] = (float)(sums->normal[k] / sums->area);
         square += (double)normal[k] * (double)normal[k];
     }
-    far.spread = (uint8_t)lrint(STRL_FAR_SPREAD_MOST * fmin(fmax(2 - 2 * sqrt(square), 0), 1));
+    far.spread = (uint8_t)lrint(STRL_SPREAD_MOST * fmin(fmax(2 - 2 * sqrt(square), 0), 1));
     for (unsigned k = 0; k < 3; k++)
         far.rgba |= strl_srgb_encode((float)(sums->linear[k] / sums->area)) << 8 * k;
     far.rgba |= (uint32_t)lrint(255 * sums->linear[3] / sums->area) << 24;
@@ -65,10 +70,9 @@ static void add_splats(strl_far_sums *sums, const strl_brick_head *head)
 {
     for (uint32_t i = head->level_count > 1 ? head->splat_end[head->level_count - 2] : 0; i < strl_brick_splats(head); i++) {
         const strl_splat *splat = &head->splat[i];
-        const uint16_t code[2] = {(uint16_t)(splat->normal[0] * STRL_OCT_MAX / 255u), (uint16_t)(splat->normal[1] * STRL_OCT_MAX / 255u)};
         double length = fmax(splat->parallel / 255.0, 0.5), area = ldexp(splat->coverage / 255.0, 2 * splat->side) / length;
         float line[3];
-        strl_oct_decode(code, line);
+        strl_splat_line(splat, line);
         add_face(sums, area, splat->rgba, (const double[3]){length * (double)line[0], length * (double)line[1], length * (double)line[2]});
     }
 }

@@ -5,15 +5,19 @@
 
 #include "geometry/progressive.h"
 #include "geometry/sample_payload.h"
-
-#define STRL_FAR_SPREAD_MOST 63u
+#include "stroll/frame.h"
 
 typedef struct strl_far {
     float area; /* of its faces */
     uint32_t rgba; /* mean, by area */
     uint16_t normal[2]; /* mean, octahedral; of faces, whichever their side */
-    uint8_t spread; /* how far they differ from it: 0 = they are parallel, to STRL_FAR_SPREAD_MOST = any direction */
+    uint8_t spread; /* how far they differ from it: 0 = they are parallel, to STRL_SPREAD_MOST = any direction */
 } strl_far;
+
+/* The share of a square that faces hide of which `seen` times as much is turned to the eye, `area` times as much with their other sides.
+ * `along`: 1 = they are parallel, lie beside each other; 0 = of any direction, seen with half their area, at random places, so that they
+ * hide each other. */
+double strl_hidden_share(double area, double seen, double along);
 
 /* Zero-initialise. */
 typedef struct strl_far_sums {

@@ -5,6 +5,7 @@
 
 #include "base/cursor.h"
 #include "base/memory.h"
+#include "geometry/octahedral.h"
 #include "stroll/error.h"
 
 /* Stands for all that lies in a cell of the octree. */
@@ -37,6 +38,19 @@ static inline int32_t strl_splat_place(int32_t centre, unsigned side)
 {
     unsigned shift = strl_splat_shift(side);
     return shift ? (int32_t)((int64_t)(centre >> shift) * ((int64_t)1 << shift) + ((int64_t)1 << (shift - 1))) : centre;
+}
+
+/* Its normal as strl_oct_decode takes it, and as a direction of length 1. */
+static inline void strl_splat_normal(const strl_splat *splat, uint16_t code[2])
+{
+    for (int k = 0; k < 2; k++)
+        code[k] = (uint16_t)(splat->normal[k] * STRL_OCT_MAX / 255u);
+}
+static inline void strl_splat_line(const strl_splat *splat, float line[3])
+{
+    uint16_t code[2];
+    strl_splat_normal(splat, code);
+    strl_oct_decode(code, line);
 }
 
 /* Triangles that follow each other in the mesh and are of one level; the next run's is another one. */

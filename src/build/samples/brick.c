@@ -8,6 +8,7 @@
 #include "base/hash.h"
 #include "build/ingest/buckets.h"
 #include "geometry/colour.h"
+#include "geometry/far.h"
 #include "geometry/octahedral.h"
 #include "geometry/payload.h"
 #include "geometry/sample_payload.h"
@@ -203,14 +204,6 @@ static void set_line(const double normal[3], const uint8_t near[2], uint8_t line
         memcpy(line, other, sizeof other);
 }
 
-/* The share of the cell's side that is hidden, of faces with `walls` times the area of that side. Parallel ones lie beside each other;
- * those of any direction are seen with half their area, at random places, so that they hide each other. */
-static double coverage_of(double walls, double parallel)
-{
-    double along = fmax(0, 2 * parallel - 1); /* any direction, turned to one side, has half the length */
-    return along * fmin(walls, 1) + (1 - along) * (1 - exp(-walls / 2));
-}
-
 static strl_splat make_splat(const strl_octree *octree, const strl_octant *octant, const int64_t anchor[3], const uint8_t near[2])
 {
     const strl_splat_sums *sums = &octant->sums;
@@ -225,8 +218,9 @@ static strl_splat make_splat(const strl_octree *octree, const strl_octant *octan
     if (!has_area)
         return splat;
     set_line(sums->normal, near, splat.normal);
-    splat.parallel = to_byte(sqrt(length) / sums->area);
-    splat.coverage = to_byte(coverage_of(sums->area / (side * side), sqrt(length) / sums->area));
+    double walls = sums->area / (side * side), parallel = sqrt(length) / sums->area;
+    splat.parallel = to_byte(parallel);
+    splat.coverage = to_byte(strl_hidden_share(walls, walls, fmax(0, 2 * parallel - 1))); /* any direction, turned to one side, has half the length */
     splat.rgba = splat_colour(sums);
     return splat;
 }
