@@ -126,6 +126,12 @@ void strl_view_depth_range(const strl_view *view, const strl_box *box, double *l
     extent_along(view, box, view->forward, least, largest);
 }
 
+void strl_view_ray(const strl_view *view, const double point[3], double ray[3])
+{
+    for (int k = 0; k < 3; k++)
+        ray[k] = view->orthographic ? view->forward[k] : point[k] - view->eye[k];
+}
+
 /* True where the box lies wholly beyond the plane side * axis = tangent * forward through the eye. */
 static bool beyond_side(const strl_view *view, const strl_box *box, const double axis[3], double side, double tangent)
 {

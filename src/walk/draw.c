@@ -7,6 +7,17 @@
 /* The eye may stand inside a box; the depth buffer still wants a near plane before it. */
 #define LEAST_NEAR 1e-6
 
+void strl__item_place(strl_draw_item *item, const strl_tree *tree, const strl_node *record, const strl__placement *placement)
+{
+    item->own_part = placement->own_part;
+    item->step = tree->step;
+    memcpy(item->anchor, record ? record->anchor : tree->box_min, sizeof item->anchor);
+    memcpy(item->box_min, record ? record->box_min : tree->box_min, sizeof item->box_min);
+    memcpy(item->box_max, record ? record->box_max : tree->box_max, sizeof item->box_max);
+    memcpy(item->origin, tree->origin, sizeof item->origin);
+    memcpy(item->transform, placement->transform, sizeof item->transform);
+}
+
 static strl_draw_item make_item(const strl_walk *walk, const strl__active *active)
 {
     const strl__node *node = active->node;
@@ -26,7 +37,6 @@ static strl_draw_item make_item(const strl_walk *walk, const strl__active *activ
         .visible = active->sight.seen,
         .vertices = mesh->vertices,
         .labels = mesh->labels,
-        .own_part = placement->own_part,
         .vertex_count = mesh->vertex_count,
         .indices = mesh->indices,
         .index_count = mesh->shared ? mesh->index_total : draw_count,
@@ -34,15 +44,10 @@ static strl_draw_item make_item(const strl_walk *walk, const strl__active *activ
         .draw_count = draw_count,
         .dirty_first = node->dirty_first,
         .dirty_count = node->dirty_end - node->dirty_first,
-        .step = tree->step,
         .error = (float)(error * tree->step),
         .error_px = (float)strl_sight_error_px(&active->sight, error * placement->length_scale),
     };
-    memcpy(item.anchor, record->anchor, sizeof item.anchor);
-    memcpy(item.box_min, record->box_min, sizeof item.box_min);
-    memcpy(item.box_max, record->box_max, sizeof item.box_max);
-    memcpy(item.origin, tree->origin, sizeof item.origin);
-    memcpy(item.transform, placement->transform, sizeof item.transform);
+    strl__item_place(&item, tree, record, placement);
     return item;
 }
 

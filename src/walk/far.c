@@ -69,11 +69,11 @@ static double find_place(const strl_view *view, const strl_box *box, bool is_mis
     return depth_of(view, place);
 }
 
-/* How much of the point's square the faces hide: `walls` is their area in such squares. Parallel ones lie beside each other, and are seen
- * as much as they face the eye; those of any direction are seen with half their area, at random places, so that they hide each other. */
+/* How much of the point's square the faces hide, of which parallel ones are seen as much as they face the eye: `walls` is their area in such
+ * squares. */
 static double opacity_of(const strl_far *far, const double sight[3], double walls)
 {
-    double along = 1 - (double)far->spread / STRL_FAR_SPREAD_MOST, square = 0, facing = 0;
+    double along = 1 - (double)far->spread / STRL_SPREAD_MOST, square = 0, facing = 0;
     float normal[3];
     strl_oct_decode(far->normal, normal);
     for (int k = 0; k < 3; k++) {
@@ -81,13 +81,7 @@ static double opacity_of(const strl_far *far, const double sight[3], double wall
         square += sight[k] * sight[k];
     }
     facing = square > 0 ? fabs(facing) / sqrt(square) : 1;
-    return along * fmin(1, walls * facing) + (1 - along) * (1 - exp(-walls / 2));
-}
-
-static void find_sight(const strl_view *view, const double place[3], double sight[3])
-{
-    for (int k = 0; k < 3; k++)
-        sight[k] = view->orthographic ? view->forward[k] : place[k] - view->eye[k];
+    return strl_hidden_share(walls, walls * facing, along);
 }
 
 strl_vertex *strl__far_points_add(strl__far_points *points, bool labels, uint32_t own_part)
@@ -127,7 +121,7 @@ strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box
     strl_vertex *point = strl__far_points_add(points, walk->labels, own_part);
     if (!point)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu splats", points->count);
-    find_sight(cut->view, place, sight);
+    strl_view_ray(cut->view, place, sight);
     double opacity = opacity_of(far, sight, (double)far->area * scale * scale / (side * side));
     strl__far_place(walk, place, point->position);
     for (int k = 0; k < 2; k++)

@@ -146,13 +146,18 @@ typedef struct strl__bound_level {
 #define STRL__MISSING_SIZES 8u
 #define STRL__POINT_SIZES (STRL__POINT_SHARES + STRL__MISSING_SIZES)
 
-/* The finest splats that a brick shows. */
+/* Splats of a brick. */
 typedef struct strl__splat_run {
     const strl_node *record;
     const strl_splat *splats;
     uint32_t count;
-    uint8_t least_side; /* UINT8_MAX where there is none */
 } strl__splat_run;
+
+/* Of a tree: the finest splats of its root's brick. */
+typedef struct strl__preview {
+    strl__splat_run run;
+    unsigned least_side; /* of a cell, as in strl_splat; UINT8_MAX where there is none */
+} strl__preview;
 
 /* Points of a placement that has items of its own. */
 typedef struct strl__placed_points {
@@ -165,7 +170,7 @@ typedef struct strl__walk_tree {
     strl__node *root;      /* NULL where no placement uses the tree */
     bool used, shared;     /* by a placement; by several. Where there are many placements both are taken to be so. */
     strl_far far;
-    strl__splat_run preview; /* of the root, which stays */
+    strl__preview preview; /* of the root, which stays */
 } strl__walk_tree;
 
 /* Points of one size, for what is not drawn itself. */
@@ -533,13 +538,14 @@ strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const
                                strl__mesh *mesh, strl_error *err);
 
 /* splats.c */
-strl__splat_run strl__finest_splats(const strl__node *node);
+strl__preview strl__preview_of(const strl__node *node);
 void strl__points_prepare(strl_walk *walk);
 
 /* points.c: behind the other items of the list. */
 strl_status strl__draw_splats(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err);
 
-/* draw.c */
+/* draw.c: `record`: NULL = of the whole tree. */
+void strl__item_place(strl_draw_item *item, const strl_tree *tree, const strl_node *record, const strl__placement *placement);
 strl_status strl__draw_list(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err);
 
 #endif

@@ -2,8 +2,8 @@
 #include "walk/points.h"
 
 #include <math.h>
-#include <string.h>
 
+#include "base/affine.h"
 #include "geometry/octahedral.h"
 
 #define MOST_POINTS 65535u   /* of an item: indices have 16 bits */
@@ -18,17 +18,6 @@ double strl__points_px(const strl_walk *walk, unsigned size)
 }
 
 /* ---- merged */
-
-/* Cofactors: what they make of a normal stands upright on what the transform makes of its plane. */
-static void find_turn(const double transform[12], double turn[9])
-{
-    for (int row = 0; row < 3; row++)
-        for (int column = 0; column < 3; column++) {
-            const double *a = transform + 4 * ((row + 1) % 3), *b = transform + 4 * ((row + 2) % 3);
-            int i = (column + 1) % 3, k = (column + 2) % 3;
-            turn[3 * row + column] = a[i] * b[k] - a[k] * b[i];
-        }
-}
 
 static void turn_normal(const double turn[9], strl_vertex *point)
 {
@@ -98,7 +87,7 @@ static bool is_merged(const strl_walk *walk, size_t points)
 static strl_status merge_points(strl__points *made, size_t first, size_t end, strl_error *err)
 {
     made->purpose = STRL__POINTS_MERGE;
-    find_turn(made->placed->transform, made->turn);
+    strl_affine_cofactors(made->placed->transform, made->turn);
     strl__points_take(made, first, end);
     return made->failed ? strl__fail(err, STRL_ERR_MEMORY, "no memory for splats of many placements") : STRL_OK;
 }
@@ -173,18 +162,9 @@ static strl_status add_items(strl_walk *walk, const strl_draw_item *shape, const
 /* Of points of one placement. */
 static strl_draw_item shape_of(const strl_walk *walk, const strl__active *active, double px)
 {
-    const strl__placement *placement = active->placed;
-    const strl_tree *tree = walk->trees[placement->tree].tree;
-    strl_draw_item item = {.placement = active->placement,
-                           .own_part = placement->own_part,
-                           .step = tree->step,
-                           .point_px = (float)fmin(fmax(px, 1), STRL__MOST_POINT_PX),
-                           .error_px = (float)px};
-    memcpy(item.anchor, tree->box_min, sizeof item.anchor);
-    memcpy(item.box_min, tree->box_min, sizeof item.box_min);
-    memcpy(item.box_max, tree->box_max, sizeof item.box_max);
-    memcpy(item.origin, tree->origin, sizeof item.origin);
-    memcpy(item.transform, placement->transform, sizeof item.transform);
+    strl_draw_item item = {
+        .placement = active->placement, .point_px = (float)fmin(fmax(px, 1), STRL__MOST_POINT_PX), .error_px = (float)px};
+    strl__item_place(&item, walk->trees[active->placed->tree].tree, NULL, active->placed);
     return item;
 }
 

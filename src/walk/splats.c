@@ -5,8 +5,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "geometry/octahedral.h"
-
 #define COARSE_PX 16.0  /* cells that close holes need not be smaller: they are there for moments */
 #define MOST_PARTS 32.0 /* along a side of a cell that is larger than any point */
 /* By measure: less turns more transparent what is seen from the side, and opens pixels between splats; more leaves foliage too dense. */
@@ -30,24 +28,11 @@ static void place_point(const strl__points *self, const strl_node *record, const
         point->position[k] = (int32_t)(uint32_t)((uint64_t)record->anchor[k] - (uint64_t)self->tree->box_min[k] + (uint64_t)(int64_t)place[k]);
 }
 
-static void encode_line(const strl_splat *splat, uint16_t code[2])
-{
-    for (int k = 0; k < 2; k++)
-        code[k] = (uint16_t)(splat->normal[k] * STRL_OCT_MAX / 255u);
-}
-
-static void find_line(const strl_splat *splat, float line[3])
-{
-    uint16_t code[2];
-    encode_line(splat, code);
-    strl_oct_decode(code, line);
-}
-
 /* How much of a direction, of length 1, lies along the splat's line. */
 static float along_line(const strl_splat *splat, const float direction[3])
 {
     float normal[3];
-    find_line(splat, normal);
+    strl_splat_line(splat, normal);
     return fabsf(normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2]);
 }
 
@@ -67,7 +52,7 @@ static strl_vertex point_of_splat(const strl__points *self, const strl_node *rec
 {
     strl_vertex point;
     place_point(self, record, splat->centre, &point);
-    encode_line(splat, point.normal);
+    strl_splat_normal(splat, point.normal);
     point.normal[0] |= (uint16_t)(spread_of(splat) << STRL_SPREAD_SHIFT);
     for (int k = 0; k < 3; k++)
         point.rgba[k] = (uint8_t)(splat->rgba >> 8 * k);
@@ -108,19 +93,24 @@ static unsigned share_of(const strl_walk *walk, const strl__active *active)
     return parts >= STRL__POINT_SHARES ? STRL__POINT_SHARES - 1 : parts >= 1 ? (unsigned)parts - 1 : 0;
 }
 
-/* As of a placement that turns and scales alike along all axes; of others near enough for looks. */
-static void find_sight(strl__points *self, const strl__active *active)
+/* Where the points that follow are seen from, and how much of one a cell of a lattice unit takes: `unit` of its sides. As of a placement that
+ * turns and scales alike along all axes; of others near enough for looks. */
+static void aim(strl__points *self, const strl__active *active, double unit)
 {
     const double *transform = active->placed->transform;
-    double way[3], turned[3], square = 0;
+    double centre[3], ray[3], turned[3], square = 0;
+    if (self->purpose == STRL__POINTS_COUNT)
+        return;
     for (int k = 0; k < 3; k++)
-        way[k] = self->view->orthographic ? self->view->forward[k] : (active->box.min[k] + active->box.max[k]) / 2 - self->view->eye[k];
+        centre[k] = (active->box.min[k] + active->box.max[k]) / 2;
+    strl_view_ray(self->view, centre, ray);
     for (int k = 0; k < 3; k++) {
-        turned[k] = transform[k] * way[0] + transform[4 + k] * way[1] + transform[8 + k] * way[2];
+        turned[k] = transform[k] * ray[0] + transform[4 + k] * ray[1] + transform[8 + k] * ray[2];
         square += turned[k] * turned[k];
     }
     for (int k = 0; k < 3; k++)
         self->sight[k] = square > 0 ? (float)(turned[k] / sqrt(square)) : 0;
+    self->unit_share = unit * unit;
 }
 
 /* Of the state that the brick is drawn in. */
@@ -133,9 +123,7 @@ static void take_shown(strl__points *self, const strl__active *active)
     if (first == end)
         return;
     unsigned size = share_of(self->walk, active);
-    double unit = strl_sight_error_px(&active->sight, active->placed->length_scale) / fmax(1, strl__points_px(self->walk, size));
-    self->unit_share = unit * unit;
-    find_sight(self, active);
+    aim(self, active, strl_sight_error_px(&active->sight, active->placed->length_scale) / fmax(1, strl__points_px(self->walk, size)));
     take_splats(self, active->node->record, mesh->splats + first, end - first, size);
 }
 
@@ -145,15 +133,24 @@ static strl__splat_run splats_of_state(const strl__node *node, uint32_t state)
 {
     const strl__mesh *mesh = &node->mesh;
     uint32_t first = state ? mesh->splat_end[state - 1] : 0;
-    strl__splat_run run = {node->record, mesh->splats + first, mesh->splat_end[state] - first, UINT8_MAX};
-    for (uint32_t i = 0; i < run.count; i++)
-        run.least_side = run.splats[i].side < run.least_side ? run.splats[i].side : run.least_side;
-    return run;
+    return (strl__splat_run){node->record, mesh->splats + first, mesh->splat_end[state] - first};
 }
 
-strl__splat_run strl__finest_splats(const strl__node *node)
+static unsigned least_side(const strl__splat_run *run)
 {
-    return node->mesh.splat_end ? splats_of_state(node, node->mesh.step_count - 1) : (strl__splat_run){.least_side = UINT8_MAX};
+    unsigned side = UINT8_MAX;
+    for (uint32_t i = 0; i < run->count; i++)
+        side = run->splats[i].side < side ? run->splats[i].side : side;
+    return side;
+}
+
+strl__preview strl__preview_of(const strl__node *node)
+{
+    strl__preview preview = {.least_side = UINT8_MAX};
+    if (node->mesh.splat_end)
+        preview.run = splats_of_state(node, node->mesh.step_count - 1);
+    preview.least_side = least_side(&preview.run);
+    return preview;
 }
 
 /* The least size that is not less than px, as far as there is one. */
@@ -196,7 +193,7 @@ static void find_plane(const strl_splat *splat, float across[3], float up[3])
 {
     float normal[3], axis[3] = {0};
     int least = 0;
-    find_line(splat, normal);
+    strl_splat_line(splat, normal);
     for (int k = 1; k < 3; k++)
         least = fabsf(normal[k]) < fabsf(normal[least]) ? k : least;
     axis[least] = 1;
@@ -258,12 +255,12 @@ static void take_missing(strl__points *self, const strl__active *active)
     while (state + 1 < mesh->step_count &&
            strl_sight_error_px(&active->sight, (double)mesh->errors[state] * active->placed->length_scale) > COARSE_PX)
         state++;
-    const strl__splat_run own = splats_of_state(node, state), *preview = &self->walk->trees[active->placed->tree].preview;
+    const strl__splat_run own = splats_of_state(node, state);
+    const strl__preview *preview = &self->walk->trees[active->placed->tree].preview;
     bool is_coarse = strl_sight_error_px(&active->sight, (double)mesh->errors[state] * active->placed->length_scale) > COARSE_PX;
-    bool is_finer = is_coarse && preview->least_side < own.least_side;
-    const strl__splat_run run = is_finer ? *preview : own;
-    self->unit_share = 1;
-    find_sight(self, active);
+    bool is_finer = is_coarse && preview->least_side < least_side(&own);
+    const strl__splat_run run = is_finer ? preview->run : own;
+    aim(self, active, 1);
     for (uint32_t i = 0; i < run.count && self->work > 0; i++, self->work--)
         if (!is_finer || is_within(node->record, run.record, &run.splats[i]))
             take_cell(self, active, run.record, &run.splats[i]);

@@ -122,7 +122,7 @@ static strl_status take_root(strl_walk *walk, uint32_t tree, strl_source_span *s
     if (status != STRL_OK)
         return status;
     strl__node_install(walk, own->root, &mesh);
-    own->preview = strl__finest_splats(own->root);
+    own->preview = strl__preview_of(own->root);
     uint64_t spare = strl__spare_bytes(record, &own->root->mesh); /* a root is never evicted */
     walk->resident_bytes -= spare;
     walk->root_bytes -= spare;
