@@ -43,9 +43,14 @@ strl_status strl_source_read(strl_source *source, uint64_t offset, void *data, s
     return status == STRL_OK ? source->klass->read(source, offset, data, size, err) : status;
 }
 
+bool strl_source_may_differ(const strl_source *source)
+{
+    return source->klass->doubt != NULL;
+}
+
 bool strl_source_ask_again(strl_source *source, unsigned *attempt, uint64_t offset, size_t size)
 {
-    if (!source->klass->doubt || ++*attempt > MOST_ATTEMPTS)
+    if (!strl_source_may_differ(source) || ++*attempt > MOST_ATTEMPTS)
         return false;
     strl_source_doubt(source, offset, size);
     return true;
@@ -62,7 +67,7 @@ strl_status strl_source_read_known(strl_source *source, const strl_source_span *
     unsigned attempt = 1;
     do {
         status = strl_source_read(source, span->offset, span->data, span->size, err);
-    } while (status == STRL_OK && source->klass->doubt && is_wrong(span) &&
+    } while (status == STRL_OK && strl_source_may_differ(source) && is_wrong(span) &&
              strl_source_ask_again(source, &attempt, span->offset, span->size));
     return status;
 }

@@ -68,6 +68,8 @@ strl_status strl_source_read_many(strl_source *source, const strl_source_span *s
 /* Whether to read once more what was not what it should be, this having been attempt 1, 2, ...: counts it, and doubts the bytes. Never of what
  * is no network's. */
 bool strl_source_ask_again(strl_source *source, unsigned *attempt, uint64_t offset, size_t size);
+/* Whether reading the same range once more may give other bytes, as over a network. */
+bool strl_source_may_differ(const strl_source *source);
 /* How many bytes may be asked for now so that they come soon, and that what is more urgent a moment later does not have
  * to wait behind them: follows bandwidth and latency. UINT64_MAX where there is nothing to wait for. What is submitted
  * beyond it is served all the same. */

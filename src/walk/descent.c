@@ -126,13 +126,13 @@ static strl__outlook find_child(strl__descent *c, strl__node *parent, uint32_t i
     }
     if (*child) {
         bool waiting = (*child)->residency == STRL__ABSENT && strl__is_waiting(walk, &(*child)->retry);
-        if (waiting && (*child)->retry.failures < STRL__GIVE_UP_FAILURES)
+        if (waiting && !strl__is_given_up(walk, &(*child)->retry))
             c->cut->waits = true;
         return waiting ? STRL__BACKING_OFF : STRL__HERE;
     }
     const strl__treelet *treelet = strl__treelets_find(&walk->treelets, parent->treelet->tree, id / STRL_TREELET_NODES);
     if (treelet && treelet->residency == STRL__ABSENT && strl__is_waiting(walk, &treelet->retry)) {
-        c->cut->waits |= treelet->retry.failures < STRL__GIVE_UP_FAILURES;
+        c->cut->waits |= !strl__is_given_up(walk, &treelet->retry);
         return STRL__BACKING_OFF;
     }
     c->cut->waits = true;

@@ -8,6 +8,10 @@
 
 #define RETRY_FRAMES 8u /* doubles with each failure in a row */
 #define RETRY_DOUBLINGS 7u
+/* From so many on strl_walk_settled does not wait for it; it is still asked for. Over a network what came wrong may come right: where every
+ * other answer is wrong, one thing in 256 is given up. */
+#define GIVE_UP_FAILURES 3u
+#define GIVE_UP_WRONG 8u
 #define LOOK_NS 1000000000u /* between two looks: this part of the time for which the source has been away, */
 #define LOOK_SHARE 4u
 #define MOST_LOOK_NS 60000000000u /* so much at most */
@@ -30,6 +34,12 @@ void strl__back_off(const strl_walk *walk, strl__retry *retry, bool is_unread)
     retry->frame = walk->frame + ((uint64_t)RETRY_FRAMES << doublings);
     retry->is_unread = is_unread;
     retry->returns = walk->returns;
+}
+
+bool strl__is_given_up(const strl_walk *walk, const strl__retry *retry)
+{
+    bool may_come_right = !retry->is_unread && strl_source_may_differ(walk->source);
+    return retry->failures >= (may_come_right ? GIVE_UP_WRONG : GIVE_UP_FAILURES);
 }
 
 bool strl__is_waiting(const strl_walk *walk, const strl__retry *retry)

@@ -25,7 +25,6 @@
 #define STRL__SPLAT_ROOM 2048u /* bytes that a decoded node may take beside what its record says: splats of an empty brick */
 #define STRL__PREVIEW_ROOM (STRL_BRICK_SPLATS * sizeof(strl_splat)) /* the same of the first node of a tree */
 #define STRL__MOST_POINT_PX 64.0 /* what every GL draws */
-#define STRL__GIVE_UP_FAILURES 3u /* from then on strl_walk_settled does not wait for it; it is still retried */
 
 typedef enum strl__residency { STRL__ABSENT, STRL__PENDING, STRL__RESIDENT } strl__residency;
 
@@ -509,6 +508,7 @@ void strl__node_touch(strl_walk *walk, strl__node *node);                       
 void strl__note_fault(strl_walk *walk, const strl_error *error);
 void strl__back_off(const strl_walk *walk, strl__retry *retry, bool is_unread);
 bool strl__is_waiting(const strl_walk *walk, const strl__retry *retry); /* it has failed and is not to be asked for yet */
+bool strl__is_given_up(const strl_walk *walk, const strl__retry *retry); /* nobody waits for it any more */
 void strl__retry_asked(const strl_walk *walk, strl__retry *retry);
 void strl__source_answers(strl_walk *walk);
 void strl__source_fails(strl_walk *walk);

@@ -214,7 +214,7 @@ static void want_run(looking *self, strl__run *run, double px)
     bool is_front = cut->kind == STRL__CUT_FRONT;
     cut->missing++;
     if (run->residency == STRL__ABSENT && strl__is_waiting(walk, &run->retry)) {
-        cut->waits |= run->retry.failures < STRL__GIVE_UP_FAILURES;
+        cut->waits |= !strl__is_given_up(walk, &run->retry);
         return;
     }
     cut->waits = cut->records_missing = true;

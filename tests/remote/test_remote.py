@@ -153,6 +153,26 @@ class Test:
             self.check(f"{fault}: nothing is said of what healed", not result.stderr, result.stderr)
         server.fault = None
 
+    def test_what_comes_wrong_again_heals(self, server):
+        server.asked.clear()
+        self.render(server.url("model.stroll"), "--no-cache")
+        at, times = server.asked[len(server.asked) // 2][1], []
+
+        def wrong_at_first(number, path):
+            _, first, last = server.asked[number]
+            if last is None or not first <= at <= last:
+                return None
+            times.append(number)
+            return "wrong" if len(times) <= 5 else None
+
+        server.fault = wrong_at_first
+        server.asked.clear()
+        out, lines, result = self.render(server.url("model.stroll"), "--no-cache")
+        server.fault = None
+        self.check("one page comes wrong five times in a row", len(times) >= 6, times)
+        self.same("five times wrong: the images are whole", out, self.local, result)
+        self.check("five times wrong: nothing is said of what healed", not result.stderr, result.stderr)
+
     def test_wrong_bytes_are_not_kept(self, server):
         cache = self.folder / "wrong-cache"
         server.fault = lambda number, path: "wrong" if number % 4 == 3 else None
