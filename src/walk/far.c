@@ -25,7 +25,7 @@ bool strl__is_far(const strl__cut *cut, const strl_box *box, double *px)
     return *px <= cut->allowed_px;
 }
 
-static double lattice_step(const strl_walk *walk)
+double strl__far_step(const strl_walk *walk)
 {
     double longest = 0;
     for (int k = 0; k < 3; k++)
@@ -101,11 +101,9 @@ void strl__far_points_deinit(strl__far_points *points)
     *points = (strl__far_points){0};
 }
 
-void strl__far_place(const strl_walk *walk, const double world[3], int32_t position[3])
+int32_t strl__far_cell(double at)
 {
-    double step = lattice_step(walk);
-    for (int k = 0; k < 3; k++)
-        position[k] = (int32_t)lrint(fmin(fmax((world[k] - walk->bounds[k]) / step, 0), LATTICE));
+    return (int32_t)lrint(at > 0 ? at < LATTICE ? at : LATTICE : 0);
 }
 
 strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far, double px, bool is_missing,
@@ -123,7 +121,8 @@ strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu splats", points->count);
     strl_view_ray(cut->view, place, sight);
     double opacity = opacity_of(far, sight, (double)far->area * scale * scale / (side * side));
-    strl__far_place(walk, place, point->position);
+    for (int k = 0; k < 3; k++)
+        point->position[k] = strl__far_cell((place[k] - walk->bounds[k]) / strl__far_step(walk));
     for (int k = 0; k < 2; k++)
         point->normal[k] = (uint16_t)(far->normal[k] | (k == 0 ? far->spread << STRL_SPREAD_SHIFT : 0));
     for (unsigned k = 0; k < 3; k++)
@@ -139,7 +138,7 @@ strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box
 /* Without placement, node or level: they stand for many. */
 strl_draw_item strl__far_item(const strl_walk *walk, double point_px, double box_px)
 {
-    strl_draw_item item = {.placement = STRL_NONE, .node = STRL_NONE, .step = lattice_step(walk), .error_px = (float)box_px,
+    strl_draw_item item = {.placement = STRL_NONE, .node = STRL_NONE, .step = strl__far_step(walk), .error_px = (float)box_px,
                            .point_px = (float)fmin(fmax(point_px, 1), STRL__MOST_POINT_PX)};
     for (int k = 0; k < 3; k++) {
         item.box_max[k] = (int64_t)LATTICE;

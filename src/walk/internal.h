@@ -463,8 +463,9 @@ strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box
 /* Room for one more, its label set; NULL: no memory. */
 strl_vertex *strl__far_points_add(strl__far_points *points, bool labels, uint32_t own_part);
 void strl__far_points_deinit(strl__far_points *points);
-/* A place in the world on the lattice of these points. */
-void strl__far_place(const strl_walk *walk, const double world[3], int32_t position[3]);
+/* These points lie on a lattice of cells of this size, counted from the least corner of the model's box; far_cell: the nearest one. */
+double strl__far_step(const strl_walk *walk);
+int32_t strl__far_cell(double at);
 double strl__far_px(double allowed_px, unsigned size);
 /* All of an item of such points but themselves; what they stand for is at most box_px large. */
 strl_draw_item strl__far_item(const strl_walk *walk, double point_px, double box_px);

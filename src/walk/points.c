@@ -19,41 +19,45 @@ double strl__points_px(const strl_walk *walk, unsigned size)
 
 /* ---- merged */
 
-static void turn_normal(const double turn[9], strl_vertex *point)
+/* From a point of the placement to the lattice of the far points, and how its normals turn. */
+static void begin_merge(strl__points *self)
 {
-    float before[3], after[3];
-    uint16_t spread = point->normal[0] & SPREAD_BITS, code[2] = {point->normal[0] & (uint16_t)~SPREAD_BITS, point->normal[1]};
-    double way[3], square = 0;
-    strl_oct_decode(code, before);
+    const double *transform = self->placed->transform, step = strl__far_step(self->walk);
+    double cofactor[9], largest = 0, least[3];
+    for (int k = 0; k < 3; k++)
+        least[k] = self->tree->origin[k] + self->tree->step * (double)self->tree->box_min[k];
     for (int row = 0; row < 3; row++) {
-        way[row] = turn[3 * row] * (double)before[0] + turn[3 * row + 1] * (double)before[1] + turn[3 * row + 2] * (double)before[2];
-        square += way[row] * way[row];
+        const double *from = transform + 4 * row;
+        double world = from[0] * least[0] + from[1] * least[1] + from[2] * least[2] + from[3];
+        for (int k = 0; k < 3; k++)
+            self->rows[row][k] = from[k] * self->tree->step / step;
+        self->rows[row][3] = (world - self->walk->bounds[row]) / step;
     }
-    for (int row = 0; row < 3; row++)
-        after[row] = square > 0 ? (float)(way[row] / sqrt(square)) : before[row];
-    strl_oct_encode(after, code);
-    point->normal[0] = code[0] | spread;
-    point->normal[1] = code[1];
+    strl_affine_cofactors(transform, cofactor);
+    for (int k = 0; k < 9; k++)
+        largest = fmax(largest, fabs(cofactor[k]));
+    for (int k = 0; k < 9; k++)
+        self->turn[k] = largest > 0 ? (float)(cofactor[k] / largest) : k % 4 == 0;
 }
 
-void strl__points_merge(strl__points *self, unsigned size, const strl_vertex *point)
+void strl__points_merge(strl__points *self, unsigned size, const strl_vertex *point, const float normal[3])
 {
     strl__far_points *merged = &self->walk->merged[size];
     strl_vertex *to = strl__far_points_add(merged, self->walk->labels, self->placed->own_part);
-    double model[3];
+    float turned[3];
     if (!to) {
         self->failed = true;
         return;
     }
     *to = *point;
-    for (int k = 0; k < 3; k++)
-        model[k] = self->tree->origin[k] + self->tree->step * ((double)self->tree->box_min[k] + point->position[k]);
-    const double *rows = self->placed->transform;
-    const double world[3] = {rows[0] * model[0] + rows[1] * model[1] + rows[2] * model[2] + rows[3],
-                             rows[4] * model[0] + rows[5] * model[1] + rows[6] * model[2] + rows[7],
-                             rows[8] * model[0] + rows[9] * model[1] + rows[10] * model[2] + rows[11]};
-    strl__far_place(self->walk, world, to->position);
-    turn_normal(self->turn, to);
+    for (int k = 0; k < 3; k++) {
+        const double *row = self->rows[k];
+        const float *turn = self->turn + 3 * k;
+        to->position[k] = strl__far_cell(row[0] * point->position[0] + row[1] * point->position[1] + row[2] * point->position[2] + row[3]);
+        turned[k] = turn[0] * normal[0] + turn[1] * normal[1] + turn[2] * normal[2];
+    }
+    strl_oct_encode(turned, to->normal);
+    to->normal[0] |= point->normal[0] & SPREAD_BITS;
 }
 
 /* ---- placements */
@@ -87,7 +91,7 @@ static bool is_merged(const strl_walk *walk, size_t points)
 static strl_status merge_points(strl__points *made, size_t first, size_t end, strl_error *err)
 {
     made->purpose = STRL__POINTS_MERGE;
-    strl_affine_cofactors(made->placed->transform, made->turn);
+    begin_merge(made);
     strl__points_take(made, first, end);
     return made->failed ? strl__fail(err, STRL_ERR_MEMORY, "no memory for splats of many placements") : STRL_OK;
 }

@@ -22,7 +22,8 @@ typedef struct strl__points {
     double unit_share;     /* of a point, what the side of a cell of one lattice unit takes */
     size_t at[STRL__POINT_SIZES]; /* how many so far, or where the next goes */
     uint64_t work;         /* that may still be done to close holes, see splats.c */
-    double turn[9];        /* of normals, row-major; to be merged */
+    double rows[3][4];     /* to be merged: from positions to cells of the far points' lattice, */
+    float turn[9];         /* and of normals, row-major */
     bool failed;           /* there was no memory to merge */
 } strl__points;
 
@@ -33,6 +34,7 @@ void strl__points_take(strl__points *self, size_t first, size_t end);
 
 /* points.c */
 double strl__points_px(const strl_walk *walk, unsigned size);
-void strl__points_merge(strl__points *self, unsigned size, const strl_vertex *point);
+/* normal: of length 1, in the tree's space. */
+void strl__points_merge(strl__points *self, unsigned size, const strl_vertex *point, const float normal[3]);
 
 #endif

@@ -28,27 +28,21 @@ static void place_point(const strl__points *self, const strl_node *record, const
         point->position[k] = (int32_t)(uint32_t)((uint64_t)record->anchor[k] - (uint64_t)self->tree->box_min[k] + (uint64_t)(int64_t)place[k]);
 }
 
-/* How much of a direction, of length 1, lies along the splat's line. */
-static float along_line(const strl_splat *splat, const float direction[3])
-{
-    float normal[3];
-    strl_splat_line(splat, normal);
-    return fabsf(normal[0] * direction[0] + normal[1] * direction[1] + normal[2] * direction[2]);
-}
-
 /* Points that are larger than their cells overlap: as many as lie in one pixel hide together what a cell hides, so that a wall stays one,
  * from wherever it is looked at. Of scattered faces that lie parallel less is seen from the side, the more scattered the more. */
-static float opacity_of(const strl__points *self, const strl_splat *splat)
+static float opacity_of(const strl__points *self, const strl_splat *splat, const float line[3])
 {
     if (splat->coverage == 255)
         return 1;
     float along = 1 - (float)spread_of(splat) / STRL_SPREAD_MOST;
-    float turned = along * (1 - along_line(splat, self->sight)) * self->walk->scattered[splat->coverage];
+    float facing = fabsf(line[0] * self->sight[0] + line[1] * self->sight[1] + line[2] * self->sight[2]);
+    float turned = along * (1 - facing) * self->walk->scattered[splat->coverage];
     float hidden = (float)splat->coverage / 255 * (1 - turned);
-    return 1 - powf(1 - hidden, (float)fmin(1, ldexp(self->unit_share, 2 * splat->side)));
+    double share = ldexp(self->unit_share, 2 * splat->side);
+    return share < 1 ? 1 - powf(1 - hidden, (float)share) : hidden;
 }
 
-static strl_vertex point_of_splat(const strl__points *self, const strl_node *record, const strl_splat *splat)
+static strl_vertex point_of_splat(const strl__points *self, const strl_node *record, const strl_splat *splat, const float line[3])
 {
     strl_vertex point;
     place_point(self, record, splat->centre, &point);
@@ -56,16 +50,18 @@ static strl_vertex point_of_splat(const strl__points *self, const strl_node *rec
     point.normal[0] |= (uint16_t)(spread_of(splat) << STRL_SPREAD_SHIFT);
     for (int k = 0; k < 3; k++)
         point.rgba[k] = (uint8_t)(splat->rgba >> 8 * k);
-    point.rgba[3] = (uint8_t)((float)(splat->rgba >> 24) * opacity_of(self, splat) + 0.5f);
+    point.rgba[3] = (uint8_t)((float)(splat->rgba >> 24) * opacity_of(self, splat, line) + 0.5f);
     return point;
 }
 
 static void take_splats(strl__points *self, const strl_node *record, const strl_splat *splats, uint32_t count, unsigned size)
 {
     for (uint32_t i = 0; i < count && self->purpose != STRL__POINTS_COUNT; i++) {
-        const strl_vertex point = point_of_splat(self, record, &splats[i]);
+        float line[3];
+        strl_splat_line(&splats[i], line);
+        const strl_vertex point = point_of_splat(self, record, &splats[i], line);
         if (self->purpose == STRL__POINTS_MERGE)
-            strl__points_merge(self, size, &point);
+            strl__points_merge(self, size, &point, line);
         else
             self->walk->points[self->at[size] + i] = point;
     }
