@@ -42,7 +42,7 @@ static void copy_node(strl_container_writer *to, uint32_t id, strl_node record, 
     strl_arena_deinit(&arena);
 }
 
-void plant_bricks(const char *good, const char *bad, brick_lie lie, void *context)
+void plant_placed_bricks(const char *good, const char *bad, brick_lie lie, void *context, const strl_placement *placement, uint32_t count)
 {
     strl_error err = {0};
     strl_container_writer *to;
@@ -58,10 +58,17 @@ void plant_bricks(const char *good, const char *bad, brick_lie lie, void *contex
         copy_node(to, id, model.node[id], file + model.node[id].page.offset + model.node[id].payload_offset, &model.mesh[id], lie,
                   context);
     must(strl_container_writer_end_tree(to, &err), &err);
+    for (uint32_t i = 0; i < count; i++)
+        must(strl_container_writer_add_placement(to, &placement[i], &err), &err);
     must(strl_container_writer_finish(to, &bytes, &err), &err);
     strl_container_writer_destroy(to);
     built_close(&model);
     free(file);
+}
+
+void plant_bricks(const char *good, const char *bad, brick_lie lie, void *context)
+{
+    plant_placed_bricks(good, bad, lie, context, NULL, 0);
 }
 
 bool no_brick_lie(void *context, uint32_t id, strl_node *record, test_brick *brick, strl_pm *mesh)

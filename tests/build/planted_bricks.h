@@ -9,6 +9,8 @@ typedef bool (*brick_lie)(void *context, uint32_t id, strl_node *record, test_br
 
 /* Names are of files in the folder of built.h. */
 void plant_bricks(const char *good, const char *bad, brick_lie lie, void *context);
+/* The same with the tree in these places; of none it is placed once, as it is. */
+void plant_placed_bricks(const char *good, const char *bad, brick_lie lie, void *context, const strl_placement *placement, uint32_t count);
 bool no_brick_lie(void *context, uint32_t id, strl_node *record, test_brick *brick, strl_pm *mesh);
 
 #endif
