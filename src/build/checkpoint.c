@@ -12,7 +12,7 @@
 
 /* The file: magic, format, checksum of the rest, then the rest. */
 static const char MAGIC[8] = {'s', 't', 'r', 'l', 's', 't', 'o', 'p'};
-#define FORMAT 8u /* changes with whatever any builder saves */
+#define FORMAT 9u /* changes with whatever any builder saves */
 #define HEAD_BYTES 20u
 #define MOST_BYTES (UINT64_C(1) << 32)
 

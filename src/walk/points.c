@@ -122,10 +122,11 @@ static strl_status add_points(strl_walk *walk, const strl_view *view, size_t fir
     strl__points made;
     size_t all = count_points(walk, view, first, end, &made);
     strl_status status = STRL_OK;
-    made.work = walk->hole_work;
-    if (all)
+    if (all) {
+        made.work = walk->hole_work;
         status = is_merged(walk, all) ? merge_points(&made, first, end, err) : make_points(&made, all, first, end, err);
-    walk->hole_work = all ? made.work : walk->hole_work;
+    }
+    walk->hole_work = made.work; /* looking at what is not seen is work too */
     return status;
 }
 

@@ -257,9 +257,11 @@ static void take_missing(strl__points *self, const strl__active *active)
     bool is_finer = is_coarse && preview->least_side < least_side(&own);
     const strl__splat_run run = is_finer ? preview->run : own;
     aim(self, active, 1);
-    for (uint32_t i = 0; i < run.count && self->work > 0; i++, self->work--)
+    for (uint32_t i = 0; i < run.count && self->work > 0; i++) {
+        self->work--;
         if (!is_finer || is_within(node->record, run.record, &run.splats[i]))
             take_cell(self, active, run.record, &run.splats[i]);
+    }
 }
 
 void strl__points_take(strl__points *self, size_t first, size_t end)

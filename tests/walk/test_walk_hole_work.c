@@ -50,6 +50,7 @@ static int destroy_model(void **state)
 typedef struct claim {
     uint8_t side;
     uint32_t marked; /* that many from the first on, red */
+    uint32_t unseen; /* that many from the first on, of the smallest cells in a corner of the box */
 } claim;
 
 /* In the inner half of the box, from which a 32nd of a cell does not lead out. */
@@ -71,7 +72,8 @@ static bool claim_splats(void *context, uint32_t id, strl_node *record, test_bri
         *splat = (test_brick_splat){.side = told->side, .coverage = 255, .parallel = 255, .rgba = i < told->marked ? MARKED : OTHERS};
         splat->normal[0] = splat->normal[1] = 128;
         for (int k = 0; k < 3; k++)
-            splat->centre[k] = place_of(record, k, i >> 4 * (2 - k) & 15) - record->anchor[k];
+            splat->centre[k] = (i < told->unseen ? record->box_min[k] : place_of(record, k, i >> 4 * (2 - k) & 15)) - record->anchor[k];
+        splat->side = i < told->unseen ? 0 : told->side;
     }
     for (uint32_t i = 0; i < brick->level_count; i++)
         brick->level[i] = (test_brick_level){brick->level[0].size, (uint16_t)(i + 1 < brick->level_count ? 0 : SPLATS)};
@@ -184,11 +186,29 @@ static void cells_larger_than_any_point_share_it_too(void **state)
     assert_int_equal(found.marked, 100 * 1024); /* all of those that come first */
 }
 
+/* The work may end at any splat, and with any rest: what has been looked at takes some of it as well. */
+static void the_work_ends_wherever_it_ends(void **state)
+{
+    (void)state;
+    claim told = {.side = 0};
+    while (ldexp(model.tree.step, told.side) < width(0))
+        told.side++;
+    const strl_camera camera = above(middle(0), middle(1), width(0) / 8);
+    for (told.unseen = 0; told.unseen < 1000; told.unseen += 37) {
+        plant_bricks(GOOD, BAD, claim_splats, &told);
+        const counted found = see_first_frames(&camera);
+        if (found.points > MOST_POINTS)
+            fail_msg("%llu points close the holes of a frame, %u splats being out of sight", (unsigned long long)found.points, told.unseen);
+        assert_true(found.points > MOST_POINTS / 2);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(many_copies_share_the_work_of_a_frame),
         cmocka_unit_test(cells_larger_than_any_point_share_it_too),
+        cmocka_unit_test(the_work_ends_wherever_it_ends),
     };
     return cmocka_run_group_tests(tests, create_model, destroy_model);
 }

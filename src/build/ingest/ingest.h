@@ -54,6 +54,7 @@ typedef struct strl_ingest {
     double short_edge;        /* 99 of 100 edges are longer; 0 = there is none */
     bool is_coarse;           /* the step had to be more than a sixteenth of short_edge */
     unsigned curve_shift;     /* lattice coordinates lose so many bits on the curve, which has 21 of each axis */
+    unsigned curve_spare;     /* halvings of the curve's cube in whose first part the whole model lies */
     float leaf_error;         /* lattice units: what quantisation moves a point at most */
     strl_axis up;
     char unit[16];            /* "" = unknown */

@@ -23,6 +23,7 @@ static void write_numbers(const strl_ingest *ingest, strl_writer *writer)
     strl_writer_f64(writer, ingest->step);
     strl_writer_f32(writer, ingest->leaf_error);
     strl_writer_u8(writer, (uint8_t)ingest->curve_shift);
+    strl_writer_u8(writer, (uint8_t)ingest->curve_spare);
     strl_writer_u8(writer, (uint8_t)ingest->up);
     strl_writer_bytes(writer, ingest->unit, sizeof ingest->unit);
     strl_writer_u8(writer, (uint8_t)(ingest->has_normals | ingest->has_colours << 1 | ingest->lacks_normals << 2 | ingest->has_texcoords << 3));
@@ -127,6 +128,7 @@ static bool read_numbers(strl_cursor *cursor, strl_ingest *ingest)
     ingest->step = strl_cursor_f64(cursor);
     ingest->leaf_error = strl_cursor_f32(cursor);
     ingest->curve_shift = strl_cursor_u8(cursor);
+    ingest->curve_spare = strl_cursor_u8(cursor);
     unsigned up = strl_cursor_u8(cursor);
     const uint8_t *unit = strl_cursor_take(cursor, sizeof ingest->unit);
     unsigned flags = strl_cursor_u8(cursor);
@@ -143,7 +145,7 @@ static bool read_numbers(strl_cursor *cursor, strl_ingest *ingest)
     ingest->parts.count = ingest->materials.count = 0; /* grow with the names */
     bool finite = isfinite(ingest->origin[0]) && isfinite(ingest->origin[1]) && isfinite(ingest->origin[2]);
     return finite && ingest->step > 0 && isfinite(ingest->step) && ingest->leaf_error > 0 &&
-           isfinite(ingest->leaf_error) && ingest->curve_shift <= MOST_CURVE_SHIFT && up < 3 && flags < 16;
+           isfinite(ingest->leaf_error) && ingest->curve_shift <= MOST_CURVE_SHIFT && ingest->curve_spare <= 20 && up < 3 && flags < 16;
 }
 
 static strl_status read_cells(strl_saved_reader *saved, strl_ingest *ingest, strl_error *err)

@@ -281,6 +281,8 @@ strl_status strl__survey_choose_lattice(const strl_build_context *context, const
         ingest->origin[k] = floor(survey->min[k] / ingest->step) * ingest->step;
     while (extent / ingest->step + 2 >= ldexp(1, 21 + (int)ingest->curve_shift))
         ingest->curve_shift++;
+    while (ingest->curve_spare < 20 && extent / ingest->step + 2 < ldexp(1, 20 + (int)ingest->curve_shift - (int)ingest->curve_spare))
+        ingest->curve_spare++;
     double rounding = (largest + extent) * 4 * DBL_EPSILON / ingest->step;
     ingest->leaf_error = nextafterf((float)(0.5 * sqrt(3.) + 2 * rounding), INFINITY);
     return STRL_OK;

@@ -450,6 +450,12 @@ static void count_below(const strl_octree *octree, const strl_octant *octant, bo
 
 /* ---- the preview */
 
+uint32_t strl_preview_depth(const strl_ingest *ingest)
+{
+    uint32_t depth = ingest->curve_spare + STRL_PREVIEW_DEPTH;
+    return depth < STRL_OCTREE_DEPTH ? depth : STRL_OCTREE_DEPTH;
+}
+
 /* How many cells a cut through the octree at `depth` has; with content they become those of `level`. */
 static uint32_t cut_cells(const strl_octree *octree, uint32_t index, uint32_t depth, uint32_t level, brick_content *content)
 {
@@ -470,7 +476,7 @@ static uint32_t cut_cells(const strl_octree *octree, uint32_t index, uint32_t de
 /* The second level of the first brick. Large triangles are in no splat but that of their cell. */
 static strl_status add_preview(const strl_octree *octree, uint32_t root, strl_arena *arena, brick_content *content, strl_error *err)
 {
-    uint32_t count = 0, depth = STRL_PREVIEW_DEPTH + 1;
+    uint32_t count = 0, depth = strl_preview_depth(octree->ingest) + 1;
     while (depth > octree->octant[root].depth && (count == 0 || count >= STRL_BRICK_SPLATS))
         count = cut_cells(octree, root, --depth, 0, NULL);
     if (octree->octant[root].is_leaf || depth <= octree->octant[root].depth)

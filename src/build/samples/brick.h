@@ -12,7 +12,7 @@
 /* More than these, of one brick, are told by several. */
 #define STRL_BRICK_TRIANGLES 8192u
 #define STRL_NO_BRICK UINT32_MAX
-#define STRL_PREVIEW_DEPTH 5u
+#define STRL_PREVIEW_DEPTH 5u /* halvings of the model */
 
 typedef struct strl_brick {
     strl_node record;     /* boxes, counts and errors; ids and levels are given when all bricks are known */
@@ -36,11 +36,13 @@ typedef struct strl_brick_set {
  * and parent alone. arena: for temporaries. */
 strl_status strl_bricks_add(strl_brick_set *set, const strl_octree *octree, uint32_t octant, uint32_t parent, strl_arena *arena,
                             strl_error *err);
-/* The first brick of a tree: what its root cell stores, and the preview: splats of the finest cells down to STRL_PREVIEW_DEPTH of
+/* The first brick of a tree: what its root cell stores, and the preview: splats of the finest cells down to strl_preview_depth of
  * which a brick has room for all. They close the holes as long as what is below is not there. */
 strl_status strl_bricks_add_root(strl_brick_set *set, const strl_octree *octree, uint32_t octant, strl_arena *arena,
                                  strl_error *err);
 /* Boxes and cones of parents around those of their children; sizes never less than theirs. */
+/* In the octree, which is that of the curve's cube. */
+uint32_t strl_preview_depth(const strl_ingest *ingest);
 void strl_bricks_close(strl_brick_set *set);
 void strl_bricks_deinit(strl_brick_set *set);
 

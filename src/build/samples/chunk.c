@@ -148,7 +148,7 @@ static bool let_rise(const strl_octree *octree, uint32_t *order, uint32_t *count
 /* What the preview needs: all children of cells above its depth. */
 static strl_status hand_up_below(const strl_octree *octree, strl_octant *above, strl_chunk *chunk, strl_error *err)
 {
-    uint32_t first = chunk->below_count, count = above->depth < STRL_PREVIEW_DEPTH ? above->child_count : 0;
+    uint32_t first = chunk->below_count, count = above->depth < strl_preview_depth(octree->ingest) ? above->child_count : 0;
     size_t capacity = chunk->below_capacity;
     if (!strl__grow(&chunk->below, &capacity, (size_t)first + count, sizeof *chunk->below))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %u cells", first + count);
