@@ -30,14 +30,13 @@ void strl_octree_corner(const strl_ingest *ingest, uint64_t prefix, uint32_t dep
         corner[k] = (double)every_third(prefix >> k) * side;
 }
 
-static bool fits(const strl_ingest *ingest, const strl_soup_triangle *triangle, uint64_t key, uint32_t depth)
+/* Whether the ball of one side's radius round the cell's centre holds the triangle. */
+static bool fits(const strl_soup_triangle *triangle, const double centre[3], double side)
 {
-    double corner[3], side = strl_octree_side(ingest, depth);
-    strl_octree_corner(ingest, key >> 3 * (STRL_OCTREE_DEPTH - depth), depth, corner);
     for (int c = 0; c < 3; c++) {
         double sum = 0;
         for (int k = 0; k < 3; k++) {
-            double way = triangle->corner[c].position[k] - (corner[k] + side / 2);
+            double way = triangle->corner[c].position[k] - centre[k];
             sum += way * way;
         }
         if (sum > side * side)
@@ -71,8 +70,16 @@ uint8_t strl_octree_limit(const strl_ingest *ingest, const strl_soup_triangle *t
     frexp(extent / SURE_SHARE, &exponent); /* the side 2^exponent is above */
     int depth = (int)(ingest->curve_shift + STRL_OCTREE_DEPTH) - exponent;
     uint32_t limit = depth < 0 ? 0 : depth > (int)STRL_OCTREE_DEPTH ? STRL_OCTREE_DEPTH : (uint32_t)depth;
-    while (limit < STRL_OCTREE_DEPTH && fits(ingest, triangle, key, limit + 1))
-        limit++;
+    const uint64_t cell[3] = {every_third(key), every_third(key >> 1), every_third(key >> 2)};
+    double side = strl_octree_side(ingest, limit);
+    for (; limit < STRL_OCTREE_DEPTH; limit++) {
+        double centre[3];
+        side /= 2;
+        for (int k = 0; k < 3; k++)
+            centre[k] = ((double)(cell[k] >> (STRL_OCTREE_DEPTH - limit - 1)) + 0.5) * side;
+        if (!fits(triangle, centre, side))
+            break;
+    }
     return (uint8_t)limit;
 }
 
