@@ -131,23 +131,34 @@ static void wake(strl__http *http, const strl__http_read *read)
         curl_multi_wakeup(http->multi);
 }
 
-/* Mutex held. Submits and waits; data may be NULL. The result's error is copied to err. */
-static strl_status wait_for(strl__http *http, const strl__http_read *like, void *data, strl_error *err)
+static strl__http_read read_of(uint64_t offset, size_t size)
 {
-    strl__http_read *read;
-    strl_status status = strl__http_read_add(http, like, &read, err);
-    if (status != STRL_OK)
-        return status;
-    wake(http, read);
+    return (strl__http_read){.offset = offset, .size = size, .begin = offset, .end = offset + size};
+}
+
+/* Mutex held. Submits a read that end_read waits for; *read is NULL on failure. */
+static strl_status begin_read(strl__http *http, strl__http_read like, strl__http_read **read, strl_error *err)
+{
+    like.urgency = INFINITY;
+    like.waited = true;
+    strl_status status = strl__http_read_add(http, &like, read, err);
+    if (status == STRL_OK)
+        wake(http, *read);
+    return status;
+}
+
+/* Mutex held. Waits, and frees the read; data may be NULL. The result's error is copied to err. */
+static strl_status end_read(strl__http *http, strl__http_read *read, void *data, bool keeps_ahead, strl_error *err)
+{
     while (read->state != STRL__HTTP_DONE)
         strl_condition_wait(&http->answered, &http->mutex);
-    status = read->result.status;
-    if (status == STRL_OK && data) {
+    strl_status status = read->result.status;
+    if (status == STRL_OK && data)
         memcpy(data, read->result.data + (read->offset - read->begin), read->size);
+    if (status == STRL_OK && keeps_ahead)
         keep_ahead(http, read);
-    } else if (status != STRL_OK && err) {
+    if (status != STRL_OK && err)
         *err = read->result.error;
-    }
     strl__free(read->result.data);
     strl__free(read);
     return status;
@@ -163,50 +174,18 @@ static strl_status fail_changed(const strl__http *http, strl_error *err)
 static strl_status http_read(strl_source *source, uint64_t offset, void *data, size_t size, strl_error *err)
 {
     strl__http *http = (strl__http *)source;
-    strl__http_read like = {
-        .offset = offset, .size = size, .begin = offset, .end = offset + size, .urgency = INFINITY, .waited = true};
+    strl__http_read like = read_of(offset, size), *read;
     strl_status status = STRL_OK;
     strl_mutex_lock(&http->mutex);
     if (http->changed.status != STRL_OK) {
         status = fail_changed(http, err);
     } else if (!copy_known(http, offset, size, data)) {
         look_ahead(http, &like);
-        status = wait_for(http, &like, data, err);
+        status = begin_read(http, like, &read, err);
+        if (status == STRL_OK)
+            status = end_read(http, read, data, true, err);
     }
     strl_mutex_unlock(&http->mutex);
-    return status;
-}
-
-/* Mutex held. The bytes of a range that are here already are copied; else *read is on its way to them. */
-static strl_status begin_read(strl__http *http, const strl_source_span *span, strl__http_read **read, strl_error *err)
-{
-    const strl__http_read like = {.offset = span->offset,
-                                  .size = span->size,
-                                  .begin = span->offset,
-                                  .end = span->offset + span->size,
-                                  .urgency = INFINITY,
-                                  .waited = true};
-    *read = NULL;
-    if (copy_known(http, span->offset, span->size, span->data))
-        return STRL_OK;
-    strl_status status = strl__http_read_add(http, &like, read, err);
-    if (status == STRL_OK)
-        wake(http, *read);
-    return status;
-}
-
-/* Mutex held. */
-static strl_status end_read(strl__http *http, strl__http_read *read, void *data, strl_error *err)
-{
-    while (read->state != STRL__HTTP_DONE)
-        strl_condition_wait(&http->answered, &http->mutex);
-    strl_status status = read->result.status;
-    if (status == STRL_OK)
-        memcpy(data, read->result.data, read->size);
-    else if (err)
-        *err = read->result.error;
-    strl__free(read->result.data);
-    strl__free(read);
     return status;
 }
 
@@ -222,9 +201,12 @@ static strl_status http_read_many(strl_source *source, const strl_source_span *s
     if (http->changed.status != STRL_OK)
         status = fail_changed(http, err);
     for (size_t i = 0; status == STRL_OK && i < count; i++)
-        status = begin_read(http, &spans[i], &reads[i], err);
+        if (!copy_known(http, spans[i].offset, spans[i].size, spans[i].data))
+            status = begin_read(http, read_of(spans[i].offset, spans[i].size), &reads[i], err);
     for (size_t i = 0; i < count; i++) { /* whatever has failed: they are on their way */
-        strl_status own = reads[i] ? end_read(http, reads[i], spans[i].data, status == STRL_OK ? err : NULL) : STRL_OK;
+        if (!reads[i])
+            continue;
+        strl_status own = end_read(http, reads[i], spans[i].data, false, status == STRL_OK ? err : NULL);
         status = status == STRL_OK ? own : status;
     }
     strl_mutex_unlock(&http->mutex);
@@ -255,12 +237,9 @@ static strl_status http_submit(strl_source *source, uint64_t token, uint64_t off
                                strl_error *err)
 {
     strl__http *http = (strl__http *)source;
-    const strl__http_read like = {.offset = offset,
-                                  .size = size,
-                                  .begin = offset,
-                                  .end = offset + size,
-                                  .urgency = urgency,
-                                  .result = {.token = token}};
+    strl__http_read like = read_of(offset, size);
+    like.urgency = urgency;
+    like.result.token = token;
     strl__http_read *read;
     strl_mutex_lock(&http->mutex);
     strl_status status = strl__http_read_add(http, &like, &read, err);
@@ -445,10 +424,11 @@ static strl_status make_handles(strl__http *http, strl_error *err)
 
 static strl_status open_address(strl__http *http, strl_error *err)
 {
-    const strl__http_read like = {
-        .size = STRL__HTTP_HEAD_BYTES, .end = STRL__HTTP_HEAD_BYTES, .urgency = INFINITY, .waited = true};
+    strl__http_read *read;
     strl_mutex_lock(&http->mutex);
-    strl_status status = wait_for(http, &like, NULL, err);
+    strl_status status = begin_read(http, read_of(0, STRL__HTTP_HEAD_BYTES), &read, err);
+    if (status == STRL_OK)
+        status = end_read(http, read, NULL, false, err);
     strl_mutex_unlock(&http->mutex);
     return status;
 }
