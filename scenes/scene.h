@@ -19,7 +19,7 @@ typedef struct strl_scene_desc {
                 * whole (platform/output.h). NAME.gltf comes with NAME_000.bin and so on, NAME.obj with NAME.mtl; the
                 * file that names the others is renamed last */
     const char *of;        /* of the array: the file that is copied, of any kind that readers know. What it places itself is written
-                            * out, and refused where that is more than ten times the triangles that it has */
+                            * out; refused where meshes of 256 triangles or more become more than ten times as many by that */
     uint64_t copies;       /* of the array; 0 = 100 */
     const char *importer;  /* of the array: the program that reads foreign formats (readers/reader.h) */
     uint64_t triangles; /* wanted; 0 = 1,000,000. strl_scene_info says how closely a scene keeps to it */

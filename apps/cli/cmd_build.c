@@ -6,6 +6,7 @@
 #include "build_progress.h"
 #include "interrupt.h"
 #include "options.h"
+#include "remote.h"
 #include "shared/importer.h"
 #include "shared/units.h"
 
@@ -156,7 +157,7 @@ static int run(strl_cli_args *args)
         {.name = "scratch", .kind = STRL_CLI_STRING, .value = &desc.scratch, .argument = "DIR",
          .help = "folder in which OUT.stroll.tmp is made, with it where missing, until the build is done (beside the output)"},
         {.name = "resume", .kind = STRL_CLI_FLAG, .value = &desc.resume,
-         .help = "go on where the same build was killed, interrupted or met a full disk (from the beginning)"},
+         .help = "go on where the same build was killed, interrupted or met a full disk; not of models with placements (from the beginning)"},
         {.name = "grid", .kind = STRL_CLI_REAL, .value = &desc.grid, .argument = "STEP",
          .help = "largest lattice step, model units; one below a 2^30th of the extent is refused (chosen from the model)",
          .least = 1e-300, .most = 1e300},
@@ -191,7 +192,9 @@ static int run(strl_cli_args *args)
     desc.warn = show_warning;
     desc.context = &watch;
     strl_cli_catch_interrupts();
-    strl_status status = structure ? strl_build_samples(&desc, &result, &err) : strl_build_clusters(&desc, &result, &err);
+    strl_status status = strl_cli_check_files("build", desc.inputs, desc.input_count, &err);
+    if (!status)
+        status = structure ? strl_build_samples(&desc, &result, &err) : strl_build_clusters(&desc, &result, &err);
     strl_cli_build_progress_end(&watch.progress);
     if (status)
         return fail(&result, &err);

@@ -31,6 +31,9 @@ typedef struct render_options {
     strl_cli_remote remote;
 } render_options;
 
+#define DEFAULT_MEMORY_BYTES (512ull << 20)
+#define SHOWN_BYTES 300 /* of an address, in a sentence */
+
 static const char *const backend_words = "auto|gl45|gl3|null|gles";
 enum { BACKEND_AUTO, BACKEND_GL45, BACKEND_GL3, BACKEND_NULL, BACKEND_GLES };
 
@@ -40,6 +43,7 @@ enum { BACKEND_AUTO, BACKEND_GL45, BACKEND_GL3, BACKEND_NULL, BACKEND_GLES };
 typedef struct prober {
     strl_render_model *model;
     strl_renderer *renderer;
+    uint32_t lacks; /* nodes that an image was without, at most */
 } prober;
 
 static strl_status probe(void *context, const strl_camera *camera, float *depth, strl_error *err)
@@ -50,6 +54,7 @@ static strl_status probe(void *context, const strl_camera *camera, float *depth,
     strl_status status = strl_renderer_resize(self->renderer, camera->width, camera->height, err);
     if (status == STRL_OK)
         status = self->model->klass->draw(self->model, self->renderer, camera, &options, &stats, err);
+    self->lacks = stats.missing_nodes > self->lacks ? stats.missing_nodes : self->lacks;
     return status == STRL_OK ? strl_renderer_read_depth(self->renderer, depth, err) : status;
 }
 
@@ -63,9 +68,15 @@ static strl_path_site make_site(const strl_render_model *model, prober *looks)
     return site;
 }
 
+/* What needs an image of the surface. */
+static bool is_along_surface(const char *path)
+{
+    return strcmp(path, "walk") == 0 || strcmp(path, "flythrough") == 0;
+}
+
 static bool is_named_path(const char *path)
 {
-    return strcmp(path, "orbit") == 0 || strcmp(path, "walk") == 0 || strcmp(path, "flythrough") == 0;
+    return strcmp(path, "orbit") == 0 || is_along_surface(path);
 }
 
 static strl_status load_path(const char *file, strl_camera_path *path, strl_error *err)
@@ -76,11 +87,11 @@ static strl_status load_path(const char *file, strl_camera_path *path, strl_erro
     return status;
 }
 
-/* A path along the surface shows that to the probe: any size the renderer had is restored. */
+/* A path along the surface shows that to the probe: any size the renderer had is restored. *lacks: nodes that the surface was without. */
 static strl_status make_path(const render_options *o, strl_render_model *model, strl_renderer *renderer,
-                             strl_camera_path *path, strl_error *err)
+                             strl_camera_path *path, uint32_t *lacks, strl_error *err)
 {
-    prober looks = {model, renderer};
+    prober looks = {model, renderer, 0};
     strl_path_site site = make_site(model, &looks);
     strl_status status;
     if (o->camera || !o->path)
@@ -95,6 +106,7 @@ static strl_status make_path(const render_options *o, strl_render_model *model, 
         status = load_path(o->path, path, err);
     if (status == STRL_OK)
         status = strl_renderer_resize(renderer, o->size[0], o->size[1], err);
+    *lacks = looks.lacks;
     return status;
 }
 
@@ -134,14 +146,16 @@ static strl_status judge(const render_options *o, size_t frames, const strl_imag
         strl_cli_coarse_report(coarse, o->memory_bytes);
     if (lacking->frames == 0)
         return STRL_OK;
+    char shown[SHOWN_BYTES];
+    const char *name = strl_location_shown(o->input, shown, sizeof shown);
     if (!o->realtime)
         return strl__fail(err, STRL_ERR_IO,
                           "%s: %" PRIu64 " of %zu frame%s coarser than asked for, %" PRIu32 " node%s could not be read, the last fault: %.200s",
-                          o->input, lacking->frames, frames, frames == 1 ? " is" : "s are", lacking->most_nodes,
+                          name, lacking->frames, frames, frames == 1 ? " is" : "s are", lacking->most_nodes,
                           strl_cli_plural(lacking->most_nodes), last->last_fault);
     if (!o->quiet)
-        fprintf(stderr, "stroll: %s: the last frame is without %" PRIu32 " node%s after %" PRIu64 " read%s that failed, the last because %s\n",
-                o->input, lacking->most_nodes, strl_cli_plural(lacking->most_nodes), last->faults, strl_cli_plural(last->faults),
+        fprintf(stderr, "stroll: %s: the last frame is without %" PRIu32 " node%s that had not come; %" PRIu64 " read%s failed before it, the last because %s\n",
+                name, lacking->most_nodes, strl_cli_plural(lacking->most_nodes), last->faults, strl_cli_plural(last->faults),
                 last->last_fault);
     return STRL_OK;
 }
@@ -179,7 +193,7 @@ static strl_status render_frames(const render_options *o, strl_render_model *mod
         stats.elapsed_ns = strl_clock_ns() - o->begun_ns;
         if (status == STRL_OK)
             status = strl_render_output_add(&output, f, renderer, &stats, err);
-        strl_cli_coarse_add(&coarse, o->error_px, stats.allowed_error_px, stats.max_error_px);
+        strl_cli_coarse_add(&coarse, o->error_px, o->splat_px, stats.allowed_error_px, stats.max_error_px);
         count_lacking(o, &stats, &lacking);
         strl_cli_progress_update(progress, "render", f + 1, path->count, "frames");
         if (status == STRL_OK)
@@ -217,14 +231,15 @@ static strl_status open_renderer(const render_options *o, uint64_t supersample, 
 }
 
 /* A path along the surface of a container is one for all that render it, however they draw it: it is made in a walk of its own, with
- * the defaults, that waits for all it wants. Others are made round the model that is drawn. */
-static strl_status survey_path(const render_options *o, const strl_render_model_desc *drawn, strl_camera_path *path, strl_error *err)
+ * the defaults, that waits for all it wants, and is none where the walk can't have that. Others are made round the model that is drawn. */
+static strl_status survey_path(const render_options *o, const strl_location *location, strl_camera_path *path, strl_error *err)
 {
-    const strl_render_model_desc desc = {.location = drawn->location, .error_px = 1, .splat_px = 1, .memory_bytes = drawn->memory_bytes};
+    const strl_render_model_desc desc = {.location = *location, .error_px = 1, .splat_px = 1, .memory_bytes = DEFAULT_MEMORY_BYTES};
+    uint32_t lacks = 0;
     strl_render_model *model = NULL;
     strl_renderer *renderer = NULL;
     bool is_container = false;
-    if (!o->path || (strcmp(o->path, "walk") != 0 && strcmp(o->path, "flythrough") != 0))
+    if (!o->path || !is_along_surface(o->path))
         return STRL_OK;
     strl_status status = strl_location_is_container(&desc.location, &is_container, err);
     if (status == STRL_OK && is_container)
@@ -232,10 +247,15 @@ static strl_status survey_path(const render_options *o, const strl_render_model_
     if (status == STRL_OK && is_container)
         status = strl_render_walk_open(&desc, &model, err);
     if (status == STRL_OK && is_container)
-        status = make_path(o, model, renderer, path, err);
+        status = make_path(o, model, renderer, path, &lacks, err);
     if (model)
         model->klass->close(model);
     strl_renderer_destroy(renderer);
+    char shown[SHOWN_BYTES];
+    if (status == STRL_OK && lacks)
+        return strl__fail(err, STRL_ERR_IO,
+                          "%s: %" PRIu32 " node%s of the surface that --path %s goes along could not be read: try again, or give a path file",
+                          strl_location_shown(o->input, shown, sizeof shown), lacks, strl_cli_plural(lacks), o->path);
     return status;
 }
 
@@ -245,6 +265,7 @@ static strl_status render(render_options *o, strl_cli_progress *progress, bool *
     strl_render_model *model = NULL;
     strl_renderer *renderer = NULL;
     strl_camera_path path = {0};
+    uint32_t lacks; /* of the surface of what is no container: nothing */
     strl_render_model_desc desc = {.full = o->full, .realtime = o->realtime, .error_px = o->error_px, .splat_px = o->splat_px,
                                    .cull = (strl_cull)o->cull, .memory_bytes = o->memory_bytes, .progress = progress};
     strl_cli_catch_interrupts();
@@ -252,13 +273,13 @@ static strl_status render(render_options *o, strl_cli_progress *progress, bool *
     if (status == STRL_OK)
         status = strl_cli_locate(&o->remote, o->input, &desc.location, err);
     if (status == STRL_OK)
-        status = survey_path(o, &desc, &path, err);
+        status = survey_path(o, &desc.location, &path, err);
     if (status == STRL_OK)
         status = open_renderer(o, o->supersample, &renderer, err);
     if (status == STRL_OK)
         status = strl_render_model_open(&desc, &model, err);
     if (status == STRL_OK && path.count == 0) {
-        status = make_path(o, model, renderer, &path, err);
+        status = make_path(o, model, renderer, &path, &lacks, err);
         *camera_wrong = o->camera && status == STRL_ERR_ARGUMENT;
     }
     if (status == STRL_OK && o->save_path)
@@ -286,7 +307,7 @@ static int check(const strl_cli_args *args, const render_options *o)
     if (o->backend == BACKEND_NULL && o->output)
         return strl_cli_usage_error(
             args, "the null backend draws no image for -o %s: leave -o out or choose another backend", o->output);
-    if (o->backend == BACKEND_NULL && o->path && (strcmp(o->path, "walk") == 0 || strcmp(o->path, "flythrough") == 0))
+    if (o->backend == BACKEND_NULL && o->path && is_along_surface(o->path))
         return strl_cli_usage_error(
             args, "the null backend sees no surface to go along: save the path with another one and load it");
     if (o->full && o->realtime)
@@ -359,7 +380,7 @@ static int parse(strl_cli_args *args, render_options *o)
 
 static int run(strl_cli_args *args)
 {
-    render_options o = {.frames = 60, .seed = 1, .supersample = 1, .memory_bytes = 512ull << 20,
+    render_options o = {.frames = 60, .seed = 1, .supersample = 1, .memory_bytes = DEFAULT_MEMORY_BYTES,
                         .gpu_memory_bytes = 512ull << 20, .size = {1280, 720}, .error_px = 1, .fps = DEFAULT_FPS,
                         .begun_ns = strl_clock_ns()};
     strl_cli_progress progress;

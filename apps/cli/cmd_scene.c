@@ -82,7 +82,7 @@ static int run(strl_cli_args *args)
          .kind = STRL_CLI_STRING,
          .value = &desc.of,
          .argument = "FILE",
-         .help = "of array: the mesh file that is copied; copies in it are written out, up to ten times its own triangles"},
+         .help = "of array: the mesh file that is copied; copies in it are written out, of meshes of 256 triangles or more up to ten times their triangles"},
         {.name = "copies", .kind = STRL_CLI_COUNT, .value = &desc.copies, .help = "of array: how many (100)", .least = 1, .most = 16000000},
         {.name = "seed", .kind = STRL_CLI_COUNT, .value = &desc.seed, .help = "another one is another model (0)"},
         {.name = "no-normals", .kind = STRL_CLI_FLAG, .value = &desc.no_normals, .help = "positions only"},

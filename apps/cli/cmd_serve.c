@@ -27,7 +27,7 @@ static const char notes[] =
     "  /metrics                                       counters, as Prometheus reads them\n"
     "\n"
     "There is no TLS and no password: whoever reaches the address can read DIR, and pages of any site can with --origin \"*\".\n"
-    "INT or TERM ends it, with exit status 0.";
+    "INT, TERM, HUP or QUIT ends it, with exit status 0.";
 
 /* Lines of several threads go to one stream, each whole. */
 typedef struct journal {
@@ -138,7 +138,7 @@ static int parse(strl_cli_args *args, settings *set, strl_cli_list *folders)
         {.name = "bandwidth", .kind = STRL_CLI_BYTES, .value = &set->bandwidth,
          .help = "bytes a second of all answers together (no limit)", .least = 1024, .most = 0x1p50},
         {.name = "timeout", .kind = STRL_CLI_REAL, .value = &set->timeout_s, .argument = "SECONDS",
-         .help = "a connection ends without a whole request or 64 KiB of an answer for so long (30)", .least = 0.05,
+         .help = "a connection ends without a whole request, 64 KiB of an answer or a turn of a query for so long (30)", .least = 0.05,
          .most = 86400},
         {.name = "request-bytes", .kind = STRL_CLI_BYTES, .value = &set->request_bytes,
          .help = "of a request's line and head, roughly (32K)", .least = 4096, .most = 1 << 20},

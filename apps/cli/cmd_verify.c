@@ -11,8 +11,8 @@
 #include "options.h"
 #include "platform/file.h"
 #include "progress.h"
+#include "remote.h"
 #include "shared/importer.h"
-#include "shared/location.h"
 #include "verify/verify.h"
 
 static bool show_progress(void *context, const char *stage, uint64_t done, uint64_t total)
@@ -152,14 +152,6 @@ static strl_status find_scratch(const char *model, const char *wanted, char **fo
     return wanted ? strl_path_make_directory(wanted, err) : STRL_OK;
 }
 
-/* Nothing of the address in the sentence: it may hold a password. */
-static strl_status check_place(const char *model, strl_error *err)
-{
-    return strl_location_is_remote(model)
-               ? strl__fail(err, STRL_ERR_ARGUMENT, "verify reads files, not addresses: save the model as one first")
-               : STRL_OK;
-}
-
 static strl_status verify(strl_cli_args *args, strl_verify_desc *desc, const char *scratch, strl_verify_report *report,
                           strl_error *err)
 {
@@ -185,7 +177,9 @@ static int verify_and_print(strl_cli_args *args, strl_verify_desc *desc, const c
 {
     strl_error err;
     strl_verify_report report = {0};
-    strl_status status = check_place(desc->model, &err);
+    strl_status status = strl_cli_check_files("verify", &desc->model, 1, &err);
+    if (status == STRL_OK)
+        status = strl_cli_check_files("verify", desc->inputs, desc->input_count, &err);
     if (status == STRL_OK)
         status = verify(args, desc, scratch, &report, &err);
     if (status == STRL_OK && json)

@@ -26,7 +26,7 @@ static void add_frame(void *context, const strl_viewer_frame *frame)
     if (frame->frame_ns > all->longest_ns)
         all->longest_ns = frame->frame_ns;
     all->last = *frame;
-    strl_cli_coarse_add(&all->coarse, frame->asked_px, frame->allowed_px, frame->max_error_px);
+    strl_cli_coarse_add(&all->coarse, frame->asked_px, frame->splat_px, frame->allowed_px, frame->max_error_px);
 }
 
 static void print_session(const session *all)

@@ -12,10 +12,11 @@ static double worth_px(double allowed_px, double drawn_px)
     return isfinite(drawn_px) ? drawn_px : allowed_px;
 }
 
-void strl_cli_coarse_add(strl_cli_coarse *coarse, double asked_px, double allowed_px, double drawn_px)
+void strl_cli_coarse_add(strl_cli_coarse *coarse, double error_px, double splat_px, double allowed_px, double drawn_px)
 {
+    const double asked_px = fmax(error_px, splat_px);
     coarse->frames++;
-    if (!(allowed_px > asked_px) || !(drawn_px > asked_px))
+    if (!(allowed_px > error_px) || !(drawn_px > asked_px))
         return;
     coarse->coarse_frames++;
     double worst = coarse->coarse_frames > 1 ? worth_px(coarse->allowed_px, coarse->drawn_px) / coarse->asked_px : 0;

@@ -42,6 +42,11 @@ strl_status strl_location_open_source(const strl_location *location, unsigned th
     return strl_source_open_http(name, &desc, source, err);
 }
 
+const char *strl_location_shown(const char *name, char *shown, size_t size)
+{
+    return strl_location_is_remote(name) ? strl__address_shown(name, shown, size) : name;
+}
+
 strl_status strl_location_open_container(const strl_location *location, strl_container **container, strl_error *err)
 {
     strl_source *source;

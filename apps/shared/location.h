@@ -3,6 +3,7 @@
 #define STRL_APPS_LOCATION_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "stroll/container.h"
@@ -17,6 +18,8 @@ typedef struct strl_location {
 
 /* Anything with "://" is meant as an address, which not all programs can reach. */
 bool strl_location_is_remote(const char *name);
+/* As sentences and titles may show it: a path itself, of an address no password and no query. */
+const char *strl_location_shown(const char *name, char *shown, size_t size);
 /* threads: of a file; an address has its own. STRL_ERR_UNSUPPORTED where it is an address of another kind. */
 strl_status strl_location_open_source(const strl_location *location, unsigned threads, strl_source **source,
                                       strl_error *err);

@@ -48,8 +48,8 @@ static void set_model(strl__viewer *v, strl_viewer_model *model)
 void strl__viewer_set_title(strl__viewer *v)
 {
     char title[256];
-    const char *slash = strrchr(v->path, '/');
-    snprintf(title, sizeof title, "%.200s - Stroll", slash ? slash + 1 : v->path);
+    const char *slash = strrchr(v->shown, '/');
+    snprintf(title, sizeof title, "%.200s - Stroll", slash ? slash + 1 : v->shown);
     if (v->window)
         strl_window_set_title(v->window, title);
 }
@@ -94,7 +94,9 @@ strl_status strl__viewer_open_model(strl__viewer *v, const char *path, strl_erro
     v->parts = parts;
     v->controls.search[0] = 0;
     bool is_other = strcmp(v->path, path) != 0;
+    char shown[sizeof v->shown];
     snprintf(v->path, sizeof v->path, "%s", path);
+    snprintf(v->shown, sizeof v->shown, "%s", strl_location_shown(path, shown, sizeof shown));
     v->mesh[0] = 0;
     strl__viewer_set_title(v);
     strl_settings_renew(&v->settings);
@@ -103,7 +105,7 @@ strl_status strl__viewer_open_model(strl__viewer *v, const char *path, strl_erro
     if (is_other) /* a path, which has been saved, leads through the model that was there */
         strl_recorder_deinit(&v->recorder);
     strl_journal_write(v->journal, "opened",
-                       json_pack("{s:o,s:I,s:I,s:i}", "file", strl_journal_text(path), "triangles",
+                       json_pack("{s:o,s:I,s:I,s:i}", "file", strl_journal_text(v->shown), "triangles",
                                  (json_int_t)model->triangles, "triangles_placed",
                                  (json_int_t)(model->placed < INT64_MAX ? model->placed : INT64_MAX), "parts",
                                  (int)info->part_count));
@@ -128,7 +130,7 @@ strl_status strl__viewer_set_budgets(strl__viewer *v, strl_error *err)
     v->desc.gpu_memory_bytes = (uint64_t)((double)v->controls.gpu_memory_mib * (1 << 20));
     strl_status status = open_walk(v, v->path, &model, err);
     if (status == STRL_OK && !is_same_model(v->model, model))
-        status = strl__fail(err, STRL_ERR_ARGUMENT, "%s holds another model now: drop it here to open that", v->path);
+        status = strl__fail(err, STRL_ERR_ARGUMENT, "%s holds another model now: drop it here to open that", v->shown);
     if (status == STRL_OK)
         status = strl__viewer_make_renderer(v, err);
     if (status == STRL_OK) {

@@ -114,7 +114,7 @@ static void gather_marks(const strl__viewer *v, strl_gui_facts *facts)
 static strl_gui_facts gather_facts(const strl__viewer *v, const strl_render_stats *drawn)
 {
     strl_gui_facts facts = {
-        .model = v->path,
+        .model = v->shown,
         .device = v->device,
         .unit = strl_container_get_info(v->model->container)->unit,
         .model_triangles = v->model->triangles,
@@ -179,6 +179,7 @@ static void tell(strl__viewer *v, uint64_t start_ns, double asked_px, uint64_t t
                                      .missing_nodes = walk->missing_nodes,
                                      .memory_bytes = v->desc.memory_bytes,
                                      .asked_px = asked_px,
+                                     .splat_px = v->desc.splat_px,
                                      .allowed_px = walk->allowed_error_px,
                                      .max_error_px = walk->max_error_px};
     v->frames_shown++;

@@ -29,6 +29,7 @@ typedef struct strl__frame_clock {
 typedef struct strl__viewer {
     strl_viewer_desc desc;            /* completed: no defaults left */
     char path[4096];                  /* of the model that is open, or its address */
+    char shown[4096];                 /* the same, as anybody may see it */
     char mesh[4096];                  /* that was dropped and of which it was built; "" = none */
     strl_viewer_desc begun;           /* as completed at the start: what has changed since then is remembered */
     strl_gui_controls begun_controls; /* the same */

@@ -15,6 +15,7 @@ typedef struct strl_viewer_frame {
     uint32_t missing_nodes;
     uint64_t memory_bytes;       /* the walk's budget */
     double asked_px, allowed_px; /* pixel error: of the panel; more where memory is tight */
+    double splat_px;             /* of sample trees, as asked for */
     double max_error_px;         /* of what was drawn; infinite where the eye is inside a node's box */
 } strl_viewer_frame;
 

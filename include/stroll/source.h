@@ -50,7 +50,7 @@ typedef struct strl_http_desc {
     const char *cache;    /* a folder that keeps what was read, for another time and for other processes; made where it is
                              missing, but not the folders above it; copied; NULL = nothing is kept */
     uint64_t cache_bytes; /* that our files in it take at most; 0 = 1 GiB */
-    const char *certificates; /* a file of PEM: who may vouch for a server of https; copied; NULL = whom libcurl was built to trust */
+    const char *certificates; /* a file of PEM: who may vouch for a server of https, nobody else; copied; NULL = whom libcurl was built to trust */
     uint32_t connections; /* at a time, at most; 0 = 6; at most 32 */
     uint32_t attempts;    /* at a read, the first included, before it has failed; 0 = 4 */
     uint32_t connect_ms;  /* until a connection is given up; 0 = 10000 */

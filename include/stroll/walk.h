@@ -95,7 +95,7 @@ STRL_API strl_status strl_walk_frame(strl_walk *walk, const strl_camera *camera,
 /* Runs decode jobs inline for up to budget_ns, one in any case (only without executor). Returns how many ran. */
 STRL_API uint64_t strl_walk_pump(strl_walk *walk, uint64_t budget_ns);
 /* True where the last frame's front is the wanted one: nothing is missing and nothing pending for it. What
- * has failed three times in a row is not waited for, though it is asked for again: missing_nodes still
+ * has failed three times in a row (eight times where a network gave wrong bytes) is not waited for, though it is asked for again: missing_nodes still
  * counts it. Without a tight budget a settled draw list is a function of camera and error alone. */
 STRL_API bool strl_walk_settled(const strl_walk *walk);
 /* Of the last frame. Borrowed until the walk is closed; the next frame overwrites it. */

@@ -107,8 +107,7 @@ static strl__pending *begin(strl__site *site, const char *path, strl__answer *an
 static strl_status work(strl__pending *self, strl__model *model, const strl__query *query, bool *is_done, strl_error *err)
 {
     strl__site *site = self->site;
-    uint64_t opening = STRL__LOOKUP_BYTES - model->left_bytes; /* of this turn's borrowing */
-    uint64_t left = STRL__LOOKUP_BYTES > self->read_bytes + opening ? STRL__LOOKUP_BYTES - self->read_bytes - opening : 0;
+    uint64_t left = STRL__LOOKUP_BYTES > self->read_bytes ? STRL__LOOKUP_BYTES - self->read_bytes : 0;
     uint64_t granted = left < TURN_BYTES ? left : TURN_BYTES;
     uint64_t most = query->most_bytes && query->most_bytes < site->answer_bytes ? query->most_bytes : site->answer_bytes;
     strl_status status = STRL_OK;
@@ -121,7 +120,7 @@ static strl_status work(strl__pending *self, strl__model *model, const strl__que
     uint32_t before = strl__selecting_visited(self->selecting);
     status = strl__selecting_step(self->selecting, model->container, TURN_NODES, is_done, err);
     uint64_t used = granted - model->left_bytes;
-    self->read_bytes += opening + used;
+    self->read_bytes += used;
     if (status != STRL_ERR_LIMIT)
         return status;
     bool moved = used > 0 || strl__selecting_visited(self->selecting) > before;
@@ -134,9 +133,8 @@ static strl_status work(strl__pending *self, strl__model *model, const strl__que
 /* So far, in requests. */
 static double cost_of(const strl__pending *self)
 {
-    if (!self->selecting)
-        return 0;
-    return strl__selecting_visited(self->selecting) / NODES_A_REQUEST + (double)self->read_bytes / BYTES_A_REQUEST;
+    double visited = self->selecting ? strl__selecting_visited(self->selecting) : 0;
+    return visited / NODES_A_REQUEST + (double)self->read_bytes / BYTES_A_REQUEST;
 }
 
 /* Takes the file and the selection out of pending. */
@@ -158,7 +156,9 @@ static bool take_turn(strl__pending *self, const strl__query *query, strl__answe
     bool is_done = false;
     strl_container_info info;
     double before = cost_of(self);
-    strl_status status = strl__models_borrow(&self->site->models, self->file, &self->info, &model, &err);
+    uint64_t opening; /* of this turn's borrowing */
+    strl_status status = strl__models_borrow(&self->site->models, self->file, &self->info, &model, &opening, &err);
+    self->read_bytes += opening;
     if (status == STRL_OK)
         status = work(self, model, query, &is_done, &err);
     if (model)

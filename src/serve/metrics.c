@@ -80,7 +80,7 @@ void strl__metrics_write(strl__metrics *metrics, const strl__gauges *gauges, str
     put_one(out, "query_nodes_total", "counter", "Nodes that queries were answered with.",
             atomic_load(&metrics->query_nodes));
     put_one(out, "query_turns_total", "counter", "Turns of a thread that queries took.", atomic_load(&metrics->query_turns));
-    put_one(out, "queries_cut_total", "counter", "Query answers that were cut at their most of bytes.",
+    put_one(out, "queries_cut_total", "counter", "Query answers that were cut.",
             atomic_load(&metrics->queries_cut));
     put_rejected(metrics, out);
     put_seconds(metrics, out);

@@ -223,8 +223,11 @@ static strl_status ready(strl__model *model, strl_error *err)
 }
 
 strl_status strl__models_borrow(strl__models *models, const strl_file *file, const strl_file_info *info,
-                                strl__model **model, strl_error *err)
+                                strl__model **model, uint64_t *read_bytes, strl_error *err)
 {
+    uint64_t unwanted;
+    read_bytes = read_bytes ? read_bytes : &unwanted;
+    *read_bytes = 0;
     strl_mutex_lock(&models->mutex);
     strl_status status = find_or_make(models, file, info, model, err);
     strl_mutex_unlock(&models->mutex);
@@ -238,6 +241,7 @@ strl_status strl__models_borrow(strl__models *models, const strl_file *file, con
         return strl__fail(err, STRL_ERR_CANCELLED, "another query is at work in the container");
     }
     status = ready(*model, err);
+    *read_bytes = STRL__LOOKUP_BYTES - (*model)->left_bytes;
     if (status != STRL_OK) {
         strl__models_return(models, *model);
         *model = NULL;

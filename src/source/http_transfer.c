@@ -182,8 +182,10 @@ static bool set_address(strl__http_transfer *transfer)
     curl_easy_setopt(easy, CURLOPT_MAXREDIRS, (long)STRL__HTTP_MOST_REDIRECTS);
     curl_easy_setopt(easy, CURLOPT_HTTP_VERSION, (long)CURL_HTTP_VERSION_2TLS);
     curl_easy_setopt(easy, CURLOPT_PIPEWAIT, http->secure ? 1L : 0L);
-    if (http->certificates)
+    if (http->certificates) { /* in place of the system's, which libcurl may have as a file and as a folder */
         curl_easy_setopt(easy, CURLOPT_CAINFO, http->certificates);
+        curl_easy_setopt(easy, CURLOPT_CAPATH, NULL);
+    }
     curl_easy_setopt(easy, CURLOPT_CONNECTTIMEOUT_MS, (long)http->desc.connect_ms);
     curl_easy_setopt(easy, CURLOPT_NOSIGNAL, 1L);
     return code == CURLE_OK;

@@ -8,6 +8,7 @@ import json
 import math
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -143,6 +144,17 @@ class Test:
 
     # ---- faults
 
+    def test_a_path_over_what_cannot_be_read(self, server):
+        server.asked.clear()
+        server.fault = lambda number, path: "500" if number > 6 else None
+        stats = self.folder / "along.jsonl"
+        result = self.run("render", server.url("model.stroll"), "--no-cache", "--path", "walk", "--frames", "2", "--size", "64x36",
+                          "--stats", stats)
+        server.fault = None
+        self.check("no path leads over a surface that is not there", result.returncode == 1 and not stats.exists() and
+                   "nodes of the surface that --path walk goes along could not be read" in result.stderr and
+                   result.stderr.count("\n") == 1, (result.returncode, result.stderr, len(server.asked)))
+
     def test_faults_heal(self, server):
         for fault in ("500", "cut", "wrong", "shifted"):
             server.fault = lambda number, path, fault=fault: fault if number % 5 == 3 else None
@@ -227,8 +239,11 @@ class Test:
                 shutil.copy(self.other, self.web / "new")
                 os.replace(self.web / "new", live)
         server.fault = swap
-        out, lines, result = self.render(server.url("live.stroll"), "--no-cache", "--quiet")
+        secret = server.url("live.stroll?signature=s3cret").replace("://", "://who:pa55@")
+        out, lines, result = self.render(secret, "--no-cache", "--quiet")
         server.fault = None
+        self.check("nothing of an address that may be a secret is said",
+                   "live.stroll" in result.stderr and not re.search("who|pa55|s3cret", result.stderr), result.stderr)
         self.check("a swap under way is said, whether or not to be quiet, and is a failure", result.returncode == 1 and
                    "3 of 3 frames are coarser" in result.stderr and CHANGED in result.stderr and result.stderr.count("\n") == 1 and
                    CHANGED in lines[-1]["last_fault"], (result.returncode, result.stderr))
@@ -246,7 +261,9 @@ class Test:
         self.refused("the server failed (500)", "info", url)
         server.fault = None
         self.refused("there is nothing at this address (404)", "info", server.url("none.stroll"))
-        self.refused("verify reads files, not addresses", "verify", url)
+        for words in (("verify", url), ("verify", self.model, "--against", "https://who:pa55@host/x.ply?s3cret"),
+                      ("build", "https://who:pa55@host/x.ply?s3cret", "-o", "x.stroll")):
+            self.refused(f"stroll: {words[0]} reads files, not addresses: save what is there as one first", *words)
         self.refused("redirected too often", "render", server.url("loop"), "-o", "x.png")
         self.refused("models are read from files, http:// and https:// alone", "info", "ftp://host/x")
         self.refused("the server cannot be reached", "render", "http://127.0.0.1:1/x", "-o", "x.png")

@@ -160,6 +160,7 @@ def a_chessboard_of_copies_is_the_same_board(folder):
             for move in model.rows(attributes["TRANSLATION"]):
                 found += [tuple((p[k] + move[k]) * fields.get("scale", [1] * 3)[k] for k in range(3)) + (shade,) for p in points]
         assert most >= least_copies and len(found) == len(wanted)
+        assert len(model.json["meshes"]) <= 8, "tiles of one shape are one mesh"
         found.sort(key=lambda p: (round(p[0], 6), round(p[1], 6), p[3]))
         wanted.sort(key=lambda p: (round(p[0], 6), round(p[1], 6), p[3]))
         assert all(abs(a - b) < 1e-6 for p, q in zip(found, wanted) for a, b in zip(p, q))

@@ -179,7 +179,7 @@ static void a_query_that_may_read_no_more_goes_on_next_time(void **state)
     strl_status status = STRL_ERR_LIMIT;
     unsigned tries = 0;
     for (; status == STRL_ERR_LIMIT && tries < 1000; tries++) {
-        assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &model, &err), STRL_OK);
+        assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &model, NULL, &err), STRL_OK);
         model->left_bytes = STRL__MAX_TREELET_BYTES;
         status = select_all(model->container, query_of(self->fixture.node_count - 1, 0), 1 << 20, &selection, &err);
         strl__models_return(&self->models, model);
@@ -201,7 +201,7 @@ static void a_query_that_may_read_no_more_is_cut(void **state)
     strl_error err = {0};
     uint32_t first = 0, answers = 0, nodes = 0;
     while (first != STRL_NONE && answers < 1000) {
-        assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &model, &err), STRL_OK);
+        assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &model, NULL, &err), STRL_OK);
         model->left_bytes = 3 * STRL__MAX_TREELET_BYTES;
         strl__query *query = query_of(0, 0);
         for (query->count = 0; first + query->count < self->fixture.node_count && query->count < STRL__QUERY_ITEMS;
@@ -229,7 +229,7 @@ static unsigned select_in_steps(served *self, const strl__query *query, uint64_t
     unsigned steps = 0;
     for (; !is_done && steps < 100000; steps++) {
         strl__model *model;
-        assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &model, &err), STRL_OK);
+        assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &model, NULL, &err), STRL_OK);
         if (!selecting)
             assert_int_equal(strl__selecting_create(model->container, query, most_bytes, &selecting, &err), STRL_OK);
         model->left_bytes = 2 * STRL__MAX_TREELET_BYTES;
@@ -259,7 +259,7 @@ static void a_selection_in_steps_is_that_of_one_go(void **state)
         strl__selection whole, parts;
         strl_error err = {0};
         uint64_t most = cut ? 20000 : UINT64_C(1) << 40;
-        assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &model, &err), STRL_OK);
+        assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &model, NULL, &err), STRL_OK);
         assert_int_equal(select_all(model->container, query, most, &whole, &err), STRL_OK);
         strl__models_return(&self->models, model);
         assert_int_equal(whole.cut, cut);
@@ -303,8 +303,8 @@ static void a_container_at_work_keeps_nobody_waiting(void **state)
     strl__model *model, *other;
     strl__selection selection;
     strl_error err = {0};
-    assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &model, &err), STRL_OK);
-    assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &other, &err), STRL_ERR_CANCELLED);
+    assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &model, NULL, &err), STRL_OK);
+    assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &other, NULL, &err), STRL_ERR_CANCELLED);
     assert_null(other);
     assert_int_equal(model->users, 1);
     strl__models_return(&self->models, model);
