@@ -93,7 +93,7 @@ static strl_status select_one(served *self, uint32_t node, uint32_t depth, strl_
 {
     strl__model *model;
     *selection = (strl__selection){0};
-    strl_status status = strl__models_borrow(&self->models, self->file, &self->info, &model, err);
+    strl_status status = strl__models_borrow(&self->models, self->file, &self->info, &model, NULL, err);
     if (status == STRL_OK)
         status = select_all(model->container, query_of(node, depth), UINT64_C(1) << 40, selection, err);
     strl__models_return(&self->models, model);
