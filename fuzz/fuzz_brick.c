@@ -101,7 +101,8 @@ static void check_states(strl__mesh *mesh)
         require(mesh->splat_end[s] >= mesh->splat_end[s - 1]);
 }
 
-static void walk_brick(strl_node *record, const uint8_t *payload, size_t head_bytes, strl_arena *arena)
+/* Whole, and with its coarse states alone. */
+static void walk_brick(strl_node *record, const strl_brick_head *head, const uint8_t *payload, size_t head_bytes, strl_arena *arena)
 {
     strl_payload_sizes sizes;
     strl_pm pm;
@@ -114,7 +115,7 @@ static void walk_brick(strl_node *record, const uint8_t *payload, size_t head_by
     record->step_count = sizes.step_count;
     strl_status status = strl_page_mesh(record, payload, record->payload_bytes, NULL, arena, NULL, &pm, &err);
     require(status == STRL_OK || (status == STRL_ERR_FORMAT && err.message[0]));
-    strl_status made = strl__mesh_create(record, payload, record->payload_bytes, NULL, true, false, &mesh, &err);
+    strl_status made = strl__mesh_create(record, payload, record->payload_bytes, NULL, true, false, 0, &mesh, &err);
     require(made == STRL_OK || (made == STRL_ERR_FORMAT && err.message[0]));
     require(status == STRL_OK || made != STRL_OK);
     if (status == STRL_OK)
@@ -122,6 +123,12 @@ static void walk_brick(strl_node *record, const uint8_t *payload, size_t head_by
     if (made == STRL_OK)
         check_states(&mesh);
     strl__mesh_deinit(&mesh);
+    for (uint32_t held = 0; held < head->level_count && made == STRL_OK; held++) {
+        require(strl__mesh_create(record, payload, record->payload_bytes, NULL, true, false, head->error[held], &mesh, &err) == STRL_OK);
+        require(mesh.held <= mesh.step_count && (mesh.held == mesh.step_count || mesh.held <= held));
+        check_states(&mesh);
+        strl__mesh_deinit(&mesh);
+    }
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -143,7 +150,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         require(bytes == text_bytes);
         check_head(&head, record.triangle_count);
         write_again(&head, record.triangle_count, &arena);
-        walk_brick(&record, payload, bytes, &arena);
+        walk_brick(&record, &head, payload, bytes, &arena);
     }
     strl_arena_deinit(&arena);
     return 0;

@@ -289,6 +289,15 @@ double strl_sight_error_px(const strl_sight *sight, double error)
     return error * sight->focal_px * sight->slope / (sight->nearest - error) * ROUND_UP;
 }
 
+double strl_sight_error_of(const strl_sight *sight, double px)
+{
+    if (sight->empty)
+        return INFINITY;
+    if (sight->orthographic)
+        return px / sight->focal_px;
+    return sight->nearest > 0 ? px * sight->nearest / (sight->focal_px * sight->slope * ROUND_UP + px) : 0;
+}
+
 double strl_view_error_px(const strl_view *view, const strl_box *box, double error)
 {
     const strl_sight sight = strl_view_sight(view, box);

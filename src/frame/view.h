@@ -46,6 +46,8 @@ typedef struct strl_sight {
 strl_sight strl_view_sight(const strl_view *view, const strl_box *box);
 /* strl_view_error_px(view, box, error) is strl_sight_error_px(strl_view_sight(view, box), error). Never decreases with error. */
 double strl_sight_error_px(const strl_sight *sight, double error);
+/* The largest error that is no more than px > 0 pixels; INFINITY where all are. */
+double strl_sight_error_of(const strl_sight *sight, double px);
 /* From the eye to a point, or as long as the view's direction where all rays are parallel. */
 void strl_view_ray(const strl_view *view, const double point[3], double ray[3]);
 /* The least and largest distance along the view direction over the box. */

@@ -12,6 +12,8 @@
 #define MOST_COARSENING 64u
 /* A finer cut must fit into this share of what there is. */
 #define REFINE_SHARE 0.9
+/* Less is held than this: what more may come of it has room. */
+#define TIGHT_SHARE 0.5
 /* Records idle for longer make room for nodes. */
 #define COLD_FRAMES 64u
 
@@ -53,9 +55,12 @@ static strl_status try_finer(strl_walk *walk, const strl_view *view, strl__cut *
 strl_status strl__budget_cut(strl_walk *walk, const strl_view *view, strl__cut *cut, strl_error *err)
 {
     bool moved = false, pending = false;
+    walk->is_tight = walk->coarsening > 0 || (double)walk->resident_bytes > TIGHT_SHARE * (double)walk->memory_bytes;
     if (walk->coarsening > 0 && walk->frame > COLD_FRAMES)
         strl__treelet_evict_cold(walk, walk->frame - COLD_FRAMES);
     strl_status status = run_at(walk, view, STRL__CUT_FRONT, walk->coarsening, 1, cut, err);
+    if (cut->overflow && walk->stands) /* it was a finer cut that seemed to fit */
+        walk->share_guard *= 2;
     while (status == STRL_OK && cut->overflow) {
         walk->coarsening++;
         moved = true;

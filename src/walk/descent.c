@@ -64,6 +64,22 @@ bool strl__add_candidate(strl__candidates *candidates, strl__node *node, uint32_
     return true;
 }
 
+float strl__closed_size(const strl_walk *walk, const strl_tree *tree, const strl_sight *sight, double length_scale, double allowed_px)
+{
+    return (float)(strl_sight_error_of(sight, allowed_px * strl__splat_ratio(walk, tree)) / length_scale / 2);
+}
+
+bool strl__ask_for_child(const strl__descent *c, strl__node *child, strl__candidates *candidates, double urgency)
+{
+    child->closed_size = 0;
+    if (strl__opens_partly(c->walk, child)) {
+        const strl_box box = strl__world_box(c->tree, c->placement, child->record->box_min, child->record->box_max);
+        const strl_sight sight = strl_view_sight(c->cut->view, &box);
+        child->closed_size = strl__closed_size(c->walk, c->tree, &sight, c->placement->length_scale, c->cut->allowed_px);
+    }
+    return strl__add_candidate(candidates, child, STRL_NONE, urgency);
+}
+
 bool strl__add_run(strl__candidates *candidates, strl__run *run, double px)
 {
     if (!strl__add_candidate(candidates, NULL, STRL_NONE, px * RECORDS_FIRST))

@@ -32,7 +32,7 @@ static strl_status prefetch_children(strl__descent *c, const strl__group *group,
         if (child->residency == STRL__PENDING)
             child->request->touched_frame = walk->frame;
         else if (child->residency == STRL__RESIDENT ? !strl__add_node(&walk->ahead, child)
-                                                    : !strl__add_candidate(&walk->prefetch, child, STRL_NONE, urgency))
+                                                    : !strl__ask_for_child(c, child, &walk->prefetch, urgency))
             status = strl__no_memory(c->err);
     }
     return status;
@@ -68,13 +68,37 @@ static strl_status stay(strl__descent *c, const strl__group *group, uint32_t mis
     return add_members(c, group, false);
 }
 
-/* Bytes of the group's children that this traversal has not counted yet. */
-static uint64_t new_bytes(const strl_walk *walk)
+/* Whether the states that are held of it do. */
+static bool suffices(const strl__descent *c, const strl__node *child)
 {
+    const strl__mesh *mesh = &child->mesh;
+    if (mesh->held == mesh->step_count || !c->walk->is_tight)
+        return true;
+    const strl_box box = strl__world_box(c->tree, c->placement, child->record->box_min, child->record->box_max);
+    double px = strl_view_error_px(c->cut->view, &box, mesh->errors[mesh->held] * c->placement->length_scale);
+    return px / strl__splat_ratio(c->walk, c->tree) <= c->cut->allowed_px;
+}
+
+/* What is to come of a brick that may be opened partly is estimated: as much of it as of those that came. Any of them needs the room, for a
+ * moment, to be decoded as a whole. What it is to replace counts too. */
+static uint64_t child_bytes(const strl__descent *c, const strl__node *child)
+{
+    bool is_here = child->residency == STRL__RESIDENT;
+    uint64_t held = strl__node_held_bytes(c->walk, child), whole = strl__node_bytes(child->record, c->walk->labels);
+    if (is_here ? suffices(c, child) : !strl__opens_partly(c->walk, child))
+        return held;
+    c->cut->slack_bytes = whole > c->cut->slack_bytes ? whole : c->cut->slack_bytes;
+    return (is_here ? held : 0) + (uint64_t)(strl__open_share(c->walk) * (double)whole);
+}
+
+/* Bytes of the group's children that this traversal has not counted yet. */
+static uint64_t new_bytes(const strl__descent *c)
+{
+    const strl_walk *walk = c->walk;
     uint64_t bytes = 0;
     for (size_t i = 0; i < walk->children.count; i++)
         if (walk->children.items[i]->counted_pass != walk->pass)
-            bytes += strl__node_bytes(walk->children.items[i]->record, walk->labels);
+            bytes += child_bytes(c, walk->children.items[i]);
     return bytes;
 }
 
@@ -105,8 +129,8 @@ static bool want_child(strl__descent *c, strl__node *child, double px)
         child->request->touched_frame = walk->frame;
         return true;
     }
-    return front ? strl__add_candidate(&walk->missing, child, STRL_NONE, px)
-                 : strl__add_candidate(&walk->prefetch, child, STRL_NONE, STRL__PREFETCH_SHARE * px / c->cut->allowed_px);
+    return front ? strl__ask_for_child(c, child, &walk->missing, px)
+                 : strl__ask_for_child(c, child, &walk->prefetch, STRL__PREFETCH_SHARE * px / c->cut->allowed_px);
 }
 
 static strl_status note_split(strl__descent *c, const strl__group *group)
@@ -165,8 +189,8 @@ static strl_status visit_group(strl__descent *c, const strl__group *group)
     cut->records_missing |= worst == STRL__RECORDS_ABSENT;
     if (worst != STRL__HERE)
         return stay(c, group, group->members);
-    uint64_t bytes = new_bytes(walk);
-    if (cut->bytes > cut->capacity_bytes || bytes > cut->capacity_bytes - cut->bytes) {
+    uint64_t bytes = new_bytes(c), taken = cut->bytes + cut->slack_bytes;
+    if (taken > cut->capacity_bytes || bytes > cut->capacity_bytes - taken) {
         cut->overflow = !cut->stop_at_capacity;
         return stay(c, group, count_inactive(walk, group));
     }

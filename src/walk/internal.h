@@ -45,6 +45,8 @@ typedef struct strl__retry {
 typedef struct strl__mesh {
     uint32_t vertex_count, base_vertices, triangle_count, step_count;
     uint32_t state; /* of the indices; 0 where shared */
+    uint32_t held;  /* the finest state whose triangles and splats are here: step_count but of bricks that show few (brick.c) */
+    uint64_t spare_bytes; /* of strl__node_bytes, that such a brick does without */
     bool shared;
     uint32_t index_total; /* in indices, of all states; shared */
     strl_vertex *vertices; /* owned, with all that follows; NULL = not resident */
@@ -66,12 +68,13 @@ typedef struct strl__node {
     const strl_node *record;
     struct strl__treelet *treelet;
     struct strl__node *older, *newer; /* residency list; resident nodes only */
-    struct strl__request *request;    /* while pending */
+    struct strl__request *request;    /* while pending, or resident and on its way with more states */
     struct strl__node *next_asked;    /* while the request is not answered */
     struct strl__node *decoded_by;    /* while pending: the node whose mesh the payload is told by, or NULL */
     uint32_t decoding;                /* pending nodes that are decoded by this one: it is not evicted */
     strl__mesh mesh;                  /* resident nodes only */
     uint64_t load;                    /* serial number of the mesh's load */
+    float closed_size;                /* of a brick: cells no larger than this need not be opened, lattice units; 0 = all must */
     strl__residency residency;
     strl__retry retry;
     uint64_t counted_pass;  /* last traversal that counted its bytes */
@@ -201,6 +204,7 @@ typedef struct strl__job {
     strl_node record;
     bool labels;      /* wanted */
     bool shared;      /* as strl__mesh */
+    float closed_size; /* as strl__node */
     strl__node *node; /* the walk's thread only */
     bool is_waiting;  /* for the node by which it is decoded; the walk's thread only */
     strl_payload_reference reference; /* that node's mesh, which stays as long as the job may run */
@@ -328,6 +332,7 @@ typedef struct strl__cut {
     bool stop_at_capacity; /* groups stay coarse where the next split would not fit; otherwise
                               overflow is set */
     uint64_t bytes;        /* result: of all nodes of the cut and their ancestors */
+    uint64_t slack_bytes;  /* of the capacity, that stays free so that any of the nodes can be decoded */
     bool overflow;         /* result: more than capacity; the rest is undefined */
     bool records_missing;  /* result: the cut ends early for want of records that are on their way */
     bool waits;            /* result: something is missing that has not been given up */
@@ -358,6 +363,10 @@ struct strl_walk {
     uint64_t frame, pass, loads, tokens;
     uint32_t coarsening; /* allowed error = error_px * 2^(coarsening / 4) */
     bool settled;
+    double opened_bytes, brick_bytes; /* of bricks that may be opened partly, those of late: held, and as a whole */
+    double share_guard; /* what has not come is taken for so much times that share */
+    bool stands;   /* the camera is that of the frame before */
+    bool is_tight; /* memory is: the cut looks at what more is to come of bricks that are here */
 
     strl__treelets treelets;
     uint64_t treelet_bytes; /* part of resident_bytes */
@@ -365,6 +374,8 @@ struct strl_walk {
     uint64_t kept_bytes;      /* the same: pages that came a moment ago */
     uint64_t resident_bytes;
     strl__node *oldest, *newest;
+    void **retired; /* [retired_count], owned with what they point at */
+    size_t retired_count, retired_capacity;
     strl__page *kept[STRL__KEPT_PAGES]; /* the oldest first */
     size_t kept_count;
 
@@ -410,8 +421,9 @@ struct strl_walk {
 uint64_t strl__node_bytes(const strl_node *record, bool labels);
 /* How much of that the splats of a root turned out not to take. */
 uint64_t strl__spare_bytes(const strl_node *record, const strl__mesh *mesh);
-strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size,
-                              const strl_payload_reference *reference, bool labels, bool shared, strl__mesh *mesh, strl_error *err);
+/* closed_size: as of strl__node; 0 where the mesh must have all of its states. */
+strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size, const strl_payload_reference *reference, bool labels,
+                              bool shared, float closed_size, strl__mesh *mesh, strl_error *err);
 /* The finest state of a node's mesh, for the payload of another node. */
 strl_payload_reference strl__mesh_reference(const strl__node *from, const strl_node *record);
 void strl__mesh_deinit(strl__mesh *mesh);
@@ -500,9 +512,17 @@ strl__node *strl__node_find(strl_walk *walk, uint32_t tree, uint32_t id);
  * neither there nor on its way. */
 bool strl__node_hold(strl_walk *walk, strl__node *node);
 void strl__node_let_go(strl__node *node);
-void strl__node_reserve(strl_walk *walk, strl__node *node); /* absent -> pending; room must be there */
-void strl__node_release(strl_walk *walk, strl__node *node); /* pending -> absent */
-void strl__node_install(strl_walk *walk, strl__node *node, const strl__mesh *mesh); /* pending -> resident */
+void strl__node_reserve(strl_walk *walk, strl__node *node); /* absent -> pending, or resident and more to come; room must be there */
+void strl__node_release(strl_walk *walk, strl__node *node); /* pending -> absent, or nothing more to come */
+void strl__node_install(strl_walk *walk, strl__node *node, const strl__mesh *mesh); /* pending or resident -> resident */
+/* How much of what has not come will be held, as far as one knows: 1 = all. */
+double strl__open_share(const strl_walk *walk);
+/* Whether of the node no more may be held than it shows. */
+bool strl__opens_partly(const strl_walk *walk, const strl__node *node);
+/* What it takes, or will at most. */
+uint64_t strl__node_held_bytes(const strl_walk *walk, const strl__node *node);
+/* Meshes that others replaced since the last frame: its list has borrowed them. */
+void strl__retired_free(strl_walk *walk);
 void strl__node_touch(strl_walk *walk, strl__node *node);                           /* now the youngest */
 
 /* faults.c */
@@ -534,9 +554,10 @@ strl_status strl__budget_cut(strl_walk *walk, const strl_view *view, strl__cut *
 /* refine.c */
 void strl__refine_front(strl_walk *walk);
 
-/* brick.c: thread-safe. Vertices and labels are the caller's to fill in. */
-strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const strl_brick_head *head, bool labels,
-                               strl__mesh *mesh, strl_error *err);
+/* brick.c: thread-safe. Vertices and labels are the caller's to fill in: those of pm whose numbers are in *from (of arena), [mesh->vertex_count];
+ * NULL = all in their order. */
+strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const strl_brick_head *head, bool labels, float closed_size,
+                               strl_arena *arena, strl__mesh *mesh, const uint16_t **from, strl_error *err);
 
 /* splats.c */
 strl__preview strl__preview_of(const strl__node *node);

@@ -15,28 +15,31 @@
 
 /* ---- vertices */
 
-static void make_vertices(const strl_pm *pm, strl_vertex *vertices)
+/* from: numbers of those to be made; NULL = all. */
+static void make_vertices(const strl_pm *pm, const uint16_t *from, uint32_t count, strl_vertex *vertices)
 {
     uint32_t last[2] = {UINT32_MAX, UINT32_MAX}, product = UINT32_MAX; /* neighbours often have one colour */
-    for (uint32_t v = 0; v < pm->vertex_count; v++) {
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t v = from ? from[i] : i;
         uint32_t colour = pm->colour ? pm->colour[v] : UINT32_MAX;
         uint32_t material = pm->palette[pm->palette_index ? pm->palette_index[v] : 0].rgba;
         if (colour != last[0] || material != last[1])
             product = strl_rgba_multiply(colour, material);
         last[0] = colour, last[1] = material;
-        memcpy(vertices[v].position, pm->position[v], sizeof vertices[v].position);
-        memcpy(vertices[v].normal, pm->normal[v], sizeof vertices[v].normal);
-        for (unsigned i = 0; i < 4; i++)
-            vertices[v].rgba[i] = (uint8_t)(product >> 8 * i);
+        memcpy(vertices[i].position, pm->position[v], sizeof vertices[i].position);
+        memcpy(vertices[i].normal, pm->normal[v], sizeof vertices[i].normal);
+        for (unsigned k = 0; k < 4; k++)
+            vertices[i].rgba[k] = (uint8_t)(product >> 8 * k);
     }
 }
 
-static void make_labels(const strl_pm *pm, strl_vertex_label *labels)
+static void make_labels(const strl_pm *pm, const uint16_t *from, uint32_t count, strl_vertex_label *labels)
 {
-    for (uint32_t v = 0; v < pm->vertex_count; v++) {
+    for (uint32_t i = 0; i < count; i++) {
+        uint32_t v = from ? from[i] : i;
         const strl_palette_entry *entry = &pm->palette[pm->palette_index ? pm->palette_index[v] : 0];
         const uint32_t texcoord = pm->texcoord ? pm->texcoord[v] : 0;
-        labels[v] = (strl_vertex_label){entry->part, entry->material, {(uint16_t)texcoord, (uint16_t)(texcoord >> 16)}};
+        labels[i] = (strl_vertex_label){entry->part, entry->material, {(uint16_t)texcoord, (uint16_t)(texcoord >> 16)}};
     }
 }
 
@@ -75,7 +78,8 @@ static strl_status allocate(const strl_node *record, const strl_pm *pm, bool lab
     *mesh = (strl__mesh){.vertex_count = pm->vertex_count,
                          .base_vertices = pm->vertex_end[0],
                          .triangle_count = pm->triangle_count,
-                         .step_count = pm->step_count};
+                         .step_count = pm->step_count,
+                         .held = pm->step_count};
     /* Four-byte arrays come first, so that all are aligned. */
     mesh->vertices = (strl_vertex *)block;
     mesh->labels = labels ? (strl_vertex_label *)(mesh->vertices + vertices) : NULL;
@@ -211,7 +215,7 @@ static strl_status keep_states(strl__mesh *mesh, uint64_t most_bytes, strl_error
     if (!block)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %" PRIu32 " vertices", mesh->vertex_count);
     strl__mesh kept = {.vertex_count = mesh->vertex_count, .base_vertices = mesh->base_vertices, .triangle_count = mesh->triangle_count,
-                       .step_count = count - 1, .index_total = 3 * triangles};
+                       .step_count = count - 1, .held = count - 1, .index_total = 3 * triangles};
     kept.vertices = (strl_vertex *)block;
     kept.labels = mesh->labels ? (strl_vertex_label *)(kept.vertices + vertices) : NULL;
     kept.triangle_end = (uint32_t *)(block + vertices * sizeof *kept.vertices + label_bytes);
@@ -246,9 +250,10 @@ static strl_status share(strl__mesh *mesh, uint64_t most_bytes, strl_error *err)
     return status;
 }
 
-strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size,
-                              const strl_payload_reference *reference, bool labels, bool shared, strl__mesh *mesh, strl_error *err)
+strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size, const strl_payload_reference *reference, bool labels,
+                              bool shared, float closed_size, strl__mesh *mesh, strl_error *err)
 {
+    const uint16_t *from = NULL;
     strl_arena arena;
     strl_pm pm;
     *mesh = (strl__mesh){0};
@@ -256,12 +261,12 @@ strl_status strl__mesh_create(const strl_node *record, const void *page, size_t 
     strl_brick_head head;
     strl_status status = strl_page_mesh(record, page, size, reference, &arena, &head, &pm, err);
     if (status == STRL_OK)
-        status = head.level_count ? strl__brick_create(record, &pm, &head, labels, mesh, err)
+        status = head.level_count ? strl__brick_create(record, &pm, &head, labels, shared ? 0 : closed_size, &arena, mesh, &from, err)
                                   : make_progressive(record, &pm, labels, &arena, mesh, err);
     if (status == STRL_OK) {
-        make_vertices(&pm, mesh->vertices);
+        make_vertices(&pm, from, mesh->vertex_count, mesh->vertices);
         if (labels)
-            make_labels(&pm, mesh->labels);
+            make_labels(&pm, from, mesh->vertex_count, mesh->labels);
         if (mesh->finest)
             memcpy(mesh->finest, pm.triangle, pm.triangle_count * sizeof *pm.triangle);
         if (shared)

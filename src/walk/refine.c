@@ -1,6 +1,6 @@
 /* States of the front's progressive meshes: the coarsest that keeps to the allowed error, reached
  * from the last frame's. */
-#include "walk/internal.h"
+#include "walk/descent.h"
 
 /* What decides on a state: its error, projected over the node's box. */
 typedef struct projector {
@@ -58,6 +58,31 @@ static uint32_t choose_state(const strl_walk *walk, const strl__active *active)
     return active->open ? mesh->step_count : coarsest_state(&p, mesh->state, mesh->step_count);
 }
 
+/* Of a brick that does not have all of its states: more, where the wanted one is not among them, or is the last, so that it is near. */
+static void ask_for_more(strl_walk *walk, const strl__active *active, uint32_t wanted)
+{
+    strl__node *node = active->node;
+    const strl__mesh *mesh = &node->mesh;
+    const strl_tree *tree = walk->trees[active->placed->tree].tree;
+    const bool lacks = wanted > mesh->held;
+    if (mesh->held == mesh->step_count || wanted < mesh->held)
+        return;
+    walk->stats.missing_nodes += lacks;
+    if (node->request)
+        node->request->touched_frame = walk->frame;
+    bool waiting = strl__is_waiting(walk, &node->retry);
+    if (lacks && !(waiting && strl__is_given_up(walk, &node->retry)))
+        walk->settled = false;
+    float closed_size = strl__closed_size(walk, tree, &active->sight, active->placed->length_scale, walk->stats.allowed_error_px);
+    if (node->request || waiting || !(mesh->errors[mesh->held] > closed_size))
+        return;
+    double px = strl_sight_error_px(&active->sight, mesh->errors[mesh->held] * active->placed->length_scale) / strl__splat_ratio(walk, tree);
+    node->closed_size = closed_size;
+    /* without memory it is asked for in a later frame */
+    strl__add_candidate(lacks ? &walk->missing : &walk->prefetch, node, STRL_NONE,
+                        lacks ? px : STRL__PREFETCH_SHARE * px / walk->stats.allowed_error_px);
+}
+
 /* was_drawn: in the frame before. */
 static void apply_state(strl_walk *walk, strl__node *node, uint32_t state, bool was_drawn)
 {
@@ -85,7 +110,9 @@ void strl__refine_front(strl_walk *walk)
     for (size_t i = 0; i < walk->front.count; i++) {
         strl__active *active = &walk->front.items[i];
         strl__node *node = active->node;
-        active->state = choose_state(walk, active);
+        uint32_t wanted = choose_state(walk, active);
+        active->state = wanted < node->mesh.held ? wanted : node->mesh.held;
+        ask_for_more(walk, active, wanted);
         if (!node->mesh.shared)
             apply_state(walk, node, active->state, node->drawn_frame > 0 && node->drawn_frame + 1 == walk->frame);
         if (active->sight.seen)

@@ -29,8 +29,8 @@ static void run_job(void *context)
         return;
     }
     const strl_payload_reference *reference = job->record.decode_parent != STRL_NONE ? &job->reference : NULL;
-    job->status = strl__mesh_create(&job->record, job->page->data, job->page->ref.bytes, reference, job->labels, job->shared, &job->mesh,
-                                    &job->error);
+    job->status = strl__mesh_create(&job->record, job->page->data, job->page->ref.bytes, reference, job->labels, job->shared,
+                                    job->closed_size, &job->mesh, &job->error);
     atomic_store_explicit(&job->phase, STRL__JOB_DONE, memory_order_release);
 }
 
@@ -119,6 +119,8 @@ static void reap_jobs(strl_walk *walk)
             continue;
         }
         strl__request *request = job->node->request;
+        if (job->status == STRL_OK && !strl__grow(&walk->retired, &walk->retired_capacity, walk->retired_count + 1, sizeof *walk->retired))
+            job->status = strl__fail(&job->error, STRL_ERR_MEMORY, "no memory for a decoded node");
         if (job->status == STRL_OK) {
             strl__node_install(walk, job->node, &job->mesh);
             job->mesh = (strl__mesh){0};
@@ -164,6 +166,7 @@ static strl_status start_job(strl_walk *walk, strl__node *node, strl__page *page
     job->record = *node->record;
     job->labels = walk->labels;
     job->shared = walk->trees[node->treelet->tree].shared;
+    job->closed_size = node->closed_size;
     strl_status status = submit_job(walk, job, err);
     if (status != STRL_OK) {
         destroy_job(job);
@@ -374,7 +377,8 @@ static void ask_for_page(strl_walk *walk, strl__request *request, strl__node *no
 static bool ask_for_node(strl_walk *walk, const strl__candidate *candidate, uint32_t in_flight, uint64_t evict_before)
 {
     strl__node *node = candidate->node;
-    if (node->residency != STRL__ABSENT)
+    bool has_more = node->residency == STRL__RESIDENT && node->mesh.held < node->mesh.step_count && !node->request;
+    if (node->residency != STRL__ABSENT && !has_more)
         return true;
     strl__page *page = strl__page_find(walk, &node->record->page);
     strl__request *request = request_of(walk, node->record->page.offset, page != NULL);

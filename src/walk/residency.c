@@ -2,8 +2,11 @@
  * their way. */
 #include "walk/internal.h"
 
+#include <math.h>
+
 /* Ids are breadth first, so the children of 128 nodes fill at most this many treelets. */
 #define MAX_CHILD_TREELETS (STRL_NODE_MAX_CHILDREN + 1)
+#define SHARE_KEEPS 0.998 /* with each brick that comes: half after some 350 */
 #define SPARE_FRAMES 60u /* what has been idle for longer makes room for what is only likely to be wanted */
 
 /* ---- meshes */
@@ -45,9 +48,32 @@ void strl__node_let_go(strl__node *node)
     node->decoded_by = NULL;
 }
 
+uint64_t strl__node_held_bytes(const strl_walk *walk, const strl__node *node)
+{
+    return strl__node_bytes(node->record, walk->labels) - node->mesh.spare_bytes;
+}
+
+bool strl__opens_partly(const strl_walk *walk, const strl__node *node)
+{
+    return node->record->rung == STRL_RUNG_SAMPLED && node->record->child_count == 0 && !walk->trees[node->treelet->tree].shared;
+}
+
+/* By bytes, of the last some hundred bricks. */
+static void learn_share(strl_walk *walk, const strl__node *node)
+{
+    walk->opened_bytes = SHARE_KEEPS * walk->opened_bytes + (double)strl__node_held_bytes(walk, node);
+    walk->brick_bytes = SHARE_KEEPS * walk->brick_bytes + (double)strl__node_bytes(node->record, walk->labels);
+}
+
+double strl__open_share(const strl_walk *walk)
+{
+    return walk->brick_bytes > 0 ? fmin(walk->share_guard * walk->opened_bytes / walk->brick_bytes, 1) : 1;
+}
+
 void strl__node_reserve(strl_walk *walk, strl__node *node)
 {
-    node->residency = STRL__PENDING;
+    if (node->residency == STRL__ABSENT)
+        node->residency = STRL__PENDING;
     node->treelet->pins++;
     walk->resident_bytes += strl__node_bytes(node->record, walk->labels);
 }
@@ -55,18 +81,40 @@ void strl__node_reserve(strl_walk *walk, strl__node *node)
 void strl__node_release(strl_walk *walk, strl__node *node)
 {
     strl__node_let_go(node);
-    node->residency = STRL__ABSENT;
+    if (node->residency == STRL__PENDING)
+        node->residency = STRL__ABSENT;
     node->request = NULL;
     node->treelet->pins--;
     walk->resident_bytes -= strl__node_bytes(node->record, walk->labels);
 }
 
+/* Another mesh comes in its place. */
+static void retire_mesh(strl_walk *walk, strl__node *node)
+{
+    unlink_node(walk, node);
+    walk->resident_bytes -= strl__node_held_bytes(walk, node);
+    node->treelet->pins--;
+    walk->retired[walk->retired_count++] = node->mesh.vertices;
+    node->mesh = (strl__mesh){0};
+}
+
+void strl__retired_free(strl_walk *walk)
+{
+    while (walk->retired_count > 0)
+        strl__free(walk->retired[--walk->retired_count]);
+}
+
 void strl__node_install(strl_walk *walk, strl__node *node, const strl__mesh *mesh)
 {
     strl__node_let_go(node);
+    if (node->residency == STRL__RESIDENT)
+        retire_mesh(walk, node);
     node->residency = STRL__RESIDENT;
     node->request = NULL;
     node->mesh = *mesh;
+    walk->resident_bytes -= mesh->spare_bytes;
+    if (strl__opens_partly(walk, node))
+        learn_share(walk, node);
     node->load = ++walk->loads;
     node->retry = (strl__retry){0};
     node->touched_frame = walk->frame;
@@ -86,8 +134,10 @@ void strl__node_touch(strl_walk *walk, strl__node *node)
 static void evict(strl_walk *walk, strl__node *node)
 {
     unlink_node(walk, node);
+    walk->resident_bytes -= strl__node_held_bytes(walk, node);
+    node->treelet->pins--;
+    node->residency = STRL__ABSENT;
     strl__mesh_deinit(&node->mesh);
-    strl__node_release(walk, node);
 }
 
 /* False where nothing may go. */
@@ -102,7 +152,7 @@ static bool evict_oldest(strl_walk *walk, uint64_t evict_before)
         strl__run_evict(walk, run);
         return true;
     }
-    if (may_go && oldest->decoding) { /* as good as wanted */
+    if (may_go && (oldest->decoding || oldest->request)) { /* as good as wanted */
         oldest->wanted_frame = walk->frame;
         strl__node_touch(walk, oldest);
     } else if (may_go) {

@@ -118,7 +118,7 @@ static strl_status take_root(strl_walk *walk, uint32_t tree, strl_source_span *s
     if (status == STRL_OK && !strl__placements_are_few(walk))
         status = strl_page_far(record, span->data, span->size, &own->far, err);
     if (status == STRL_OK)
-        status = strl__mesh_create(record, span->data, span->size, NULL, walk->labels, own->shared, &mesh, err);
+        status = strl__mesh_create(record, span->data, span->size, NULL, walk->labels, own->shared, 0, &mesh, err);
     if (status != STRL_OK)
         return status;
     strl__node_install(walk, own->root, &mesh);
@@ -191,6 +191,7 @@ static void apply_desc(strl_walk *walk, const strl_walk_desc *desc, strl_source 
     walk->labels = desc->labels;
     walk->cull = desc->cull;
     strl_walk_set_error_px(walk, desc->error_px);
+    walk->share_guard = 1.25;
     walk->splat_ratio = isfinite(desc->splat_px) && desc->splat_px > 0 ? desc->splat_px / walk->error_px : 1;
     walk->stats.allowed_error_px = walk->error_px;
     strl__points_prepare(walk);
@@ -226,6 +227,7 @@ void strl_walk_close(strl_walk *walk)
     if (!walk)
         return;
     strl__jobs_abandon(walk);
+    strl__retired_free(walk);
     while (strl__page_drop_oldest(walk))
         ;
     strl__placements_deinit(walk);
@@ -254,6 +256,7 @@ void strl_walk_close(strl_walk *walk)
                            walk->placed_points,
                            walk->wanted_runs.items,
                            walk->numbers,
+                           walk->retired,
                            walk};
     for (unsigned size = 0; size < STRL__FAR_SIZES; size++)
         strl__far_points_deinit(&walk->far[size]);
@@ -315,17 +318,26 @@ static strl_status select_front(strl_walk *walk, const strl_camera *camera, cons
     return STRL_OK;
 }
 
+static bool is_same_camera(const strl_camera *a, const strl_camera *b)
+{
+    return memcmp(a->eye, b->eye, sizeof a->eye) == 0 && memcmp(a->target, b->target, sizeof a->target) == 0 &&
+           memcmp(a->up, b->up, sizeof a->up) == 0 && a->fov_y_deg == b->fov_y_deg && a->ortho_height == b->ortho_height &&
+           a->width == b->width && a->height == b->height;
+}
+
 strl_status strl_walk_frame(strl_walk *walk, const strl_camera *camera, strl_draw_list *list, strl_error *err)
 {
     uint64_t start = strl_clock_ns();
     strl_view view;
     *list = (strl_draw_list){.near_distance = 1, .far_distance = 2};
     begin_frame(walk);
+    strl__retired_free(walk);
     strl__requests_receive(walk);
     strl_status status = strl_view_init(&view, camera)
                              ? STRL_OK
                              : strl__fail(err, STRL_ERR_ARGUMENT,
                                           "the camera is degenerate: not finite, without a direction or an image");
+    walk->stands = is_same_camera(camera, &walk->camera);
     if (status == STRL_OK)
         status = select_front(walk, camera, &view, err);
     if (status == STRL_OK) {

@@ -179,6 +179,37 @@ static void boxes_that_nest_have_bounds_in_the_same_order(void **state)
     }
 }
 
+static void the_error_of_so_many_pixels_has_so_many(void **state)
+{
+    (void)state;
+    uint64_t seed = 12;
+    int seen = 0;
+    for (int round = 0; round < 2000; round++) {
+        strl_camera camera = random_camera(&seed);
+        if (round % 4 == 0)
+            camera.fov_y_deg = 0, camera.ortho_height = 100;
+        strl_view view;
+        if (!strl_view_init(&view, &camera))
+            continue;
+        double centre[3], half[3] = {uniform(&seed), uniform(&seed), uniform(&seed)}, px = 0.01 + 50 * uniform(&seed);
+        for (int i = 0; i < 3; i++)
+            centre[i] = 200 * uniform(&seed) - 100;
+        const strl_box box = box_round(centre, half);
+        const strl_sight sight = strl_view_sight(&view, &box);
+        double error = strl_sight_error_of(&sight, px);
+        assert_true(error >= 0);
+        if (sight.empty) {
+            assert_true(isinf(error));
+        } else if (error > 0) {
+            assert_true(fabs(strl_sight_error_px(&sight, error) - px) < 1e-9 * px);
+            seen++;
+        }
+    }
+    assert_true(seen > 200);
+    const strl_sight inside = {.seen = true, .focal_px = 500, .nearest = 0, .slope = 1};
+    assert_true(strl_sight_error_of(&inside, 1) == 0); /* the eye is in the box: nothing is small enough */
+}
+
 static void the_corner_of_a_wide_image_counts_2_4_times_the_centre(void **state)
 {
     (void)state;
@@ -289,6 +320,7 @@ int main(void)
         cmocka_unit_test(the_bound_of_a_small_box_is_within_1_3_of_the_truth),
         cmocka_unit_test(no_displacement_by_the_error_moves_a_point_further_than_the_bound),
         cmocka_unit_test(boxes_that_nest_have_bounds_in_the_same_order),
+        cmocka_unit_test(the_error_of_so_many_pixels_has_so_many),
         cmocka_unit_test(the_corner_of_a_wide_image_counts_2_4_times_the_centre),
         cmocka_unit_test(a_box_round_the_eye_is_infinite_and_one_outside_the_image_is_zero),
         cmocka_unit_test(a_box_that_passes_below_the_eye_is_bounded_by_what_the_image_shows_of_it),

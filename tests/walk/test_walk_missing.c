@@ -9,6 +9,7 @@
 #include <string.h>
 #include <cmocka.h>
 
+#include "base/hash.h"
 #include "base/memory.h"
 #include "build/sample_tree.h"
 #include "walk/walk_checks.h"
@@ -204,11 +205,106 @@ static void nor_has_any_that_comes_behind_it(void **state)
     }
 }
 
+/* Nearer and nearer: what is held of a brick no longer does, and more of it is on its way. */
+static void nor_has_any_on_the_way_there(void **state)
+{
+    (void)state;
+    watched_source *source = watched_source_open(memory_source(bytes[0], size[0]));
+    strl_walk *walk = open_walk(&source->base, &(strl_walk_desc){.error_px = 1});
+    unsigned late = 0, frames = 0;
+    source->walking = true;
+    for (double distance = 4; distance > 0.55; distance *= 0.96, frames++) {
+        const strl_camera camera = camera_at(distance);
+        source->hold_percent = frames < 3 ? 0 : 95;
+        strl_draw_list list = walk_frame(walk, &camera);
+        double share = uncovered_share(&list, distance);
+        if (share > MOST_UNCOVERED)
+            fail_msg("at %g %g of the ball are open", distance, share);
+        late += strl_walk_get_stats(walk)->missing_nodes > 0;
+        strl_walk_pump(walk, UINT64_MAX);
+    }
+    assert_true(late > 0 && late < frames);
+    strl_walk_close(walk);
+}
+
+/* Positions and colours of the corners of all that is drawn, in whatever order. */
+static uint64_t hash_of_list(const strl_draw_list *list)
+{
+    uint64_t sum = 0;
+    for (uint32_t i = 0; i < list->count; i++) {
+        const strl_draw_item *item = &list->items[i];
+        for (uint32_t k = 0; k < item->draw_count; k++) {
+            const strl_vertex *vertex = &item->vertices[item->indices[k]];
+            uint64_t one = k % 3;
+            for (int axis = 0; axis < 3; axis++)
+                one = strl__mix64(one ^ (uint64_t)(item->anchor[axis] + vertex->position[axis]));
+            sum += strl__mix64(one ^ (uint64_t)vertex->normal[0] << 48 ^ (uint64_t)vertex->normal[1] << 32 ^
+                               (uint64_t)(vertex->rgba[0] | vertex->rgba[1] << 8 | vertex->rgba[2] << 16) << 8 ^ vertex->rgba[3]);
+        }
+    }
+    return sum;
+}
+
+static strl_walk *settled_walk(double distance, uint64_t *triangles, uint64_t *hash)
+{
+    strl_walk *walk = open_walk(memory_source(bytes[0], size[0]), &(strl_walk_desc){.error_px = 1});
+    const strl_camera camera = camera_at(distance);
+    strl_draw_list list = settle(walk, &camera, 2000);
+    *triangles = strl_walk_get_stats(walk)->triangles;
+    *hash = hash_of_list(&list);
+    return walk;
+}
+
+/* Of a brick that is seen from afar only what it shows is held, and nothing else differs: nearer, more of it comes; back again, it is there. */
+static void of_what_is_far_little_is_held(void **state)
+{
+    (void)state;
+    const double distances[] = {40, 16, 10, 6, 4, 2.5, 1.6, 1.2, 0.8, 5, 40};
+    strl_walk *walk = open_walk(memory_source(bytes[0], size[0]), &(strl_walk_desc){.error_px = 1});
+    const strl_walk_stats *stats = strl_walk_get_stats(walk);
+    uint64_t most = 0;
+    for (size_t i = 0; i < sizeof distances / sizeof *distances; i++) {
+        const strl_camera camera = camera_at(distances[i]);
+        strl_draw_list list = settle(walk, &camera, 2000);
+        uint64_t triangles, hash, before = most;
+        strl_walk *fresh = settled_walk(distances[i], &triangles, &hash);
+        uint64_t fresh_bytes = strl_walk_get_stats(fresh)->resident_bytes;
+        assert_int_equal(stats->triangles, triangles);
+        assert_true(hash_of_list(&list) == hash);
+        assert_int_equal(stats->missing_nodes, 0);
+        most = stats->resident_bytes > most ? stats->resident_bytes : most;
+        if (i + 1 == sizeof distances / sizeof *distances)
+            assert_true(fresh_bytes < before / 4 && stats->resident_bytes > fresh_bytes); /* it stays while there is room */
+        strl_walk_close(fresh);
+    }
+    strl_walk_close(walk);
+}
+
+/* How much of a brick will be held is estimated: whatever comes of that, it settles within its budget. */
+static void it_settles_with_little_memory(void **state)
+{
+    (void)state;
+    const double distances[] = {40, 20, 6, 30, 1.2, 40};
+    for (uint64_t megabytes = 2; megabytes <= 16; megabytes *= 2) {
+        strl_walk *walk = open_walk(memory_source(bytes[0], size[0]), &(strl_walk_desc){.error_px = 0.5, .memory_bytes = megabytes << 20});
+        for (size_t i = 0; i < sizeof distances / sizeof *distances; i++) {
+            const strl_camera camera = camera_at(distances[i]);
+            settle(walk, &camera, 2000);
+            assert_true(strl_walk_get_stats(walk)->resident_bytes <= megabytes << 20);
+            assert_int_equal(strl_walk_get_stats(walk)->missing_nodes, 0);
+        }
+        strl_walk_close(walk);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
         cmocka_unit_test(the_first_image_has_no_hole),
         cmocka_unit_test(nor_has_any_that_comes_behind_it),
+        cmocka_unit_test(nor_has_any_on_the_way_there),
+        cmocka_unit_test(of_what_is_far_little_is_held),
+        cmocka_unit_test(it_settles_with_little_memory),
     };
     return cmocka_run_group_tests(tests, create_ball, destroy_ball);
 }

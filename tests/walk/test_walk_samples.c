@@ -118,7 +118,7 @@ static void look_at_brick(const strl_draw_item *item, listed *found)
     found->bricks++;
     const strl_pm *mesh = &model.mesh[item->node];
     assert_true(item->draw_count <= 3 * mesh->triangle_count);
-    assert_int_equal(item->vertex_count, mesh->vertex_count);
+    assert_true(item->vertex_count <= mesh->vertex_count); /* fewer of what is far */
     found->whole += item->draw_count == 3 * mesh->triangle_count;
     for (uint32_t i = 0; i < item->draw_count; i++)
         assert_true(item->indices[i] < item->vertex_count);
