@@ -12,8 +12,8 @@ LARGE_SPLATS = (1, 5)  # 5: as Klein et al. (2005) draw their largest landscape
 CHESSBOARDS = ("chessboard_80k", "chessboard_8m", "chessboard_32m", "chessboard_320m")
 SAMPLED = ("isosurface_1m", "isosurface_10m", "dragon_scans", "boxes_1m", "chessboard_8m", "landscape_10m", "landscape_400m")
 STRUCTURES = {"samples": SAMPLES, "clusters": ()}
-LARGE = ("landscape_400m samples", "landscape_2g_placed samples", "landscape_2g_placed clusters", "dragon_scans_x10000 samples",
-         "dragon_scans_x10000 clusters")
+LARGE = ("landscape_400m samples", "landscape_2g_placed samples", "landscape_2g_placed clusters", "dragon_scans_x12000 samples",
+         "dragon_scans_x12000 clusters")
 ROOMY = ("--memory", "12G", "--gpu-memory", "4G")  # the size of the splats decides, not a budget
 COLUMNS = ("frame_ms", "select_ms", "triangles", "splats", "draws", "requests", "missing_nodes")
 
