@@ -54,7 +54,7 @@ typedef struct strl_walk_stats {
     uint32_t nodes_culled;     /* active, but outside the frustum */
     uint32_t nodes_backfacing; /* left out, each with all that is below it: with STRL_CULL_BACK nothing of them would be seen. Of sample
                                   trees; not in nodes_culled */
-    uint32_t missing_nodes;    /* nodes of the wanted front that are not drawn yet; where the records of their parents' children are
+    uint32_t missing_nodes;    /* nodes of the wanted front that are not drawn yet, or too coarsely; where the records of their parents' children are
                                   missing too, those parents */
     uint32_t requests;         /* reads submitted in this frame */
     uint32_t requests_pending;

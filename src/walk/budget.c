@@ -1,7 +1,7 @@
 /* The allowed error under a tight budget. It moves on a geometric scale of quarter octaves: up at
  * once where the wanted cut does not fit, down by a step a frame where the finer cut would leave
- * some room, so that it does not swing. All bytes are known from records, before anything is
- * fetched. */
+ * some room, so that it does not swing. Bytes are known from records before anything is fetched, but for those of bricks that are opened
+ * partly: these are estimated from what came of late, so that under a tight budget what fits depends on the way there. */
 #include "walk/internal.h"
 
 #include <math.h>
@@ -12,6 +12,7 @@
 #define MOST_COARSENING 64u
 /* A finer cut must fit into this share of what there is. */
 #define REFINE_SHARE 0.9
+#define GUARD_SINKS 0.9 /* in a frame in which the camera moves */
 /* Less is held than this: what more may come of it has room. */
 #define TIGHT_SHARE 0.5
 /* Records idle for longer make room for nodes. */
@@ -49,18 +50,24 @@ static strl_status try_finer(strl_walk *walk, const strl_view *view, strl__cut *
     if (probe.records_missing)
         return STRL_OK;
     walk->coarsening--;
+    walk->went_finer = true;
     return run_at(walk, view, STRL__CUT_FRONT, walk->coarsening, 1, cut, err);
 }
 
 strl_status strl__budget_cut(strl_walk *walk, const strl_view *view, strl__cut *cut, strl_error *err)
 {
     bool moved = false, pending = false;
-    walk->is_tight = walk->coarsening > 0 || (double)walk->resident_bytes > TIGHT_SHARE * (double)walk->memory_bytes;
+    walk->is_tight = walk->coarsening > 0 || walk->lacked_room ||
+                     (double)walk->resident_bytes > TIGHT_SHARE * (double)walk->memory_bytes;
     if (walk->coarsening > 0 && walk->frame > COLD_FRAMES)
         strl__treelet_evict_cold(walk, walk->frame - COLD_FRAMES);
     strl_status status = run_at(walk, view, STRL__CUT_FRONT, walk->coarsening, 1, cut, err);
-    if (cut->overflow && walk->stands) /* it was a finer cut that seemed to fit */
+    walk->went_finer &= walk->stands;
+    if (cut->overflow && walk->went_finer) /* a finer cut seemed to fit, and what came of it did not */
         walk->share_guard *= 2;
+    else if (!walk->stands)
+        walk->share_guard = fmax(STRL__LEAST_GUARD, GUARD_SINKS * walk->share_guard);
+    walk->went_finer &= !cut->overflow;
     while (status == STRL_OK && cut->overflow) {
         walk->coarsening++;
         moved = true;

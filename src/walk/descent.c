@@ -69,14 +69,32 @@ float strl__closed_size(const strl_walk *walk, const strl_tree *tree, const strl
     return (float)(strl_sight_error_of(sight, allowed_px * strl__splat_ratio(walk, tree)) / length_scale / 2);
 }
 
-bool strl__ask_for_child(const strl__descent *c, strl__node *child, strl__candidates *candidates, double urgency)
+/* The same of a box beside the image: as it is seen by who turns round. */
+static double size_beside(const strl_view *view, const strl_box *box, double px)
+{
+    double square = 0;
+    for (int k = 0; k < 3; k++) {
+        double way = fmax(0, fmax(box->min[k] - view->eye[k], view->eye[k] - box->max[k]));
+        square += way * way;
+    }
+    return view->orthographic ? px / view->focal_px : px * sqrt(square) / (view->focal_px * view->corner * view->corner);
+}
+
+void strl__note_size(const strl__descent *c, strl__node *child)
 {
     child->closed_size = 0;
-    if (strl__opens_partly(c->walk, child)) {
-        const strl_box box = strl__world_box(c->tree, c->placement, child->record->box_min, child->record->box_max);
-        const strl_sight sight = strl_view_sight(c->cut->view, &box);
-        child->closed_size = strl__closed_size(c->walk, c->tree, &sight, c->placement->length_scale, c->cut->allowed_px);
-    }
+    if (!strl__opens_partly(c->walk, child))
+        return;
+    const strl_box box = strl__world_box(c->tree, c->placement, child->record->box_min, child->record->box_max);
+    const strl_sight sight = strl_view_sight(c->cut->view, &box);
+    const double px = c->cut->allowed_px * strl__splat_ratio(c->walk, c->tree);
+    child->closed_size = sight.empty ? (float)(size_beside(c->cut->view, &box, px) / c->placement->length_scale / 2)
+                                     : strl__closed_size(c->walk, c->tree, &sight, c->placement->length_scale, c->cut->allowed_px);
+}
+
+bool strl__ask_for_child(const strl__descent *c, strl__node *child, strl__candidates *candidates, double urgency)
+{
+    strl__note_size(c, child);
     return strl__add_candidate(candidates, child, STRL_NONE, urgency);
 }
 
@@ -118,7 +136,7 @@ static void leave_out(strl__descent *c, strl__node *child)
     bool may_come = c->cut->kind == STRL__CUT_FRONT && child->residency == STRL__ABSENT && !strl__is_waiting(c->walk, &child->retry);
     c->turned_away++;
     if (may_come) /* without memory it does not */
-        strl__add_candidate(&c->walk->along, child, STRL_NONE, 0);
+        strl__ask_for_child(c, child, &c->walk->along, 0);
 }
 
 /* The records of one child, or a candidate for the treelet that has them. Another node's child is

@@ -30,6 +30,8 @@ bool strl__asks_itself(const strl__descent *c, const strl_node *record);
 bool strl__add_visit(strl__visits *visits, strl__node *node, bool active);
 bool strl__add_node(strl__nodes *nodes, strl__node *node);
 bool strl__add_candidate(strl__candidates *candidates, strl__node *node, uint32_t treelet, double urgency);
+/* Sets its closed_size for the view. */
+void strl__note_size(const strl__descent *c, strl__node *child);
 /* A candidate, and how much of it is to be opened. */
 bool strl__ask_for_child(const strl__descent *c, strl__node *child, strl__candidates *candidates, double urgency);
 /* What a node's closed_size is for a sight of it: cells need not be opened that are half as large as what is allowed to be seen, so that

@@ -127,6 +127,7 @@ static bool want_child(strl__descent *c, strl__node *child, double px)
     c->cut->waits = true;
     if (child->residency == STRL__PENDING) {
         child->request->touched_frame = walk->frame;
+        strl__note_size(c, child);
         return true;
     }
     return front ? strl__ask_for_child(c, child, &walk->missing, px)
@@ -189,9 +190,10 @@ static strl_status visit_group(strl__descent *c, const strl__group *group)
     cut->records_missing |= worst == STRL__RECORDS_ABSENT;
     if (worst != STRL__HERE)
         return stay(c, group, group->members);
-    uint64_t bytes = new_bytes(c), taken = cut->bytes + cut->slack_bytes;
+    uint64_t slack = cut->slack_bytes, bytes = new_bytes(c), taken = cut->bytes + cut->slack_bytes;
     if (taken > cut->capacity_bytes || bytes > cut->capacity_bytes - taken) {
         cut->overflow = !cut->stop_at_capacity;
+        cut->slack_bytes = slack; /* they do not come */
         return stay(c, group, count_inactive(walk, group));
     }
     cut->bytes += bytes;

@@ -24,6 +24,7 @@
 #define STRL__MAX_REQUESTS 256u
 #define STRL__SPLAT_ROOM 2048u /* bytes that a decoded node may take beside what its record says: splats of an empty brick */
 #define STRL__PREVIEW_ROOM (STRL_BRICK_SPLATS * sizeof(strl_splat)) /* the same of the first node of a tree */
+#define STRL__LEAST_GUARD 1.25
 #define STRL__MOST_POINT_PX 64.0 /* what every GL draws */
 
 typedef enum strl__residency { STRL__ABSENT, STRL__PENDING, STRL__RESIDENT } strl__residency;
@@ -366,6 +367,8 @@ struct strl_walk {
     double opened_bytes, brick_bytes; /* of bricks that may be opened partly, those of late: held, and as a whole */
     double share_guard; /* what has not come is taken for so much times that share */
     bool stands;   /* the camera is that of the frame before */
+    bool went_finer;  /* since it stands, into more memory than is proved to do */
+    bool lacked_room; /* once, for more states of a brick */
     bool is_tight; /* memory is: the cut looks at what more is to come of bricks that are here */
 
     strl__treelets treelets;

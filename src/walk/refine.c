@@ -74,10 +74,11 @@ static void ask_for_more(strl_walk *walk, const strl__active *active, uint32_t w
     if (lacks && !(waiting && strl__is_given_up(walk, &node->retry)))
         walk->settled = false;
     float closed_size = strl__closed_size(walk, tree, &active->sight, active->placed->length_scale, walk->stats.allowed_error_px);
-    if (node->request || waiting || !(mesh->errors[mesh->held] > closed_size))
+    bool reaches_further = mesh->errors[mesh->held] > closed_size;
+    if (node->request || waiting || !(lacks || reaches_further))
         return;
     double px = strl_sight_error_px(&active->sight, mesh->errors[mesh->held] * active->placed->length_scale) / strl__splat_ratio(walk, tree);
-    node->closed_size = closed_size;
+    node->closed_size = reaches_further ? closed_size : 0; /* whole, whatever sizes the file tells */
     /* without memory it is asked for in a later frame */
     strl__add_candidate(lacks ? &walk->missing : &walk->prefetch, node, STRL_NONE,
                         lacks ? px : STRL__PREFETCH_SHARE * px / walk->stats.allowed_error_px);

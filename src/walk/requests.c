@@ -388,6 +388,7 @@ static bool ask_for_node(strl_walk *walk, const strl__candidate *candidate, uint
         return true;
     strl__page_share(page); /* what makes room may let go of it */
     if (!strl__make_room(walk, strl__node_bytes(node->record, walk->labels), evict_before)) {
+        walk->lacked_room |= has_more;
         strl__node_let_go(node);
         strl__page_release(page);
         return false;

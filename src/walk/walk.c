@@ -191,7 +191,7 @@ static void apply_desc(strl_walk *walk, const strl_walk_desc *desc, strl_source 
     walk->labels = desc->labels;
     walk->cull = desc->cull;
     strl_walk_set_error_px(walk, desc->error_px);
-    walk->share_guard = 1.25;
+    walk->share_guard = STRL__LEAST_GUARD;
     walk->splat_ratio = isfinite(desc->splat_px) && desc->splat_px > 0 ? desc->splat_px / walk->error_px : 1;
     walk->stats.allowed_error_px = walk->error_px;
     strl__points_prepare(walk);
@@ -331,8 +331,8 @@ strl_status strl_walk_frame(strl_walk *walk, const strl_camera *camera, strl_dra
     strl_view view;
     *list = (strl_draw_list){.near_distance = 1, .far_distance = 2};
     begin_frame(walk);
-    strl__retired_free(walk);
     strl__requests_receive(walk);
+    strl__retired_free(walk); /* the list that borrowed them is no more */
     strl_status status = strl_view_init(&view, camera)
                              ? STRL_OK
                              : strl__fail(err, STRL_ERR_ARGUMENT,
