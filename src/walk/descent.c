@@ -64,9 +64,15 @@ bool strl__add_candidate(strl__candidates *candidates, strl__node *node, uint32_
     return true;
 }
 
-float strl__closed_size(const strl_walk *walk, const strl_tree *tree, const strl_sight *sight, double length_scale, double allowed_px)
+double strl__reserve(const strl_walk *walk)
 {
-    return (float)(strl_sight_error_of(sight, allowed_px * strl__splat_ratio(walk, tree)) / length_scale / 2);
+    return walk->is_tight ? STRL__LEAST_RESERVE : STRL__RESERVE;
+}
+
+float strl__closed_size(const strl_walk *walk, const strl_tree *tree, const strl_sight *sight, double length_scale, double allowed_px,
+                        double reserve)
+{
+    return (float)(strl_sight_error_of(sight, allowed_px * strl__splat_ratio(walk, tree)) / length_scale * reserve);
 }
 
 /* The same of a box beside the image: as it is seen by who turns round. */
@@ -80,16 +86,20 @@ static double size_beside(const strl_view *view, const strl_box *box, double px)
     return view->orthographic ? px / view->focal_px : px * sqrt(square) / (view->focal_px * view->corner * view->corner);
 }
 
-void strl__note_size(const strl__descent *c, strl__node *child)
+float strl__closed_size_of(const strl__descent *c, const strl__node *child, double reserve)
 {
-    child->closed_size = 0;
     if (!strl__opens_partly(c->walk, child))
-        return;
+        return 0;
     const strl_box box = strl__world_box(c->tree, c->placement, child->record->box_min, child->record->box_max);
     const strl_sight sight = strl_view_sight(c->cut->view, &box);
     const double px = c->cut->allowed_px * strl__splat_ratio(c->walk, c->tree);
-    child->closed_size = sight.empty ? (float)(size_beside(c->cut->view, &box, px) / c->placement->length_scale / 2)
-                                     : strl__closed_size(c->walk, c->tree, &sight, c->placement->length_scale, c->cut->allowed_px);
+    return sight.empty ? (float)(size_beside(c->cut->view, &box, px) / c->placement->length_scale * reserve)
+                       : strl__closed_size(c->walk, c->tree, &sight, c->placement->length_scale, c->cut->allowed_px, reserve);
+}
+
+void strl__note_size(const strl__descent *c, strl__node *child)
+{
+    child->closed_size = strl__closed_size_of(c, child, strl__reserve(c->walk));
 }
 
 bool strl__ask_for_child(const strl__descent *c, strl__node *child, strl__candidates *candidates, double urgency)

@@ -79,16 +79,20 @@ static bool suffices(const strl__descent *c, const strl__node *child)
     return px / strl__splat_ratio(c->walk, c->tree) <= c->cut->allowed_px;
 }
 
-/* What is to come of a brick that may be opened partly is estimated: as much of it as of those that came. Any of them needs the room, for a
- * moment, to be decoded as a whole. What it is to replace counts too. */
+/* What is to come of a brick that may be opened partly is estimated by those that came. Any of them needs the room, for a moment, to be
+ * decoded as a whole. What it holds beyond its need does not count: it goes as soon as room is wanted. */
 static uint64_t child_bytes(const strl__descent *c, const strl__node *child)
 {
-    bool is_here = child->residency == STRL__RESIDENT;
+    bool is_here = child->residency == STRL__RESIDENT, opens_partly = strl__opens_partly(c->walk, child);
     uint64_t held = strl__node_held_bytes(c->walk, child), whole = strl__node_bytes(child->record, c->walk->labels);
-    if (is_here ? suffices(c, child) : !strl__opens_partly(c->walk, child))
+    if (!opens_partly || (is_here && !c->walk->is_tight))
         return held;
+    float closed_size = strl__closed_size_of(c, child, STRL__LEAST_RESERVE);
+    if (is_here && suffices(c, child))
+        return held - strl__node_excess(c->walk, child, closed_size);
     c->cut->slack_bytes = whole > c->cut->slack_bytes ? whole : c->cut->slack_bytes;
-    return (is_here ? held : 0) + (uint64_t)(strl__open_share(c->walk) * (double)whole);
+    uint64_t expected = strl__expected_bytes(c->walk, child, closed_size);
+    return is_here && held > expected ? held : expected;
 }
 
 /* Bytes of the group's children that this traversal has not counted yet. */
@@ -122,8 +126,11 @@ static bool want_child(strl__descent *c, strl__node *child, double px)
         return true;
     if (front && !strl__add_node(&walk->wanted, child))
         return false;
-    if (child->residency == STRL__RESIDENT)
+    if (child->residency == STRL__RESIDENT) {
+        if (front && walk->is_tight && !child->request)
+            child->closed_size = strl__closed_size_of(c, child, STRL__LEAST_RESERVE);
         return front || strl__add_node(&walk->ahead, child);
+    }
     c->cut->waits = true;
     if (child->residency == STRL__PENDING) {
         child->request->touched_frame = walk->frame;
@@ -280,6 +287,7 @@ strl_status strl__cut_run(strl_walk *walk, strl__cut *cut, strl_error *err)
 void strl__cut_commit(strl_walk *walk)
 {
     strl_walk_stats *stats = &walk->stats;
+    walk->trimmed = 0;
     /* Order of age: what may be wanted soon, then what is wanted, is the youngest. */
     for (size_t i = 0; i < walk->ahead.count; i++)
         strl__node_touch(walk, walk->ahead.items[i]);

@@ -25,6 +25,7 @@
 #define STRL__SPLAT_ROOM 2048u /* bytes that a decoded node may take beside what its record says: splats of an empty brick */
 #define STRL__PREVIEW_ROOM (STRL_BRICK_SPLATS * sizeof(strl_splat)) /* the same of the first node of a tree */
 #define STRL__LEAST_GUARD 1.25
+#define STRL__HALVINGS (STRL_BRICK_LEVELS + 1)
 #define STRL__MOST_POINT_PX 64.0 /* what every GL draws */
 
 typedef enum strl__residency { STRL__ABSENT, STRL__PENDING, STRL__RESIDENT } strl__residency;
@@ -47,7 +48,7 @@ typedef struct strl__mesh {
     uint32_t vertex_count, base_vertices, triangle_count, step_count;
     uint32_t state; /* of the indices; 0 where shared */
     uint32_t held;  /* the finest state whose triangles and splats are here: step_count but of bricks that show few (brick.c) */
-    uint64_t spare_bytes; /* of strl__node_bytes, that such a brick does without */
+    uint64_t spare_bytes; /* of strl__node_bytes, that a brick does without */
     bool shared;
     uint32_t index_total; /* in indices, of all states; shared */
     strl_vertex *vertices; /* owned, with all that follows; NULL = not resident */
@@ -75,7 +76,7 @@ typedef struct strl__node {
     uint32_t decoding;                /* pending nodes that are decoded by this one: it is not evicted */
     strl__mesh mesh;                  /* resident nodes only */
     uint64_t load;                    /* serial number of the mesh's load */
-    float closed_size;                /* of a brick: cells no larger than this need not be opened, lattice units; 0 = all must */
+    float closed_size;                /* of a brick: cells no larger than this need not be opened, lattice units; 0 = all must. As last wanted; while it is on its way as then. */
     strl__residency residency;
     strl__retry retry;
     uint64_t counted_pass;  /* last traversal that counted its bytes */
@@ -364,8 +365,9 @@ struct strl_walk {
     uint64_t frame, pass, loads, tokens;
     uint32_t coarsening; /* allowed error = error_px * 2^(coarsening / 4) */
     bool settled;
-    double opened_bytes, brick_bytes; /* of bricks that may be opened partly, those of late: held, and as a whole */
-    double share_guard; /* what has not come is taken for so much times that share */
+    /* Of bricks that may be opened partly, those of late, by how often their coarsest cells are halved: what is then held, of how much. */
+    double opened_bytes[STRL__HALVINGS], brick_bytes[STRL__HALVINGS];
+    double share_guard; /* what has not come is taken for so many times what that tells */
     bool stands;   /* the camera is that of the frame before */
     bool went_finer;  /* since it stands, into more memory than is proved to do */
     bool lacked_room; /* once, for more states of a brick */
@@ -397,6 +399,7 @@ struct strl_walk {
     strl__demands demands;
     strl__nodes children;             /* of the group in work */
     strl__nodes wanted;               /* the wanted cut and all above it */
+    size_t trimmed;                   /* the first ones of them, that have been looked at for room in this frame */
     strl__nodes ahead;                /* resident, likely to be wanted soon */
     strl__runs wanted_runs;           /* of which the front has placements, or may have */
     strl__splits split, split_before; /* of this frame and the last */
@@ -422,8 +425,6 @@ struct strl_walk {
 /* mesh.c: thread-safe. */
 /* What a decoded node takes at most, known before anything is fetched. */
 uint64_t strl__node_bytes(const strl_node *record, bool labels);
-/* How much of that the splats of a root turned out not to take. */
-uint64_t strl__spare_bytes(const strl_node *record, const strl__mesh *mesh);
 /* closed_size: as of strl__node; 0 where the mesh must have all of its states. */
 strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size, const strl_payload_reference *reference, bool labels,
                               bool shared, float closed_size, strl__mesh *mesh, strl_error *err);
@@ -502,7 +503,7 @@ bool strl__page_drop_oldest(strl_walk *walk); /* false: none is kept */
 
 /* residency.c */
 /* Evicts what has waited longest and that this frame does not need until `bytes` fit; evict_before:
- * only what was touched before that frame. False where it does not fit. */
+ * only what was touched before that frame; where all may go, what bricks hold beyond their need goes too. False where it does not fit. */
 bool strl__make_room(strl_walk *walk, uint64_t bytes, uint64_t evict_before);
 uint64_t strl__idle_since(const strl_walk *walk); /* what was touched before this frame is needed for nothing soon */
 /* A treelet without content yet, its bytes reserved; NULL where there is no room or no memory. */
@@ -518,8 +519,12 @@ void strl__node_let_go(strl__node *node);
 void strl__node_reserve(strl_walk *walk, strl__node *node); /* absent -> pending, or resident and more to come; room must be there */
 void strl__node_release(strl_walk *walk, strl__node *node); /* pending -> absent, or nothing more to come */
 void strl__node_install(strl_walk *walk, strl__node *node, const strl__mesh *mesh); /* pending or resident -> resident */
-/* How much of what has not come will be held, as far as one knows: 1 = all. */
-double strl__open_share(const strl_walk *walk);
+/* Of a resident one: what is held beyond what cells of that size need, and may be dropped. */
+uint64_t strl__node_excess(const strl_walk *walk, const strl__node *node, float closed_size);
+/* What will be held of a brick that has not come, as far as one knows. */
+uint64_t strl__expected_bytes(const strl_walk *walk, const strl__node *node, float closed_size);
+/* Before any has come. */
+void strl__expect_nothing(strl_walk *walk);
 /* Whether of the node no more may be held than it shows. */
 bool strl__opens_partly(const strl_walk *walk, const strl__node *node);
 /* What it takes, or will at most. */
@@ -561,6 +566,10 @@ void strl__refine_front(strl_walk *walk);
  * NULL = all in their order. */
 strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const strl_brick_head *head, bool labels, float closed_size,
                                strl_arena *arena, strl__mesh *mesh, const uint16_t **from, strl_error *err);
+/* Bytes of the mesh that go by trimming it to what strl__brick_create would have kept; 0 where it is no brick. */
+uint64_t strl__brick_excess(const strl__mesh *mesh, float closed_size);
+/* False without memory, or where it is in a finer state: then nothing changes. */
+bool strl__brick_trim(strl__mesh *mesh, float closed_size);
 
 /* splats.c */
 strl__preview strl__preview_of(const strl__node *node);

@@ -50,12 +50,6 @@ static bool has_preview(const strl_node *record)
     return record->rung == STRL_RUNG_SAMPLED && record->parent == STRL_NONE && record->child_count > 0;
 }
 
-uint64_t strl__spare_bytes(const strl_node *record, const strl__mesh *mesh)
-{
-    uint64_t splats = mesh->splat_end ? mesh->splat_end[mesh->step_count - 1] * sizeof(strl_splat) : 0;
-    return has_preview(record) && splats < STRL__PREVIEW_ROOM ? STRL__PREVIEW_ROOM - splats : 0;
-}
-
 uint64_t strl__node_bytes(const strl_node *record, bool labels)
 {
     uint64_t splats = has_preview(record) ? STRL__PREVIEW_ROOM : record->rung == STRL_RUNG_SAMPLED ? STRL__SPLAT_ROOM : 0;
@@ -291,7 +285,7 @@ void strl__mesh_set_state(strl__mesh *mesh, uint32_t state, uint32_t *first, uin
     uint32_t low = *first, high = *end, base = mesh->base_vertices;
     bool refine = state > mesh->state;
     uint32_t from = mesh->vertex_end[mesh->state], to = mesh->vertex_end[state];
-    uint32_t count = refine ? to - from : from - to;
+    uint32_t count = mesh->splat_end ? 0 : refine ? to - from : from - to; /* in a brick no vertex moves */
     for (uint32_t i = 0; i < count; i++) {
         uint32_t v = refine ? from + i : from - 1 - i;
         uint16_t value = refine ? (uint16_t)v : mesh->parents[v - base];

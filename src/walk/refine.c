@@ -65,7 +65,7 @@ static void ask_for_more(strl_walk *walk, const strl__active *active, uint32_t w
     const strl__mesh *mesh = &node->mesh;
     const strl_tree *tree = walk->trees[active->placed->tree].tree;
     const bool lacks = wanted > mesh->held;
-    if (mesh->held == mesh->step_count || wanted < mesh->held)
+    if (mesh->held == mesh->step_count || wanted < mesh->held || active->sight.empty)
         return;
     walk->stats.missing_nodes += lacks;
     if (node->request)
@@ -73,7 +73,8 @@ static void ask_for_more(strl_walk *walk, const strl__active *active, uint32_t w
     bool waiting = strl__is_waiting(walk, &node->retry);
     if (lacks && !(waiting && strl__is_given_up(walk, &node->retry)))
         walk->settled = false;
-    float closed_size = strl__closed_size(walk, tree, &active->sight, active->placed->length_scale, walk->stats.allowed_error_px);
+    float closed_size = strl__closed_size(walk, tree, &active->sight, active->placed->length_scale, walk->stats.allowed_error_px,
+                                          strl__reserve(walk));
     bool reaches_further = mesh->errors[mesh->held] > closed_size;
     if (node->request || waiting || !(lacks || reaches_further))
         return;

@@ -7,6 +7,7 @@
 /* Ids are breadth first, so the children of 128 nodes fill at most this many treelets. */
 #define MAX_CHILD_TREELETS (STRL_NODE_MAX_CHILDREN + 1)
 #define SHARE_KEEPS 0.998 /* with each brick that comes: half after some 350 */
+#define SURFACE_HALVINGS 3 /* before any brick has come: of a surface so many times halved all is shown */
 #define SPARE_FRAMES 60u /* what has been idle for longer makes room for what is only likely to be wanted */
 
 /* ---- meshes */
@@ -58,16 +59,42 @@ bool strl__opens_partly(const strl_walk *walk, const strl__node *node)
     return node->record->rung == STRL_RUNG_SAMPLED && node->record->child_count == 0 && !walk->trees[node->treelet->tree].shared;
 }
 
-/* By bytes, of the last some hundred bricks. */
-static void learn_share(strl_walk *walk, const strl__node *node)
+uint64_t strl__node_excess(const strl_walk *walk, const strl__node *node, float closed_size)
 {
-    walk->opened_bytes = SHARE_KEEPS * walk->opened_bytes + (double)strl__node_held_bytes(walk, node);
-    walk->brick_bytes = SHARE_KEEPS * walk->brick_bytes + (double)strl__node_bytes(node->record, walk->labels);
+    bool may_go = node->residency == STRL__RESIDENT && !node->request && strl__opens_partly(walk, node);
+    return may_go ? strl__brick_excess(&node->mesh, closed_size) : 0;
 }
 
-double strl__open_share(const strl_walk *walk)
+/* By bytes, of the last some hundred bricks. What a brick does not have all of tells nothing of finer cells than it has. */
+static void learn_shares(strl_walk *walk, const strl__node *node)
 {
-    return walk->brick_bytes > 0 ? fmin(walk->share_guard * walk->opened_bytes / walk->brick_bytes, 1) : 1;
+    const strl__mesh *mesh = &node->mesh;
+    double held = (double)strl__node_held_bytes(walk, node), whole = (double)strl__node_bytes(node->record, walk->labels);
+    float size = node->record->geometric_max;
+    for (unsigned halvings = 0; halvings < STRL__HALVINGS; halvings++, size /= 2) {
+        if (mesh->held < mesh->step_count && mesh->errors[mesh->held] > size)
+            return;
+        double shown = held - (double)strl__node_excess(walk, node, size);
+        walk->opened_bytes[halvings] = SHARE_KEEPS * walk->opened_bytes[halvings] + shown;
+        walk->brick_bytes[halvings] = SHARE_KEEPS * walk->brick_bytes[halvings] + whole;
+    }
+}
+
+void strl__expect_nothing(strl_walk *walk)
+{
+    for (unsigned halvings = 0; halvings < STRL__HALVINGS; halvings++) {
+        walk->brick_bytes[halvings] = 1;
+        walk->opened_bytes[halvings] = fmin(ldexp(1, 2 * ((int)halvings - SURFACE_HALVINGS)), 1);
+    }
+}
+
+uint64_t strl__expected_bytes(const strl_walk *walk, const strl__node *node, float closed_size)
+{
+    double whole = (double)strl__node_bytes(node->record, walk->labels), share = 0;
+    double most = ceil(log2((double)node->record->geometric_max / closed_size)); /* a size of 0: no end of them */
+    for (unsigned halvings = 0; halvings < STRL__HALVINGS && (halvings == 0 || !(halvings > most)); halvings++)
+        share = fmax(share, walk->opened_bytes[halvings] / walk->brick_bytes[halvings]);
+    return (uint64_t)(whole * (closed_size > 0 ? fmin(walk->share_guard * share, 1) : 1));
 }
 
 void strl__node_reserve(strl_walk *walk, strl__node *node)
@@ -114,7 +141,7 @@ void strl__node_install(strl_walk *walk, strl__node *node, const strl__mesh *mes
     node->mesh = *mesh;
     walk->resident_bytes -= mesh->spare_bytes;
     if (strl__opens_partly(walk, node))
-        learn_share(walk, node);
+        learn_shares(walk, node);
     node->load = ++walk->loads;
     node->retry = (strl__retry){0};
     node->touched_frame = walk->frame;
@@ -129,6 +156,24 @@ void strl__node_touch(strl_walk *walk, strl__node *node)
         return;
     unlink_node(walk, node);
     link_newest(walk, node);
+}
+
+/* Of what this frame wants, the next brick that holds more than it needs. False where there is none. No list has borrowed its mesh: the one
+ * of the last frame is no more, that of this one is not made yet. */
+static bool trim_next(strl_walk *walk)
+{
+    while (walk->trimmed < walk->wanted.count) {
+        strl__node *node = walk->wanted.items[walk->trimmed++];
+        uint64_t excess = strl__node_excess(walk, node, node->closed_size);
+        if (excess == 0 || !strl__brick_trim(&node->mesh, node->closed_size))
+            continue;
+        walk->resident_bytes -= excess;
+        node->load = ++walk->loads; /* drawn by another key, so from the first index on */
+        node->dirty_first = 0;
+        node->dirty_end = 3 * node->mesh.triangle_end[node->mesh.state];
+        return true;
+    }
+    return false;
 }
 
 static void evict(strl_walk *walk, strl__node *node)
@@ -173,7 +218,7 @@ bool strl__make_room(strl_walk *walk, uint64_t bytes, uint64_t evict_before)
         return false;
     while (walk->resident_bytes > walk->memory_bytes - bytes)
         if (!evict_oldest(walk, evict_before < idle_since ? evict_before : idle_since) && !strl__page_drop_oldest(walk) &&
-            !evict_oldest(walk, evict_before))
+            !evict_oldest(walk, evict_before) && !(evict_before > walk->frame && trim_next(walk)))
             break;
     if (walk->resident_bytes > walk->memory_bytes - bytes)
         strl__treelet_evict_cold(walk, evict_before < walk->frame ? evict_before : walk->frame);

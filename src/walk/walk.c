@@ -123,9 +123,7 @@ static strl_status take_root(strl_walk *walk, uint32_t tree, strl_source_span *s
         return status;
     strl__node_install(walk, own->root, &mesh);
     own->preview = strl__preview_of(own->root);
-    uint64_t spare = strl__spare_bytes(record, &own->root->mesh); /* a root is never evicted */
-    walk->resident_bytes -= spare;
-    walk->root_bytes -= spare;
+    walk->root_bytes -= mesh.spare_bytes; /* a root is never evicted */
     keep_page(walk, &record->page, span);
     return STRL_OK;
 }
@@ -192,6 +190,7 @@ static void apply_desc(strl_walk *walk, const strl_walk_desc *desc, strl_source 
     walk->cull = desc->cull;
     strl_walk_set_error_px(walk, desc->error_px);
     walk->share_guard = STRL__LEAST_GUARD;
+    strl__expect_nothing(walk);
     walk->splat_ratio = isfinite(desc->splat_px) && desc->splat_px > 0 ? desc->splat_px / walk->error_px : 1;
     walk->stats.allowed_error_px = walk->error_px;
     strl__points_prepare(walk);
