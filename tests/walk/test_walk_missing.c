@@ -330,6 +330,107 @@ static void from_near_it_is_as_fine_as_from_afar(void **state)
     assert_true(tight > 3);
 }
 
+/* ---- what goes wrong on the way to more or less of a brick */
+
+/* Near enough that of all bricks more is wanted than from afar, and back. */
+static const double trip[] = {6, 1.6, 6, 4, 1.2, 6};
+
+/* Once nothing is missing (settled does not tell that: it waits for nothing that failed three times) it shows what a walk shows that never
+ * had to do with any of that. */
+static void check_settles_right(strl_walk *walk, double distance)
+{
+    const strl_camera camera = camera_at(distance);
+    uint64_t triangles, hash;
+    strl_draw_list list = settle(walk, &camera, 5000);
+    for (unsigned frame = 0; frame < 5000 && strl_walk_get_stats(walk)->missing_nodes > 0; frame++) {
+        strl_walk_pump(walk, UINT64_MAX);
+        list = walk_frame(walk, &camera);
+    }
+    strl_walk_close(settled_walk(distance, &triangles, &hash));
+    assert_int_equal(strl_walk_get_stats(walk)->missing_nodes, 0);
+    assert_int_equal(strl_walk_get_stats(walk)->triangles, triangles);
+    assert_true(hash_of_list(&list) == hash);
+}
+
+/* At each n-th allocation, whichever that is: asking, decoding, replacing, dropping. */
+static void without_memory_it_keeps_what_it_has(void **state)
+{
+    (void)state;
+    const uint64_t budgets[] = {0, (uint64_t)3 << 20};
+    unsigned failed = 0;
+    for (unsigned i = 0; i < 2; i++)
+        for (uint64_t n = 1; n < 80; n += 1 + n / 2) {
+            strl_walk *walk = open_walk(memory_source(bytes[0], size[0]), &(strl_walk_desc){.error_px = 1, .memory_bytes = budgets[i]});
+            for (size_t at = 0; at < sizeof trip / sizeof *trip; at++) {
+                const strl_camera camera = camera_at(trip[at]);
+                for (unsigned frame = 0; frame < 8; frame++) {
+                    strl_draw_list list;
+                    bool fails = walk_frame_without_memory(walk, &camera, n, &list) != STRL_OK;
+                    failed += fails || strl_walk_get_stats(walk)->faults > 0;
+                    if (!fails)
+                        assert_true(uncovered_share(&list, trip[at]) <= MOST_UNCOVERED || strl_walk_get_stats(walk)->missing_nodes > 0);
+                }
+            }
+            if (budgets[i] == 0)
+                check_settles_right(walk, trip[5]);
+            strl_walk_close(walk);
+        }
+    assert_true(failed > 20);
+}
+
+/* Each third read fails. */
+static void where_reads_fail_it_keeps_what_it_has(void **state)
+{
+    (void)state;
+    strl_source *failing;
+    assert_int_equal(strl_source_open_delayed(memory_source(bytes[0], size[0]), 0, 3, &failing, NULL), STRL_OK);
+    strl_walk *walk = open_walk(failing, &(strl_walk_desc){.error_px = 1, .memory_bytes = (uint64_t)7 << 20});
+    uint64_t faults = 0;
+    for (size_t at = 0; at < sizeof trip / sizeof *trip; at++) {
+        const strl_camera camera = camera_at(trip[at]);
+        for (unsigned frame = 0; frame < 200; frame++) {
+            strl_draw_list list = walk_frame(walk, &camera);
+            if (frame % 40 == 0)
+                assert_true(uncovered_share(&list, trip[at]) <= MOST_UNCOVERED);
+            strl_walk_pump(walk, UINT64_MAX);
+        }
+        faults = strl_walk_get_stats(walk)->faults;
+    }
+    assert_true(faults > 0);
+    check_settles_right(walk, trip[5]);
+    strl_walk_close(walk);
+}
+
+/* More was asked for, and who asked has gone away again before it came: the read is cancelled, the brick as it was. */
+static void what_nobody_wants_any_more_is_not_waited_for(void **state)
+{
+    (void)state;
+    watched_source *source = watched_source_open(memory_source(bytes[0], size[0]));
+    strl_walk *walk = open_walk(&source->base, &(strl_walk_desc){.error_px = 1});
+    const strl_camera far = camera_at(30), near = camera_at(1.2);
+    settle(walk, &far, 2000);
+    source->walking = true;
+    source->hold_percent = 100;
+    for (unsigned frame = 0; frame < 80; frame++) /* until no page is kept from which it could come */
+        walk_frame(walk, &near);
+    assert_true(strl_walk_get_stats(walk)->missing_nodes > 0 && !strl_walk_settled(walk));
+    uint32_t pending = strl_walk_get_stats(walk)->requests_pending;
+    for (unsigned frame = 0; frame < 40; frame++)
+        walk_frame(walk, &far);
+    assert_true(strl_walk_settled(walk));
+    source->hold_percent = 0;
+    for (unsigned frame = 0; frame < 40; frame++) {
+        walk_frame(walk, &far);
+        strl_walk_pump(walk, UINT64_MAX);
+    }
+    assert_true(pending > 0);
+    assert_int_equal(strl_walk_get_stats(walk)->requests_pending, 0);
+    source->walking = false;
+    check_settles_right(walk, 30);
+    check_settles_right(walk, 1.2);
+    strl_walk_close(walk);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -339,6 +440,9 @@ int main(void)
         cmocka_unit_test(of_what_is_far_little_is_held),
         cmocka_unit_test(it_settles_with_little_memory),
         cmocka_unit_test(from_near_it_is_as_fine_as_from_afar),
+        cmocka_unit_test(without_memory_it_keeps_what_it_has),
+        cmocka_unit_test(where_reads_fail_it_keeps_what_it_has),
+        cmocka_unit_test(what_nobody_wants_any_more_is_not_waited_for),
     };
     return cmocka_run_group_tests(tests, create_ball, destroy_ball);
 }
