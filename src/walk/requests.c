@@ -119,7 +119,8 @@ static void reap_jobs(strl_walk *walk)
             continue;
         }
         strl__request *request = job->node->request;
-        if (job->status == STRL_OK && !strl__grow(&walk->retired, &walk->retired_capacity, walk->retired_count + 1, sizeof *walk->retired))
+        if (job->status == STRL_OK && job->node->residency == STRL__RESIDENT && /* what it has is replaced */
+            !strl__grow(&walk->retired, &walk->retired_capacity, walk->retired_count + 1, sizeof *walk->retired))
             job->status = strl__fail(&job->error, STRL_ERR_MEMORY, "no memory for a decoded node");
         if (job->status == STRL_OK) {
             strl__node_install(walk, job->node, &job->mesh);

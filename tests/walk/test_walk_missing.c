@@ -367,8 +367,8 @@ static void without_memory_it_keeps_what_it_has(void **state)
                     strl_draw_list list;
                     bool fails = walk_frame_without_memory(walk, &camera, n, &list) != STRL_OK;
                     failed += fails || strl_walk_get_stats(walk)->faults > 0;
-                    if (!fails)
-                        assert_true(uncovered_share(&list, trip[at]) <= MOST_UNCOVERED || strl_walk_get_stats(walk)->missing_nodes > 0);
+                    if (!fails && budgets[i] == 0) /* splats of tens of pixels are as transparent as what they stand for is open */
+                        assert_true(uncovered_share(&list, trip[at]) <= MOST_UNCOVERED);
                 }
             }
             if (budgets[i] == 0)
