@@ -72,7 +72,7 @@ static strl_status stay(strl__descent *c, const strl__group *group, uint32_t mis
 static bool suffices(const strl__descent *c, const strl__node *child)
 {
     const strl__mesh *mesh = &child->mesh;
-    if (mesh->held == mesh->step_count || !c->walk->is_tight)
+    if (mesh->held == mesh->step_count)
         return true;
     const strl_box box = strl__world_box(c->tree, c->placement, child->record->box_min, child->record->box_max);
     double px = strl_view_error_px(c->cut->view, &box, mesh->errors[mesh->held] * c->placement->length_scale);
@@ -134,7 +134,8 @@ static bool want_child(strl__descent *c, strl__node *child, double px)
     c->cut->waits = true;
     if (child->residency == STRL__PENDING) {
         child->request->touched_frame = walk->frame;
-        strl__note_size(c, child);
+        if (front)
+            strl__note_size(c, child);
         return true;
     }
     return front ? strl__ask_for_child(c, child, &walk->missing, px)
@@ -287,7 +288,7 @@ strl_status strl__cut_run(strl_walk *walk, strl__cut *cut, strl_error *err)
 void strl__cut_commit(strl_walk *walk)
 {
     strl_walk_stats *stats = &walk->stats;
-    walk->trimmed = 0;
+    walk->looked_at = 0;
     /* Order of age: what may be wanted soon, then what is wanted, is the youngest. */
     for (size_t i = 0; i < walk->ahead.count; i++)
         strl__node_touch(walk, walk->ahead.items[i]);

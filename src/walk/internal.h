@@ -9,7 +9,8 @@
  * of all members are resident, so that the front is a cut without cracks whatever is resident; (2)
  * nodes of the wanted cut and all their ancestors carry wanted_frame = this frame and are not
  * evicted, so that collapsing never waits; (3) resident_bytes counts meshes, records,
- * placements, pages kept and reservations of reads under way, and never exceeds memory_bytes; (4) a run of placements whose page is not there is
+ * placements, pages kept and reservations of reads under way, and never exceeds memory_bytes (beside it there are, for a moment, meshes that
+ * were replaced); (4) a run of placements whose page is not there is
  * drawn as a point; a page that the front points into carries wanted_frame = this frame. */
 #ifndef STRL_WALK_INTERNAL_H
 #define STRL_WALK_INTERNAL_H
@@ -76,13 +77,14 @@ typedef struct strl__node {
     uint32_t decoding;                /* pending nodes that are decoded by this one: it is not evicted */
     strl__mesh mesh;                  /* resident nodes only */
     uint64_t load;                    /* serial number of the mesh's load */
-    float closed_size;                /* of a brick: cells no larger than this need not be opened, lattice units; 0 = all must. As last wanted; while it is on its way as then. */
+    float closed_size;                /* of a brick: cells no larger than this need not be opened, lattice units; 0 = all must */
     strl__residency residency;
     strl__retry retry;
     uint64_t counted_pass;  /* last traversal that counted its bytes */
     uint64_t wanted_frame;  /* last frame whose wanted cut has it at or above itself */
     uint64_t touched_frame; /* the same or prefetched */
-    uint64_t drawn_frame;   /* last frame in whose front it was and visible */
+    uint64_t front_frame;   /* last frame in whose front it was */
+    uint64_t drawn_frame;   /* the same and visible */
     uint64_t split_frame;   /* last frame in which it was split */
     uint32_t dirty_first, dirty_end;
 } strl__node;
@@ -365,9 +367,11 @@ struct strl_walk {
     uint64_t frame, pass, loads, tokens;
     uint32_t coarsening; /* allowed error = error_px * 2^(coarsening / 4) */
     bool settled;
-    /* Of bricks that may be opened partly, those of late, by how often their coarsest cells are halved: what is then held, of how much. */
+    /* Of bricks that may be opened partly, those of late, by how often their coarsest cells are halved: what is then held, of how much
+     * (strl__node_bytes). */
     double opened_bytes[STRL__HALVINGS], brick_bytes[STRL__HALVINGS];
     double share_guard; /* what has not come is taken for so many times what that tells */
+    uint32_t renewals; /* resident nodes of which another mesh is on its way */
     bool stands;   /* the camera is that of the frame before */
     bool went_finer;  /* since it stands, into more memory than is proved to do */
     bool lacked_room; /* once, for more states of a brick */
@@ -399,7 +403,7 @@ struct strl_walk {
     strl__demands demands;
     strl__nodes children;             /* of the group in work */
     strl__nodes wanted;               /* the wanted cut and all above it */
-    size_t trimmed;                   /* the first ones of them, that have been looked at for room in this frame */
+    size_t looked_at;                 /* how many of them, from the first on, were looked at for what they can give back in this frame */
     strl__nodes ahead;                /* resident, likely to be wanted soon */
     strl__runs wanted_runs;           /* of which the front has placements, or may have */
     strl__splits split, split_before; /* of this frame and the last */
@@ -503,7 +507,8 @@ bool strl__page_drop_oldest(strl_walk *walk); /* false: none is kept */
 
 /* residency.c */
 /* Evicts what has waited longest and that this frame does not need until `bytes` fit; evict_before:
- * only what was touched before that frame; where all may go, what bricks hold beyond their need goes too. False where it does not fit. */
+ * only what was touched before that frame; where that is this one too and memory is tight, what bricks hold beyond their need goes as well,
+ * by a shorter copy that is made first. False where it does not fit. */
 bool strl__make_room(strl_walk *walk, uint64_t bytes, uint64_t evict_before);
 uint64_t strl__idle_since(const strl_walk *walk); /* what was touched before this frame is needed for nothing soon */
 /* A treelet without content yet, its bytes reserved; NULL where there is no room or no memory. */

@@ -117,6 +117,7 @@ void strl__refine_front(strl_walk *walk)
         ask_for_more(walk, active, wanted);
         if (!node->mesh.shared)
             apply_state(walk, node, active->state, node->drawn_frame > 0 && node->drawn_frame + 1 == walk->frame);
+        node->front_frame = walk->frame;
         if (active->sight.seen)
             node->drawn_frame = walk->frame;
     }

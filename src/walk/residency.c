@@ -91,14 +91,16 @@ void strl__expect_nothing(strl_walk *walk)
 uint64_t strl__expected_bytes(const strl_walk *walk, const strl__node *node, float closed_size)
 {
     double whole = (double)strl__node_bytes(node->record, walk->labels), share = 0;
+    double all = walk->opened_bytes[STRL__HALVINGS - 1] / walk->brick_bytes[STRL__HALVINGS - 1];
     double most = ceil(log2((double)node->record->geometric_max / closed_size)); /* a size of 0: no end of them */
     for (unsigned halvings = 0; halvings < STRL__HALVINGS && (halvings == 0 || !(halvings > most)); halvings++)
         share = fmax(share, walk->opened_bytes[halvings] / walk->brick_bytes[halvings]);
-    return (uint64_t)(whole * (closed_size > 0 ? fmin(walk->share_guard * share, 1) : 1));
+    return (uint64_t)(whole * (closed_size > 0 ? fmin(walk->share_guard * share, all) : all));
 }
 
 void strl__node_reserve(strl_walk *walk, strl__node *node)
 {
+    walk->renewals += node->residency == STRL__RESIDENT;
     if (node->residency == STRL__ABSENT)
         node->residency = STRL__PENDING;
     node->treelet->pins++;
@@ -108,6 +110,7 @@ void strl__node_reserve(strl_walk *walk, strl__node *node)
 void strl__node_release(strl_walk *walk, strl__node *node)
 {
     strl__node_let_go(node);
+    walk->renewals -= node->residency == STRL__RESIDENT;
     if (node->residency == STRL__PENDING)
         node->residency = STRL__ABSENT;
     node->request = NULL;
@@ -119,6 +122,7 @@ void strl__node_release(strl_walk *walk, strl__node *node)
 static void retire_mesh(strl_walk *walk, strl__node *node)
 {
     unlink_node(walk, node);
+    walk->renewals--;
     walk->resident_bytes -= strl__node_held_bytes(walk, node);
     node->treelet->pins--;
     walk->retired[walk->retired_count++] = node->mesh.vertices;
@@ -162,9 +166,11 @@ void strl__node_touch(strl_walk *walk, strl__node *node)
  * of the last frame is no more, that of this one is not made yet. */
 static bool trim_next(strl_walk *walk)
 {
-    while (walk->trimmed < walk->wanted.count) {
-        strl__node *node = walk->wanted.items[walk->trimmed++];
+    while (walk->looked_at < walk->wanted.count) {
+        strl__node *node = walk->wanted.items[walk->looked_at++];
         uint64_t excess = strl__node_excess(walk, node, node->closed_size);
+        if (excess > 0 && node->front_frame != walk->frame)
+            node->mesh.state = 0; /* in which it was drawn earlier */
         if (excess == 0 || !strl__brick_trim(&node->mesh, node->closed_size))
             continue;
         walk->resident_bytes -= excess;
@@ -218,7 +224,7 @@ bool strl__make_room(strl_walk *walk, uint64_t bytes, uint64_t evict_before)
         return false;
     while (walk->resident_bytes > walk->memory_bytes - bytes)
         if (!evict_oldest(walk, evict_before < idle_since ? evict_before : idle_since) && !strl__page_drop_oldest(walk) &&
-            !evict_oldest(walk, evict_before) && !(evict_before > walk->frame && trim_next(walk)))
+            !evict_oldest(walk, evict_before) && !(evict_before > walk->frame && walk->is_tight && trim_next(walk)))
             break;
     if (walk->resident_bytes > walk->memory_bytes - bytes)
         strl__treelet_evict_cold(walk, evict_before < walk->frame ? evict_before : walk->frame);

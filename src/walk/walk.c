@@ -342,6 +342,7 @@ strl_status strl_walk_frame(strl_walk *walk, const strl_camera *camera, strl_dra
     if (status == STRL_OK) {
         strl__refine_front(walk);
         strl__requests_submit(walk);
+        walk->settled &= walk->coarsening == 0 || walk->renewals == 0; /* what comes of them tells whether a finer cut fits */
         status = strl__draw_list(walk, &view, list, err);
         walk->camera = *camera;
     }

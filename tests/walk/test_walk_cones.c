@@ -435,7 +435,8 @@ static void settled_lists_are_the_same_from_wherever_one_comes(void **state)
     strl_walk_close(walk);
 }
 
-/* What is left out is not waited for, and takes no memory that something else needs. */
+/* What is left out is not waited for, and takes no memory that something else needs: a quarter of the bricks, so that nine tenths of the memory
+ * do for one side, with room for one to be decoded, and not for both. */
 static void one_side_takes_less_memory(void **state)
 {
     (void)state;

@@ -319,8 +319,7 @@ static void from_near_it_is_as_fine_as_from_afar(void **state)
                          fresh_px);
             if (px == fresh_px)
                 assert_true(hash_of_list(&list) == hash_of_list(&fresh_list));
-            if (kilobytes > 1024)
-                assert_true(fresh_px <= before[i] && (before[i] < 8 || fresh_px < before[i]));
+            assert_true(kilobytes == 1024 || fresh_px <= before[i]);
             before[i] = fresh_px;
             tight += fresh_px > 0.5;
             strl_walk_close(fresh);
@@ -328,6 +327,29 @@ static void from_near_it_is_as_fine_as_from_afar(void **state)
         strl_walk_close(walk);
     }
     assert_true(tight > 3);
+}
+
+/* What has settled stays as it is while the camera stands, but for little: of bricks more may come that is only likely to be wanted. */
+static void what_has_settled_stays(void **state)
+{
+    (void)state;
+    unsigned changed = 0, all = 0;
+    for (double distance = 0.6; distance < 6; distance *= 1.25)
+        for (uint64_t kilobytes = 1024; kilobytes <= 8192; kilobytes += 1024, all++) {
+            strl_walk *walk = open_walk(memory_source(bytes[0], size[0]), &(strl_walk_desc){.error_px = 0.5, .memory_bytes = kilobytes << 10});
+            const strl_camera camera = camera_at(distance);
+            settle(walk, &camera, 2000);
+            double settled_px = strl_walk_get_stats(walk)->allowed_error_px;
+            for (unsigned frame = 0; frame < 100; frame++) {
+                walk_frame(walk, &camera);
+                strl_walk_pump(walk, UINT64_MAX);
+            }
+            double px = strl_walk_get_stats(walk)->allowed_error_px;
+            changed += px != settled_px;
+            strl_walk_close(walk);
+        }
+    if (20 * changed > all) /* what is prefetched changes estimates: now and then a step more fits by them */
+        fail_msg("%u of %u that had settled changed", changed, all);
 }
 
 /* ---- what goes wrong on the way to more or less of a brick */
@@ -390,7 +412,7 @@ static void where_reads_fail_it_keeps_what_it_has(void **state)
         const strl_camera camera = camera_at(trip[at]);
         for (unsigned frame = 0; frame < 200; frame++) {
             strl_draw_list list = walk_frame(walk, &camera);
-            if (frame % 40 == 0)
+            if (frame % 40 == 0 && strl_walk_get_stats(walk)->allowed_error_px <= 2)
                 assert_true(uncovered_share(&list, trip[at]) <= MOST_UNCOVERED);
             strl_walk_pump(walk, UINT64_MAX);
         }
@@ -440,6 +462,7 @@ int main(void)
         cmocka_unit_test(of_what_is_far_little_is_held),
         cmocka_unit_test(it_settles_with_little_memory),
         cmocka_unit_test(from_near_it_is_as_fine_as_from_afar),
+        cmocka_unit_test(what_has_settled_stays),
         cmocka_unit_test(without_memory_it_keeps_what_it_has),
         cmocka_unit_test(where_reads_fail_it_keeps_what_it_has),
         cmocka_unit_test(what_nobody_wants_any_more_is_not_waited_for),

@@ -11,6 +11,7 @@
 #include "base/hash.h"
 #include "base/memory.h"
 #include "build/sample_tree.h"
+#include "walk/internal.h"
 #include "walk/walk_checks.h"
 
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -415,6 +416,136 @@ static void without_memory_calls_fail_and_the_walk_goes_on(void **state)
     }
 }
 
+/* ---- less of a brick */
+
+static void check_same_meshes(const strl__mesh *a, const strl__mesh *b)
+{
+    assert_int_equal(a->vertex_count, b->vertex_count);
+    assert_int_equal(a->triangle_count, b->triangle_count);
+    assert_int_equal(a->held, b->held);
+    assert_int_equal(a->spare_bytes, b->spare_bytes);
+    assert_memory_equal(a->vertices, b->vertices, a->vertex_count * sizeof *a->vertices);
+    assert_memory_equal(a->labels, b->labels, a->vertex_count * sizeof *a->labels);
+    assert_memory_equal(a->indices, b->indices, 3 * (size_t)a->triangle_count * sizeof *a->indices);
+    assert_memory_equal(a->errors, b->errors, (a->step_count + 1) * sizeof *a->errors);
+    assert_memory_equal(a->triangle_end, b->triangle_end, (a->step_count + 1) * sizeof *a->triangle_end);
+    assert_memory_equal(a->vertex_end, b->vertex_end, (a->step_count + 1) * sizeof *a->vertex_end);
+    assert_memory_equal(a->splat_end, b->splat_end, a->step_count * sizeof *a->splat_end);
+    for (uint32_t i = 0; i < a->splat_end[a->step_count - 1]; i++) {
+        const strl_splat *s = &a->splats[i], *t = &b->splats[i];
+        assert_memory_equal(s->centre, t->centre, sizeof s->centre);
+        assert_memory_equal(s->normal, t->normal, sizeof s->normal);
+        assert_true(s->side == t->side && s->coverage == t->coverage && s->parallel == t->parallel && s->rgba == t->rgba);
+    }
+}
+
+static strl__mesh make_brick(const strl_node *record, float closed_size)
+{
+    strl__mesh mesh;
+    strl_error err = {0};
+    if (strl__mesh_create(record, bytes + record->page.offset, record->page.bytes, NULL, true, false, closed_size, &mesh, &err) != STRL_OK)
+        fail_msg("%s", err.message);
+    return mesh;
+}
+
+/* Trimmed, a brick is the one that is made so, and what it gives back is what was told. */
+static void a_trimmed_brick_is_one_made_so(void **state)
+{
+    (void)state;
+    unsigned smaller = 0;
+    for (uint32_t id = 1; id < model.tree.node_count; id++) {
+        const strl_node *record = &model.node[id];
+        if (record->child_count > 0) /* taken as it is */
+            continue;
+        for (double halvings = 0; halvings < 8; halvings += 0.5) {
+            float closed_size = (float)(record->geometric_max * exp2(-halvings));
+            strl__mesh whole = make_brick(record, 0), part = make_brick(record, closed_size);
+            uint64_t excess = strl__brick_excess(&whole, closed_size), spare = whole.spare_bytes;
+            assert_true((excess > 0) == (part.held < part.step_count));
+            if (excess > 0) {
+                whole.state = part.held;
+                assert_true(strl__brick_trim(&whole, closed_size));
+                assert_int_equal(whole.spare_bytes, spare + excess);
+                assert_int_equal(strl__brick_excess(&whole, closed_size), 0);
+                smaller++;
+            }
+            check_same_meshes(&whole, &part);
+            strl__mesh_deinit(&whole);
+            strl__mesh_deinit(&part);
+        }
+        strl__mesh whole = make_brick(record, 0), before = whole;
+        whole.state = whole.step_count;
+        if (strl__brick_excess(&whole, record->geometric_max) > 0) /* it is drawn in a finer state */
+            assert_true(!strl__brick_trim(&whole, record->geometric_max) && whole.vertices == before.vertices);
+        strl__mesh_deinit(&whole);
+    }
+    assert_true(smaller > 20);
+}
+
+/* What a renderer holds of a node. */
+typedef struct shadow {
+    uint64_t key;
+    bool drawn; /* in the last frame */
+    uint32_t vertex_count; /* of which a key tells */
+    uint16_t *indices;
+    strl_vertex *vertices;
+} shadow;
+
+static void upload(shadow *self, const strl_draw_item *item)
+{
+    bool known = self->key == item->key && self->drawn;
+    uint32_t first = known ? item->dirty_first : 0, count = known ? item->dirty_count : item->index_count;
+    assert_true(first + count <= item->index_count);
+    if (self->key != item->key) {
+        self->indices = realloc(self->indices, 3 * (size_t)STRL_PM_MAX_TRIANGLES * sizeof *self->indices);
+        self->vertices = realloc(self->vertices, (size_t)STRL_PM_MAX_VERTICES * sizeof *self->vertices);
+        memcpy(self->vertices, item->vertices, item->vertex_count * sizeof *item->vertices);
+    }
+    memcpy(self->indices + first, item->indices + first, count * sizeof *item->indices);
+    assert_true(self->key != item->key || self->vertex_count == item->vertex_count);
+    self->key = item->key;
+    self->vertex_count = item->vertex_count;
+    assert_memory_equal(self->indices, item->indices, item->index_count * sizeof *item->indices);
+    assert_memory_equal(self->vertices, item->vertices, item->vertex_count * sizeof *item->vertices);
+}
+
+/* Bricks come, grow and shrink: who uploads what is said to be new draws what the list says. */
+static void what_bricks_give_back_is_told(void **state)
+{
+    (void)state;
+    shadow *shadows = calloc(model.tree.node_count, sizeof *shadows);
+    bool *now = calloc(model.tree.node_count, sizeof *now);
+    strl_walk *walk = open_walk(memory_source(bytes, size), &(strl_walk_desc){.error_px = 0.5, .memory_bytes = (uint64_t)3 << 20});
+    unsigned gave_back = 0;
+    assert_true(shadows && now);
+    for (unsigned at = 0; at < 240; at++) {
+        double distance = 6 - 5.2 * fabs(sin(at * 0.08));
+        strl_camera camera = camera_at(0.5 + distance, 0.5 + 0.01 * at, 0.4);
+        strl_draw_list list = walk_frame(walk, &camera);
+        memset(now, 0, model.tree.node_count * sizeof *now);
+        for (uint32_t i = 0; i < list.count; i++) {
+            const strl_draw_item *item = &list.items[i];
+            if (!item->visible || item->point_px > 0)
+                continue;
+            shadow *self = &shadows[item->node];
+            gave_back += self->drawn && self->key && self->key != item->key;
+            upload(self, item);
+            now[item->node] = true;
+        }
+        for (uint32_t node = 0; node < model.tree.node_count; node++)
+            shadows[node].drawn = now[node];
+        strl_walk_pump(walk, UINT64_MAX);
+    }
+    assert_true(gave_back > 10);
+    for (uint32_t node = 0; node < model.tree.node_count; node++) {
+        free(shadows[node].indices);
+        free(shadows[node].vertices);
+    }
+    free(shadows);
+    free(now);
+    strl_walk_close(walk);
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -427,6 +558,8 @@ int main(void)
         cmocka_unit_test(no_page_is_read_twice),
         cmocka_unit_test(a_late_source_shows_what_is_there),
         cmocka_unit_test(without_memory_calls_fail_and_the_walk_goes_on),
+        cmocka_unit_test(a_trimmed_brick_is_one_made_so),
+        cmocka_unit_test(what_bricks_give_back_is_told),
     };
     return cmocka_run_group_tests(tests, create_model, destroy_model);
 }
