@@ -14,11 +14,7 @@
 #include "walk/internal.h"
 #include "walk/walk_checks.h"
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define TRIANGLES 50000u
-#else
 #define TRIANGLES 100000u
-#endif
 #define CAMERAS 24u
 
 static built_model model;
