@@ -335,7 +335,7 @@ static void what_has_settled_stays(void **state)
     (void)state;
     unsigned changed = 0, all = 0;
     for (double distance = 0.6; distance < 6; distance *= 1.25)
-        for (uint64_t kilobytes = 1024; kilobytes <= 8192; kilobytes += 1024, all++) {
+        for (uint64_t kilobytes = 1024; kilobytes <= 8192; kilobytes *= 2, all++) {
             strl_walk *walk = open_walk(memory_source(bytes[0], size[0]), &(strl_walk_desc){.error_px = 0.5, .memory_bytes = kilobytes << 10});
             const strl_camera camera = camera_at(distance);
             settle(walk, &camera, 2000);
