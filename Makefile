@@ -2,11 +2,12 @@
 # make demo     installs what is missing, builds, makes the demo model and walks through it
 # make install  builds and installs: make install PREFIX=/usr DESTDIR=/tmp/stage
 # make test     installs what is missing and runs the whole suite
-# make format-check, make clean
+# make format   lays all C out as .clang-format says; make format-check only looks
+# make clean
 
 PREFIX ?= /usr/local
 
-.PHONY: all build deps demo install test format-check clean
+.PHONY: all build deps demo install test format format-check clean
 
 all: build
 
@@ -31,6 +32,9 @@ install:
 
 test: deps
 	@python3 tools/run_tests.py
+
+format:
+	@git ls-files '*.c' '*.h' '*.cpp' | xargs clang-format -i
 
 format-check:
 	@git ls-files '*.c' '*.h' '*.cpp' | xargs clang-format --dry-run --Werror

@@ -1,6 +1,6 @@
-/* What the triangles of a container of samples would take in plain order: along a Morton curve, in pieces of as many triangles as its
- * bricks have in the mean, by the same payload codec, without splats, records or a tree. One JSON line a file. Holds all triangles
- * in memory.
+/* What the triangles of a container of samples would take in plain order: along a Morton curve, in pieces of as many
+ * triangles as its bricks have in the mean, by the same payload codec, without splats, records or a tree. One JSON line
+ * a file. Holds all triangles in memory.
  *
  *     bench_morton FILE.stroll... */
 #include <inttypes.h>
@@ -232,8 +232,8 @@ static int compare(const char *path)
     if (status)
         fprintf(stderr, "bench_morton: %s: %s\n", path, err.message);
     else
-        printf("{\"file\":\"%s\",\"triangles\":%zu,\"triangles_a_piece\":%u,\"plain_bytes\":%" PRIu64 ",\"container_bytes\":%" PRIu64
-               ",\"over\":%.4f}\n",
+        printf("{\"file\":\"%s\",\"triangles\":%zu,\"triangles_a_piece\":%u,\"plain_bytes\":%" PRIu64
+               ",\"container_bytes\":%" PRIu64 ",\"over\":%.4f}\n",
                path, m.count, each, bytes, strl_container_get_info(m.container)->file_bytes,
                bytes ? (double)strl_container_get_info(m.container)->file_bytes / (double)bytes : 0);
     strl_container_close(m.container);

@@ -1,5 +1,5 @@
-/* Where a container's payload bytes go, and how fast they decode: one JSON line a file, with bytes per leaf triangle for each
- * stream of docs/format-payload.md. One core, processor time.
+/* Where a container's payload bytes go, and how fast they decode: one JSON line a file, with bytes per leaf triangle
+ * for each stream of docs/format-payload.md. One core, processor time.
  *
  *     bench_streams FILE.stroll... */
 #include <inttypes.h>
@@ -71,8 +71,8 @@ static strl_status load_node(struct model *model, uint32_t id, strl_error *err)
         status = strl_source_read(strl_container_source(model->container), record->page.offset + record->payload_offset,
                                   node->payload, record->payload_bytes, err);
     if (!status)
-        status = strl_payload_decode(node->payload, record->payload_bytes, reference_of(model, node), &model->arena, &node->mesh,
-                                     err);
+        status = strl_payload_decode(node->payload, record->payload_bytes, reference_of(model, node), &model->arena,
+                                     &node->mesh, err);
     model->payload_bytes += record->payload_bytes;
     model->triangles += record->triangle_count;
     return status;
@@ -100,7 +100,8 @@ static strl_status sum_streams(struct model *model, double bits[STRL__STREAM_COU
     for (uint32_t id = 0; id < model->count && !status; id++) {
         struct strl__streams_out streams;
         double more[STRL__STREAM_COUNT];
-        status = strl__payload_collect(&model->nodes[id].mesh, reference_of(model, &model->nodes[id]), &scratch, &streams, NULL, err);
+        status = strl__payload_collect(&model->nodes[id].mesh, reference_of(model, &model->nodes[id]), &scratch,
+                                       &streams, NULL, err);
         strl__streams_bits(&streams, more);
         for (unsigned i = 0; i < STRL__STREAM_COUNT; i++)
             bits[i] += more[i];
@@ -132,7 +133,8 @@ static strl_status time_decode(struct model *model, double seconds[ROUNDS], strl
         for (uint32_t id = 0; id < model->count && !status; id++) {
             struct node *node = &model->nodes[id];
             strl_pm mesh;
-            status = strl_payload_decode(node->payload, node->record.payload_bytes, reference_of(model, node), &arena, &mesh, err);
+            status = strl_payload_decode(node->payload, node->record.payload_bytes, reference_of(model, node), &arena,
+                                         &mesh, err);
             strl_arena_rewind(&arena, (strl_arena_mark){0});
         }
         seconds[round] = processor_s() - start;
@@ -153,17 +155,19 @@ static strl_status report(const char *path, strl_error *err)
         status = time_decode(&model, seconds, err);
     if (!status) {
         double leaves = (double)model.leaf_triangles, rate = 1e-6 * (double)model.triangles;
-        printf("{\"bench\":\"streams\",\"commit\":\"%s\",\"file\":\"%s\",\"triangles\":%" PRIu64 ",\"bytes_per_triangle\":%.4f", STRL_COMMIT,
-               path, model.leaf_triangles, (double)model.file_bytes / leaves);
+        printf("{\"bench\":\"streams\",\"commit\":\"%s\",\"file\":\"%s\",\"triangles\":%" PRIu64
+               ",\"bytes_per_triangle\":%.4f",
+               STRL_COMMIT, path, model.leaf_triangles, (double)model.file_bytes / leaves);
         for (unsigned k = 0; k < sizeof kinds / sizeof *kinds; k++) {
             double sum = 0;
             for (unsigned i = kinds[k].first; i < kinds[k].end; i++)
                 sum += bits[i] / 8;
             printf(",\"%s\":%.4f", kinds[k].name, sum / leaves);
         }
-        printf(",\"beside_payloads\":%.4f,\"decode_mtri_per_s\":%.2f,\"decode_slowest\":%.2f,\"decode_fastest\":%.2f}\n",
-               (double)(model.file_bytes - model.payload_bytes) / leaves, rate / seconds[ROUNDS / 2], rate / seconds[ROUNDS - 1],
-               rate / seconds[0]);
+        printf(
+            ",\"beside_payloads\":%.4f,\"decode_mtri_per_s\":%.2f,\"decode_slowest\":%.2f,\"decode_fastest\":%.2f}\n",
+            (double)(model.file_bytes - model.payload_bytes) / leaves, rate / seconds[ROUNDS / 2],
+            rate / seconds[ROUNDS - 1], rate / seconds[0]);
     }
     strl_container_close(model.container);
     strl_arena_deinit(&model.arena);

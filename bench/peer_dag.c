@@ -4,16 +4,17 @@
  *     peer_dag INPUT.ply PREFIX ERROR...
  *
  * Clusters of at most 128 triangles are put into groups of about 16 along their shared edges (METIS); vertices that
- * several groups have are locked, each group is simplified to half its triangles and split into clusters again, until no
- * group gets below 85 %. A group's error is the largest of its clusters' and of its own step, so that it grows upward.
- * These are the settings of the library's own example (demo/clusterlod.h, 2025), less what speaks of normals and
- * texture coordinates: only the shape counts here. For each ERROR (model units) PREFIX_I.ply is the cut of the clusters
- * whose own error is at most ERROR and whose group's error is above it. One JSON line for the hierarchy, one for each cut.
+ * several groups have are locked, each group is simplified to half its triangles and split into clusters again, until
+ * no group gets below 85 %. A group's error is the largest of its clusters' and of its own step, so that it grows
+ * upward. These are the settings of the library's own example (demo/clusterlod.h, 2025), less what speaks of normals
+ * and texture coordinates: only the shape counts here. For each ERROR (model units) PREFIX_I.ply is the cut of the
+ * clusters whose own error is at most ERROR and whose group's error is above it. One JSON line for the hierarchy, one
+ * for each cut.
  *
  * Library versions before 1.0 cannot lock single vertices nor report an error of the whole model's scale. A vertex that
- * shares its place with two others is left alone by all of them, so locked vertices are given two unused twins; errors are
- * scaled by the extent that the library reports. They have no sloppy simplification with locks either: a group that gets
- * stuck stays as it is, and buildMeshlets stands for buildMeshletsFlex. */
+ * shares its place with two others is left alone by all of them, so locked vertices are given two unused twins; errors
+ * are scaled by the extent that the library reports. They have no sloppy simplification with locks either: a group that
+ * gets stuck stays as it is, and buildMeshlets stands for buildMeshletsFlex. */
 #include <float.h>
 #include <meshoptimizer.h>
 #include <metis.h>

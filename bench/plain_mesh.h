@@ -1,6 +1,6 @@
-/* Triangle meshes for the programs that measure Stroll from outside: a PLY reader and writer and nothing else. It shares no
- * code with Stroll's readers on purpose, and reads what they need: binary little-endian, scalar vertex properties, faces of
- * three corners. */
+/* Triangle meshes for the programs that measure Stroll from outside: a PLY reader and writer and nothing else. It
+ * shares no code with Stroll's readers on purpose, and reads what they need: binary little-endian, scalar vertex
+ * properties, faces of three corners. */
 #ifndef BENCH_PLAIN_MESH_H
 #define BENCH_PLAIN_MESH_H
 

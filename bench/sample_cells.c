@@ -56,7 +56,8 @@ static bool add_cells(model *m, const strl_node *node, const strl_brick_head *he
     return true;
 }
 
-/* The children of which cell a brick holds. One that goes on with a brick too full for its triangles has cells of the same place. */
+/* The children of which cell a brick holds. One that goes on with a brick too full for its triangles has cells of the
+ * same place. */
 static uint32_t owner_of(const model *m, const brick *above, const brick *own, const int64_t at[3])
 {
     const cell *first = &m->cells[own->first[0]];
@@ -92,7 +93,8 @@ static bool add_faces(model *m, const strl_node *node, const strl_pm *mesh, cons
         if (t == 0 && above)
             own->owner = owner_of(m, above, own, at);
         uint32_t level = levels[t];
-        const cell *storing = level && level <= cells->levels ? cell_at(m, cells->first[level - 1], cells->first[level], at) : NULL;
+        const cell *storing =
+            level && level <= cells->levels ? cell_at(m, cells->first[level - 1], cells->first[level], at) : NULL;
         m->lost += level && !storing;
         f->stored = storing ? storing->side : own->owner;
     }

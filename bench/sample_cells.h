@@ -1,4 +1,5 @@
-/* A container of samples as triangles, each with the cell of the octree that stores it, found from the bytes: for theorem.c. */
+/* A container of samples as triangles, each with the cell of the octree that stores it, found from the bytes: for
+ * theorem.c. */
 #ifndef STRL_BENCH_SAMPLE_CELLS_H
 #define STRL_BENCH_SAMPLE_CELLS_H
 
@@ -30,16 +31,17 @@ typedef struct model {
     size_t face_count, face_capacity;
     cell *cells;
     size_t cell_count, cell_capacity;
-    brick *bricks; /* [node_count] */
+    brick *bricks;  /* [node_count] */
     unsigned shift; /* of coordinates in keys */
     uint64_t lost;  /* triangles for which no cell was found */
 } model;
 
 /* What a cell has below it and beside it in the cells above. */
 typedef struct content {
-    float *at[3], *image[3]; /* [3 count] corners by axis, in sides of the cell, from its centre; as seen by an eye, in samples */
-    uint8_t *drawn;          /* [count] 1 = stored by the cell, 2 = above it, 0 = below it */
-    uint32_t *drawn_face;    /* [drawn_count] */
+    /* [3 count] corners by axis, in sides of the cell, from its centre; as seen by an eye, in samples */
+    float *at[3], *image[3];
+    uint8_t *drawn;       /* [count] 1 = stored by the cell, 2 = above it, 0 = below it */
+    uint32_t *drawn_face; /* [drawn_count] */
     size_t capacity;
     uint32_t count, drawn_count;
     double area; /* over that of the cell's side */

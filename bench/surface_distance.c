@@ -1,11 +1,13 @@
-/* How far two surfaces are apart, in both directions: the one measure for Stroll and for others, of which it shares no code.
+/* How far two surfaces are apart, in both directions: the one measure for Stroll and for others, of which it shares no
+ * code.
  *
  *     surface_distance [--samples N] REFERENCE.ply OTHER.ply...
  *
- * Each surface is sampled evenly by area (N points, one in each N-th of the area) and at every vertex that a triangle uses;
- * the nearest point of the other surface is exact, by a tree of boxes. One JSON line for each OTHER, lengths in model units:
- * rms is over the even samples, max over these and the vertices; "forward" is from the reference to the other surface, and
- * rms and max are the larger of both directions. The maximum is one over samples: the true one is no smaller. */
+ * Each surface is sampled evenly by area (N points, one in each N-th of the area) and at every vertex that a triangle
+ * uses; the nearest point of the other surface is exact, by a tree of boxes. One JSON line for each OTHER, lengths in
+ * model units: rms is over the even samples, max over these and the vertices; "forward" is from the reference to the
+ * other surface, and rms and max are the larger of both directions. The maximum is one over samples: the true one is no
+ * smaller. */
 #include <math.h>
 #include <pthread.h>
 #include <stdio.h>
@@ -175,7 +177,8 @@ static double square_to_segment(const double p[3], const double a[3], const doub
     return dot(ap, ap);
 }
 
-/* Over the inside the distance to the plane, else that to the nearest of the three edges; right for degenerate ones too. */
+/* Over the inside the distance to the plane, else that to the nearest of the three edges; right for degenerate ones
+ * too. */
 static double square_to_triangle(const double p[3], const double t[3][3])
 {
     double u[3], v[3], w[3];

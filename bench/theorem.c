@@ -1,18 +1,19 @@
-/* Theorem 1 of the sample tree (Klein et al. 2005) on a container, from the bytes alone: nothing of the builder or the walk.
+/* Theorem 1 of the sample tree (Klein et al. 2005) on a container, from the bytes alone: nothing of the builder or the
+ * walk.
  *
  *     theorem FILE.stroll [--pairs N] [--seed S] [--probability P]
  *
- * A pair is a cell of the octree, each as likely as any other, and an eye from which the cell covers half a pixel to a whole one.
- * Content of a cell: the triangles whose centroid lies in it and that are stored in it, below it, or above it and within its ball
- * (one side round its centre), so not those that were too large for it. Drawn when the front ends at the cell: those of them that it
- * and the cells above it store. Cells that store all of their content (leaves) cannot fail and are no candidates.
+ * A pair is a cell of the octree, each as likely as any other, and an eye from which the cell covers half a pixel to a
+ * whole one. Content of a cell: the triangles whose centroid lies in it and that are stored in it, below it, or above
+ * it and within its ball (one side round its centre), so not those that were too large for it. Drawn when the front
+ * ends at the cell: those of them that it and the cells above it store. Cells that store all of their content (leaves)
+ * cannot fail and are no candidates.
  *
- * Of each pair the content is rasterised with a depth test, 16 x 16 samples over the square that the cell covers at most, which
- * moves at random below them. Three questions, ever less strict:
- *   unsampled  no sample shows a drawn triangle
- *   hidden     nor does any of four points in each drawn triangle: no triangle is before one of them
- *   broken     of the hidden ones, those in which what is visible has an area of at least A(P(u)) / q, a group of the proof
- * One JSON line. Holds all triangles of the first tree in memory. */
+ * Of each pair the content is rasterised with a depth test, 16 x 16 samples over the square that the cell covers at
+ * most, which moves at random below them. Three questions, ever less strict: unsampled  no sample shows a drawn
+ * triangle hidden     nor does any of four points in each drawn triangle: no triangle is before one of them broken of
+ * the hidden ones, those in which what is visible has an area of at least A(P(u)) / q, a group of the proof One JSON
+ * line. Holds all triangles of the first tree in memory. */
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
@@ -75,7 +76,8 @@ typedef struct eye {
 
 static void random_direction(random_source *random, float out[3])
 {
-    double z = 2 * random_unit(random) - 1, angle = 2 * 3.14159265358979323846 * random_unit(random), r = sqrt(1 - z * z);
+    double z = 2 * random_unit(random) - 1, angle = 2 * 3.14159265358979323846 * random_unit(random),
+           r = sqrt(1 - z * z);
     out[0] = (float)(r * cos(angle));
     out[1] = (float)(r * sin(angle));
     out[2] = (float)z;
@@ -197,7 +199,8 @@ static void draw(const content *c, id_buffer *buffer)
         for (int y = y0; y <= y1; y++)
             for (int x = x0; x <= x1; x++) {
                 float depth;
-                if (!depth_at(&s, (float)x, (float)y, &depth) || (buffer->id[y][x] != UINT32_MAX && depth <= buffer->depth[y][x]))
+                if (!depth_at(&s, (float)x, (float)y, &depth) ||
+                    (buffer->id[y][x] != UINT32_MAX && depth <= buffer->depth[y][x]))
                     continue;
                 buffer->depth[y][x] = depth;
                 buffer->id[y][x] = t;
@@ -396,7 +399,8 @@ static strl_status report(model *m, uint64_t pairs, double probability, uint64_t
     size_t cells = m->cell_count, candidates;
     figures f = {0};
     uint64_t *triangles = strl__alloc(cells, sizeof *triangles);
-    bool good = triangles && find_candidates(m, &candidates, triangles) && test(m, candidates, pairs, probability, seed, &f);
+    bool good =
+        triangles && find_candidates(m, &candidates, triangles) && test(m, candidates, pairs, probability, seed, &f);
     if (good) {
         qsort(triangles, candidates, sizeof *triangles, by_number);
         printf("{\"triangles\":%zu,\"lost\":%" PRIu64 ",\"cells\":%zu,\"candidates\":%zu,\"triangles_median\":%" PRIu64

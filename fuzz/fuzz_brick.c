@@ -1,6 +1,6 @@
-/* Hostile bricks of sample trees. An input is the number of triangles that the node's record says (u32), then the payload. Two readers of
- * the head, one written from the format's text alone, agree on what they refuse; what is accepted comes back from another round; and what
- * a walk makes of the whole keeps to its arrays in every state. */
+/* Hostile bricks of sample trees. An input is the number of triangles that the node's record says (u32), then the
+ * payload. Two readers of the head, one written from the format's text alone, agree on what they refuse; what is
+ * accepted comes back from another round; and what a walk makes of the whole keeps to its arrays in every state. */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -55,7 +55,8 @@ static strl_status check_by_text(const strl_node *record, const uint8_t *payload
 static void check_head(const strl_brick_head *head, uint32_t triangles)
 {
     uint64_t sum = 0;
-    require(head->level_count >= 1 && head->level_count <= STRL_BRICK_LEVELS && strl_brick_splats(head) <= STRL_BRICK_SPLATS);
+    require(head->level_count >= 1 && head->level_count <= STRL_BRICK_LEVELS &&
+            strl_brick_splats(head) <= STRL_BRICK_SPLATS);
     for (uint32_t i = 0; i < head->level_count; i++)
         require(head->error[i] >= 0 && head->error[i] <= (i ? head->error[i - 1] : LARGEST_CELL));
     for (uint32_t i = 0; i < head->run_count; i++)
@@ -91,7 +92,8 @@ static void check_states(strl__mesh *mesh)
 {
     for (uint32_t state = 0; state <= mesh->step_count; state++) {
         uint32_t first = UINT32_MAX, end = 0;
-        require(mesh->triangle_end[state] <= mesh->triangle_count && (state == 0 || mesh->triangle_end[state] >= mesh->triangle_end[state - 1]));
+        require(mesh->triangle_end[state] <= mesh->triangle_count &&
+                (state == 0 || mesh->triangle_end[state] >= mesh->triangle_end[state - 1]));
         strl__mesh_set_state(mesh, state, &first, &end);
         for (uint32_t i = 0; i < 3 * mesh->triangle_end[state]; i++)
             require(mesh->indices[i] < mesh->vertex_count);
@@ -102,7 +104,8 @@ static void check_states(strl__mesh *mesh)
 }
 
 /* Whole, and with its coarse states alone. */
-static void walk_brick(strl_node *record, const strl_brick_head *head, const uint8_t *payload, size_t head_bytes, strl_arena *arena)
+static void walk_brick(strl_node *record, const strl_brick_head *head, const uint8_t *payload, size_t head_bytes,
+                       strl_arena *arena)
 {
     strl_payload_sizes sizes;
     strl_pm pm;
@@ -124,7 +127,8 @@ static void walk_brick(strl_node *record, const strl_brick_head *head, const uin
         check_states(&mesh);
     strl__mesh_deinit(&mesh);
     for (uint32_t held = 0; held < head->level_count && made == STRL_OK; held++) {
-        require(strl__mesh_create(record, payload, record->payload_bytes, NULL, true, false, head->error[held], &mesh, &err) == STRL_OK);
+        require(strl__mesh_create(record, payload, record->payload_bytes, NULL, true, false, head->error[held], &mesh,
+                                  &err) == STRL_OK);
         require(mesh.held <= mesh.step_count && (mesh.held == mesh.step_count || mesh.held <= held));
         check_states(&mesh);
         strl__mesh_deinit(&mesh);

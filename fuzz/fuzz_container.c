@@ -1,5 +1,5 @@
-/* Opens a container from memory and reads everything, once as it is and once with its checksums made right, which is how
- * mutations get past them. Properties: whatever is accepted keeps the promises of container.h and progressive.h. */
+/* Opens a container from memory and reads everything, once as it is and once with its checksums made right, which is
+ * how mutations get past them. Properties: whatever is accepted keeps the promises of container.h and progressive.h. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -75,7 +75,8 @@ static void read_runs(strl_container *container)
         require(facts.page.bytes >= 112 && facts.page.bytes <= STRL__TABLE_PAGE_BYTES);
         uint8_t *page = malloc(facts.page.bytes);
         require(page != NULL);
-        if (strl_source_read(strl_container_source(container), facts.page.offset, page, facts.page.bytes, NULL) == STRL_OK &&
+        if (strl_source_read(strl_container_source(container), facts.page.offset, page, facts.page.bytes, NULL) ==
+                STRL_OK &&
             strl_run_check(container, run, &facts, page, facts.page.bytes, NULL) == STRL_OK)
             for (uint64_t i = (uint64_t)run * STRL_RUN_PLACEMENTS; i < count && i / STRL_RUN_PLACEMENTS == run; i++) {
                 strl_placement placement;

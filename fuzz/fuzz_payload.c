@@ -42,8 +42,8 @@ static void encode_again(const strl_pm *pm, const strl_payload_reference *refere
     strl_writer writer = {0};
     strl_pm again;
     if (strl_payload_encode(pm, reference, arena, &writer, NULL, &err) ||
-        strl_payload_decode(writer.data, writer.size, reference, arena, &again, &err) || again.vertex_count != pm->vertex_count ||
-        again.triangle_count != pm->triangle_count ||
+        strl_payload_decode(writer.data, writer.size, reference, arena, &again, &err) ||
+        again.vertex_count != pm->vertex_count || again.triangle_count != pm->triangle_count ||
         memcmp(again.vertex_end, pm->vertex_end, (pm->step_count + 1) * sizeof *pm->vertex_end) ||
         memcmp(again.triangle_end, pm->triangle_end, (pm->step_count + 1) * sizeof *pm->triangle_end) ||
         memcmp(again.geometric_error, pm->geometric_error, (pm->step_count + 1) * sizeof *pm->geometric_error))

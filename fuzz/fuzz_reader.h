@@ -12,12 +12,12 @@
 #include "base/hash.h"
 #include "readers/internal.h"
 
-#define FUZZ_CHECK(condition)                                                                      \
-    do {                                                                                           \
-        if (!(condition)) {                                                                        \
-            fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition);                        \
-            abort();                                                                               \
-        }                                                                                          \
+#define FUZZ_CHECK(condition)                                                                                          \
+    do {                                                                                                               \
+        if (!(condition)) {                                                                                            \
+            fprintf(stderr, "%s:%d: %s\n", __FILE__, __LINE__, #condition);                                            \
+            abort();                                                                                                   \
+        }                                                                                                              \
     } while (0)
 
 #define FUZZ_TRIANGLES_MAX 20000u
@@ -40,12 +40,12 @@ static inline void fuzz_check_triangle(const strl_triangle *triangle, fuzz_pass 
         FUZZ_CHECK(__builtin_isfinite(coordinate));
         FUZZ_CHECK((triangle->flags & STRL_TRIANGLE_HAS_TEXCOORD) || coordinate == 0);
     }
-    FUZZ_CHECK((triangle->flags & ~(STRL_TRIANGLE_HAS_NORMAL | STRL_TRIANGLE_HAS_COLOUR | STRL_TRIANGLE_HAS_TEXCOORD)) == 0);
+    FUZZ_CHECK(
+        (triangle->flags & ~(STRL_TRIANGLE_HAS_NORMAL | STRL_TRIANGLE_HAS_COLOUR | STRL_TRIANGLE_HAS_TEXCOORD)) == 0);
     if (!(triangle->flags & STRL_TRIANGLE_HAS_COLOUR))
         FUZZ_CHECK(triangle->colour[0] == 0xffffffffu && triangle->colour[2] == 0xffffffffu);
     pass->highest_part = triangle->part > pass->highest_part ? triangle->part : pass->highest_part;
-    pass->highest_material =
-        triangle->material > pass->highest_material ? triangle->material : pass->highest_material;
+    pass->highest_material = triangle->material > pass->highest_material ? triangle->material : pass->highest_material;
 }
 
 static inline fuzz_pass fuzz_read_pass(strl_reader *reader)
@@ -57,13 +57,11 @@ static inline fuzz_pass fuzz_read_pass(strl_reader *reader)
     size_t count = 0;
     do {
         pass.status = strl_reader_next(reader, triangles, 61, &count, &err);
-        FUZZ_CHECK(pass.status == STRL_OK ||
-                   (count == 0 && err.message[0] != 0 && err.status == pass.status));
+        FUZZ_CHECK(pass.status == STRL_OK || (count == 0 && err.message[0] != 0 && err.status == pass.status));
         for (size_t i = 0; i < count; i++)
             fuzz_check_triangle(&triangles[i], &pass);
         pass.count += count;
-        pass.checksum =
-            strl__mix64(pass.checksum ^ strl__checksum(triangles, count * sizeof *triangles));
+        pass.checksum = strl__mix64(pass.checksum ^ strl__checksum(triangles, count * sizeof *triangles));
     } while (count > 0);
     strl_reader_drops_get(reader, &pass.drops);
     return pass;
@@ -98,7 +96,8 @@ static inline void fuzz_pieces(const strl_reader_desc *desc, const strl__format 
         strl_reader_placement placement;
         if (strl_reader_next_placement(reader, &placement, &found, &err) || !found)
             break;
-        FUZZ_CHECK(placement.piece > 0 && placement.piece < strl_reader_piece_count(reader) && ++placements <= announced);
+        FUZZ_CHECK(placement.piece > 0 && placement.piece < strl_reader_piece_count(reader) &&
+                   ++placements <= announced);
         for (unsigned i = 0; i < 12; i++)
             FUZZ_CHECK(__builtin_isfinite(placement.transform[i]));
     }
@@ -111,8 +110,7 @@ static inline void fuzz_reader(const strl__format *format, const uint8_t *data, 
     char path[40];
     if (file < 0)
         file = memfd_create("fuzz", 0);
-    FUZZ_CHECK(file >= 0 && ftruncate(file, 0) == 0 &&
-               pwrite(file, data, size, 0) == (ssize_t)size);
+    FUZZ_CHECK(file >= 0 && ftruncate(file, 0) == 0 && pwrite(file, data, size, 0) == (ssize_t)size);
     snprintf(path, sizeof path, "/proc/self/fd/%d", file);
     strl_reader_desc desc = {.path = path, .memory_bytes = STRL__READER_MEMORY_LEAST};
     strl_reader *reader;
@@ -134,8 +132,7 @@ static inline void fuzz_reader(const strl__format *format, const uint8_t *data, 
     FUZZ_CHECK(first.highest_material < strl_reader_material_count(reader));
     FUZZ_CHECK(strl_reader_rewind(reader, &err) == STRL_OK);
     fuzz_pass second = fuzz_read_pass(reader);
-    FUZZ_CHECK(first.status == second.status && first.count == second.count &&
-               first.checksum == second.checksum);
+    FUZZ_CHECK(first.status == second.status && first.count == second.count && first.checksum == second.checksum);
     FUZZ_CHECK(memcmp(&first.drops, &second.drops, sizeof first.drops) == 0);
     strl_reader_rest(reader);
     fuzz_pass none = fuzz_read_pass(reader);

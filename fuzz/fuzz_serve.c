@@ -1,5 +1,5 @@
-/* What the server takes apart of a stranger's request. The first byte says as what the rest is taken; whatever it is, what
- * comes out keeps its promises: no path leads out, no part is outside of its file, nothing leaves its quotes. */
+/* What the server takes apart of a stranger's request. The first byte says as what the rest is taken; whatever it is,
+ * what comes out keeps its promises: no path leads out, no part is outside of its file, nothing leaves its quotes. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -41,7 +41,8 @@ static void check_query(char *text)
 {
     static strl__query query;
     strl__refusal refusal = strl__parse_query(text, &query);
-    must(refusal.status == 0 || (refusal.status == 400 && refusal.sentence), "a query is taken or refused with a sentence");
+    must(refusal.status == 0 || (refusal.status == 400 && refusal.sentence),
+         "a query is taken or refused with a sentence");
     must(query.count <= STRL__QUERY_ITEMS, "a query has at most 4096 items");
     if (refusal.status)
         return;
@@ -69,7 +70,8 @@ static void try_range(char *text)
     for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
         strl__range range = strl__parse_range(text, sizes[i]);
         if (range.kind == STRL__RANGE_PART)
-            must(range.bytes > 0 && range.first < sizes[i] && range.bytes <= sizes[i] - range.first, "a part is in its file");
+            must(range.bytes > 0 && range.first < sizes[i] && range.bytes <= sizes[i] - range.first,
+                 "a part is in its file");
     }
 }
 
@@ -94,12 +96,17 @@ static void try_conditions(char *text)
         lines[i] = *text ? text : NULL;
         text = end;
     }
-    const strl__conditions conditions = {.match = {lines[0]}, .none_match = {lines[1]}, .unmodified_since = lines[2],
-                                         .modified_since = lines[3], .range = lines[4], .if_range = lines[5]};
+    const strl__conditions conditions = {.match = {lines[0]},
+                                         .none_match = {lines[1]},
+                                         .unmodified_since = lines[2],
+                                         .modified_since = lines[3],
+                                         .range = lines[4],
+                                         .if_range = lines[5]};
     const strl__validators file = {.etag = "\"m-0\"", .modified_s = 784111777, .date_is_strong = true, .bytes = 1000};
     strl__range range;
     unsigned status = strl__decide(&conditions, &file, true, &range);
-    must(status == 200 || status == 206 || status == 304 || status == 412 || status == 416, "the status is one of five");
+    must(status == 200 || status == 206 || status == 304 || status == 412 || status == 416,
+         "the status is one of five");
     must((status == 206) == (range.kind == STRL__RANGE_PART), "206 has a part");
     must(status != 206 || range.bytes <= file.bytes - range.first, "a part is in its file");
     must(strl__decide(&conditions, &file, false, &range) != 206, "no method but GET has parts");
@@ -118,7 +125,8 @@ static void try_text(char *text)
     strl__put_json(&json, text);
     strl__log_text(text, line, sizeof line);
     for (size_t i = 0; i < html.size; i++)
-        must(html.data[i] != '<' && html.data[i] != '>' && html.data[i] != '"' && html.data[i] != '\'', "HTML has no tag");
+        must(html.data[i] != '<' && html.data[i] != '>' && html.data[i] != '"' && html.data[i] != '\'',
+             "HTML has no tag");
     for (size_t i = 0; i < log.size; i++)
         must(log.data[i] > 0x20 && log.data[i] < 0x7f && log.data[i] != '"', "a log is printable");
     for (size_t i = 0; i < url.size; i++)

@@ -1,6 +1,6 @@
-/* Scene `array`: copies of any model on a square grid, as one mesh of glTF and one node with EXT_mesh_gpu_instancing. Triangles are
- * streamed as they are read, each with corners of its own, so memory does not grow with the model; materials become colours of
- * vertices.
+/* Scene `array`: copies of any model on a square grid, as one mesh of glTF and one node with EXT_mesh_gpu_instancing.
+ * Triangles are streamed as they are read, each with corners of its own, so memory does not grow with the model;
+ * materials become colours of vertices.
  *
  *   NAME_000.bin: corners (position, normal, colour: 32 bytes), then moves, then turns of the copies */
 #include <inttypes.h>
@@ -14,7 +14,7 @@
 #include "scenes/generator.h"
 #include "scenes/parts/gltf_json.h"
 
-#define SPACING 1.25 /* of the model's sides */
+#define SPACING 1.25        /* of the model's sides */
 #define MOST_WRITTEN_OUT 10 /* times the triangles of a model that has copies itself */
 enum { ENDING = 5, AT_ONCE = 1024, CORNER_BYTES = 32, COPIES_DEFAULT = 100 };
 
@@ -30,7 +30,7 @@ typedef struct array_scene {
     strl_reader *reader;
     strl_output *gltf, *bin;
     strl__stream stream, text;
-    uint16_t linear[256]; /* of sRGB */
+    uint16_t linear[256];     /* of sRGB */
     strl_triangle *triangles; /* [AT_ONCE] */
     array_corner *corners;    /* [3 * AT_ONCE] */
     float low[3], high[3];
@@ -77,7 +77,8 @@ static strl_status copy_some(array_scene *scene, size_t *count, strl_error *err)
             put_corner(scene, &scene->triangles[i], c, rgba, &scene->corners[3 * i + (size_t)c]);
     }
     scene->count += *count;
-    return status == STRL_OK ? strl__stream_write(&scene->stream, scene->corners, *count * 3 * CORNER_BYTES, err) : status;
+    return status == STRL_OK ? strl__stream_write(&scene->stream, scene->corners, *count * 3 * CORNER_BYTES, err)
+                             : status;
 }
 
 static strl_status copy_triangles(array_scene *scene, strl_error *err)
@@ -89,7 +90,8 @@ static strl_status copy_triangles(array_scene *scene, strl_error *err)
     while (status == STRL_OK && count) {
         status = copy_some(scene, &count, err);
         if (status == STRL_OK)
-            status = strl__scene_report(scene->run, "copying", strl_reader_bytes_done(scene->reader), info.file_bytes, err);
+            status =
+                strl__scene_report(scene->run, "copying", strl_reader_bytes_done(scene->reader), info.file_bytes, err);
     }
     if (status == STRL_OK && scene->count == 0)
         return strl__fail(err, STRL_ERR_FORMAT, "%s: expected a triangle, found none", scene->run->desc->of);
@@ -106,14 +108,16 @@ static void place_copy(const array_scene *scene, uint64_t index, float move[3], 
 {
     const uint64_t side = (uint64_t)ceil(sqrt((double)scene->copies));
     const int a = (scene->up + 1) % 3, b = (scene->up + 2) % 3;
-    const double x = SPACING * (double)(scene->high[a] - scene->low[a]), y = SPACING * (double)(scene->high[b] - scene->low[b]);
+    const double x = SPACING * (double)(scene->high[a] - scene->low[a]),
+                 y = SPACING * (double)(scene->high[b] - scene->low[b]);
     const double spacing = fmax(fmax(x, y), 1e-30);
     double c, s;
     strl__circle((double)(strl__mix64(strl__mix64(scene->run->desc->seed) + index) >> 11) * 0x1p-54, &c, &s);
     memset(move, 0, 3 * sizeof *move);
     memset(turn, 0, 4 * sizeof *turn);
     /* Turned about its own middle: that stays where the grid has it. */
-    const double middle[2] = {(double)(scene->low[a] + scene->high[a]) / 2, (double)(scene->low[b] + scene->high[b]) / 2};
+    const double middle[2] = {(double)(scene->low[a] + scene->high[a]) / 2,
+                              (double)(scene->low[b] + scene->high[b]) / 2};
     const double cosine = c * c - s * s, sine = 2 * c * s;
     move[a] = (float)(spacing * (double)(index % side) + middle[0] - (cosine * middle[0] - sine * middle[1]));
     move[b] = (float)(spacing * (double)(index / side) + middle[1] - (sine * middle[0] + cosine * middle[1]));
@@ -145,20 +149,23 @@ static strl_status put_accessors(array_scene *scene, strl_error *err)
 {
     const uint64_t corners = 3 * scene->count;
     strl__stream *text = &scene->text;
-    strl_status status = put_accessor(scene, "\"accessors\":[\n{\"bufferView\":0,\"componentType\":5126", corners, "VEC3", err);
+    strl_status status =
+        put_accessor(scene, "\"accessors\":[\n{\"bufferView\":0,\"componentType\":5126", corners, "VEC3", err);
     if (status == STRL_OK)
         status = strl__json_floats(text, "min", scene->low, 3, err);
     if (status == STRL_OK)
         status = strl__json_floats(text, "max", scene->high, 3, err);
     if (status == STRL_OK)
-        status = put_accessor(scene, "},\n{\"bufferView\":0,\"byteOffset\":24,\"componentType\":5123,\"normalized\":true", corners,
-                              "VEC4", err);
+        status =
+            put_accessor(scene, "},\n{\"bufferView\":0,\"byteOffset\":24,\"componentType\":5123,\"normalized\":true",
+                         corners, "VEC4", err);
     if (status == STRL_OK)
         status = put_accessor(scene, "},\n{\"bufferView\":1,\"componentType\":5126", scene->copies, "VEC3", err);
     if (status == STRL_OK)
         status = put_accessor(scene, "},\n{\"bufferView\":2,\"componentType\":5126", scene->copies, "VEC4", err);
     if (status == STRL_OK && scene->has_normals)
-        status = put_accessor(scene, "},\n{\"bufferView\":0,\"byteOffset\":12,\"componentType\":5126", corners, "VEC3", err);
+        status =
+            put_accessor(scene, "},\n{\"bufferView\":0,\"byteOffset\":12,\"componentType\":5126", corners, "VEC3", err);
     return status == STRL_OK ? strl__json_print(text, err, "}],\n") : status;
 }
 
@@ -175,23 +182,27 @@ static strl_status put_views(array_scene *scene, const char *bin, strl_error *er
                                   "{\"buffer\":0,\"byteLength\":%" PRIu64 ",\"byteStride\":%d,\"target\":34962},\n"
                                   "{\"buffer\":0,\"byteOffset\":%" PRIu64 ",\"byteLength\":%" PRIu64 "},\n"
                                   "{\"buffer\":0,\"byteOffset\":%" PRIu64 ",\"byteLength\":%" PRIu64 "}],\n",
-                                  corners + moves + turns, corners, CORNER_BYTES, corners, moves, corners + moves, turns)
+                                  corners + moves + turns, corners, CORNER_BYTES, corners, moves, corners + moves,
+                                  turns)
                : status;
 }
 
 static strl_status put_text(array_scene *scene, const char *bin, strl_error *err)
 {
     strl__stream *text = &scene->text;
-    strl_status status = strl__json_print(text, err,
-                                          "{\"asset\":{\"version\":\"2.0\",\"generator\":\"stroll scene\"},"
-                                          "\"extensionsUsed\":[\"EXT_mesh_gpu_instancing\"],\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\n");
+    strl_status status = strl__json_print(
+        text, err,
+        "{\"asset\":{\"version\":\"2.0\",\"generator\":\"stroll scene\"},"
+        "\"extensionsUsed\":[\"EXT_mesh_gpu_instancing\"],\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\n");
     if (status == STRL_OK)
-        status = strl__json_print(text, err,
-                                  "\"nodes\":[{\"name\":\"ARRAY\"%s,\"mesh\":0,\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":"
-                                  "{\"TRANSLATION\":2,\"ROTATION\":3}}}}],\n\"meshes\":[{\"name\":\"COPIED\",\"primitives\":[{\"attributes\":"
-                                  "{\"POSITION\":0,\"COLOR_0\":1%s}}]}],\n", 
-                                  scene->up == 2 ? ",\"rotation\":[-0.70710678,0,0,0.70710678]" : "", /* glTF has y up */
-                                  scene->has_normals ? ",\"NORMAL\":4" : "");
+        status = strl__json_print(
+            text, err,
+            "\"nodes\":[{\"name\":\"ARRAY\"%s,\"mesh\":0,\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":"
+            "{\"TRANSLATION\":2,\"ROTATION\":3}}}}],\n\"meshes\":[{\"name\":\"COPIED\",\"primitives\":[{\"attributes\":"
+            "{\"POSITION\":0,\"COLOR_0\":1%s}}]}],\n",
+            /* glTF has y up */
+            scene->up == 2 ? ",\"rotation\":[-0.70710678,0,0,0.70710678]" : "",
+            scene->has_normals ? ",\"NORMAL\":4" : "");
     if (status == STRL_OK)
         status = put_accessors(scene, err);
     if (status == STRL_OK)
@@ -203,8 +214,8 @@ static strl_status put_text(array_scene *scene, const char *bin, strl_error *err
 
 /* ---- the whole */
 
-/* Copies of copies would need a node for each: glTF's nodes have one parent, and its instances no children. What a model places is
- * written out, which a forest is not made for. */
+/* Copies of copies would need a node for each: glTF's nodes have one parent, and its instances no children. What a
+ * model places is written out, which a forest is not made for. */
 static strl_status check_copies(const strl_scene_desc *desc, const strl_reader *reader, strl_error *err)
 {
     uint64_t own = 0, placed = 0;
@@ -218,13 +229,16 @@ static strl_status check_copies(const strl_scene_desc *desc, const strl_reader *
                ? STRL_OK
                : strl__fail(err, STRL_ERR_LIMIT,
                             "%s: it places its %" PRIu64 " triangles so often that they are %" PRIu64
-                            ", and an array has them written out: expected at most %d times as many", desc->of, own, placed, MOST_WRITTEN_OUT);
+                            ", and an array has them written out: expected at most %d times as many",
+                            desc->of, own, placed, MOST_WRITTEN_OUT);
 }
 
 static strl_status open_model(array_scene *scene, strl_error *err)
 {
     const strl_scene_desc *desc = scene->run->desc;
-    strl_reader_desc reading = {.path = desc->of, .memory_bytes = desc->memory_bytes, .child = {.importer = desc->importer},
+    strl_reader_desc reading = {.path = desc->of,
+                                .memory_bytes = desc->memory_bytes,
+                                .child = {.importer = desc->importer},
                                 .most_pieces = STRL_READER_MOST_PIECES};
     strl_status status = strl_reader_open(&reading, &scene->reader, err);
     if (status != STRL_OK || strl_reader_piece_count(scene->reader) == 1)
@@ -277,19 +291,23 @@ static strl_status write_all(array_scene *scene, const char *bin, strl_error *er
 strl_status strl__scene_array(const strl__scene_run *run, strl_scene_result *result, strl_error *err)
 {
     const strl_scene_desc *desc = run->desc;
-    array_scene scene = {.run = run, .copies = desc->copies ? desc->copies : COPIES_DEFAULT,
-                         .low = {INFINITY, INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY, -INFINITY}};
+    array_scene scene = {.run = run,
+                         .copies = desc->copies ? desc->copies : COPIES_DEFAULT,
+                         .low = {INFINITY, INFINITY, INFINITY},
+                         .high = {-INFINITY, -INFINITY, -INFINITY}};
     if (!desc->of || !strl__path_ends_in(desc->path, ".gltf"))
-        return strl__fail(err, STRL_ERR_ARGUMENT, "%s: an array is of a file and written as glTF, expected a name that ends in .gltf",
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "%s: an array is of a file and written as glTF, expected a name that ends in .gltf",
                           desc->path);
     char *bin = strl__path_sibling(desc->path, ENDING, "_000.bin");
     make_linear(scene.linear);
-    strl_status status = bin ? open_all(&scene, bin, err) : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", desc->path);
+    strl_status status =
+        bin ? open_all(&scene, bin, err) : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", desc->path);
     if (status == STRL_OK)
         status = write_all(&scene, bin, err);
     if (status == STRL_OK && result)
-        *result = (strl_scene_result){3 * scene.count * scene.copies, scene.count * scene.copies, scene.stream.offset + scene.text.offset,
-                                      scene.copies};
+        *result = (strl_scene_result){3 * scene.count * scene.copies, scene.count * scene.copies,
+                                      scene.stream.offset + scene.text.offset, scene.copies};
     strl_reader_close(scene.reader);
     strl__stream_deinit(&scene.stream);
     strl__stream_deinit(&scene.text);

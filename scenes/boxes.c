@@ -1,5 +1,5 @@
-/* Scene `boxes`: many closed boxes that share nothing, of any orientation and size, in the unit cube: a mesh whose topology
- * nobody can simplify across parts. The boxes' mean distance sets their size, so that few of them touch. */
+/* Scene `boxes`: many closed boxes that share nothing, of any orientation and size, in the unit cube: a mesh whose
+ * topology nobody can simplify across parts. The boxes' mean distance sets their size, so that few of them touch. */
 #include "scenes/generator.h"
 
 #include <math.h>
@@ -21,7 +21,8 @@ static double next_uniform(uint64_t *state)
     return (double)(strl__mix64(*state) >> 11) * 0x1p-53;
 }
 
-/* A uniformly distributed rotation: a random point of the 4-ball as quaternion (Marsaglia), so that no sine is needed. */
+/* A uniformly distributed rotation: a random point of the 4-ball as quaternion (Marsaglia), so that no sine is needed.
+ */
 static void random_quaternion(uint64_t *state, double q[4])
 {
     double square;

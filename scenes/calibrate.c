@@ -1,9 +1,10 @@
 /* How fine a grid, and how many levels of noise, give the wanted number of triangles.
  *
- * All levels are tried from the coarsest on, counted exactly at the coarsest useful sampling (two cells per coefficient, which
- * is 1/5 to 1/20 of the work of the final grid), until the wanted count is in reach with at most CELLS_MAX cells per
- * coefficient. For a given level the count grows with the square of the resolution, nearly; how nearly is measured, on a
- * sample of boxes counted at both resolutions. Small surfaces are counted exactly instead, as often as it takes. */
+ * All levels are tried from the coarsest on, counted exactly at the coarsest useful sampling (two cells per
+ * coefficient, which is 1/5 to 1/20 of the work of the final grid), until the wanted count is in reach with at most
+ * CELLS_MAX cells per coefficient. For a given level the count grows with the square of the resolution, nearly; how
+ * nearly is measured, on a sample of boxes counted at both resolutions. Small surfaces are counted exactly instead, as
+ * often as it takes. */
 #include "scenes/generator.h"
 
 #include <math.h>
@@ -115,8 +116,9 @@ static strl_status measure_growth(const strl__scene_run *run, const strl__isosur
     return status;
 }
 
-/* Tries grids near the estimate, counted exactly, and keeps the best. First the secant; where one more cell is already too
- * much, grids of nearly the same size that sample the field elsewhere: their counts scatter round the wanted one. */
+/* Tries grids near the estimate, counted exactly, and keeps the best. First the secant; where one more cell is already
+ * too much, grids of nearly the same size that sample the field elsewhere: their counts scatter round the wanted one.
+ */
 static strl_status search_exactly(const strl__scene_run *run, strl__isosurface *surface, double cells, strl_error *err)
 {
     double wanted = (double)run->desc->triangles;

@@ -1,6 +1,7 @@
-/* Scene `chessboard`: the unit square in black and white fields of two triangles each, as Klein et al. 2005 (6) draw it: from afar
- * all of it is grey, and what is drawn shows whether samples are fair. Fields share no vertices, so that borders are sharp. As glTF it is
- * copies of a square of fields; these have whole numbers as coordinates, which one scale makes the unit square. */
+/* Scene `chessboard`: the unit square in black and white fields of two triangles each, as Klein et al. 2005 (6) draw
+ * it: from afar all of it is grey, and what is drawn shows whether samples are fair. Fields share no vertices, so that
+ * borders are sharp. As glTF it is copies of a square of fields; these have whole numbers as coordinates, which one
+ * scale makes the unit square. */
 #include <math.h>
 #include <string.h>
 
@@ -17,19 +18,20 @@ const strl__material strl__chessboard_materials[STRL__CHESSBOARD_MATERIALS] = {
 };
 
 typedef struct field_batch {
-    uint8_t *records; /* [BATCH * CORNERS] */
+    uint8_t *records;  /* [BATCH * CORNERS] */
     uint32_t *corners; /* [BATCH * 6] */
 } field_batch;
 
-static void put_field(const field_batch *batch, uint32_t at, uint64_t first_vertex, uint64_t row, uint64_t column, double rows,
-                      double columns)
+static void put_field(const field_batch *batch, uint32_t at, uint64_t first_vertex, uint64_t row, uint64_t column,
+                      double rows, double columns)
 {
     const uint8_t shade = (row + column) & 1 ? 255 : 0;
     const uint32_t first = (uint32_t)(first_vertex + (uint64_t)at * CORNERS);
     uint32_t *corners = batch->corners + (size_t)at * 6;
     for (unsigned corner = 0; corner < CORNERS; corner++) {
         uint8_t *record = batch->records + ((size_t)at * CORNERS + corner) * RECORD_BYTES;
-        const float position[3] = {(float)(((double)column + (corner & 1)) / columns), (float)(((double)row + (corner >> 1)) / rows), 0};
+        const float position[3] = {(float)(((double)column + (corner & 1)) / columns),
+                                   (float)(((double)row + (corner >> 1)) / rows), 0};
         memcpy(record, position, sizeof position);
         memset(record + sizeof position, shade, 3);
     }
@@ -37,14 +39,16 @@ static void put_field(const field_batch *batch, uint32_t at, uint64_t first_vert
     memcpy(corners, both, sizeof both);
 }
 
-static strl_status write_fields(strl__scene_run *run, const field_batch *batch, uint64_t columns, uint64_t rows, strl_error *err)
+static strl_status write_fields(strl__scene_run *run, const field_batch *batch, uint64_t columns, uint64_t rows,
+                                strl_error *err)
 {
     const uint64_t fields = columns * rows;
     strl_status status = STRL_OK;
     for (uint64_t first = 0; first < fields && status == STRL_OK; first += BATCH) {
         const uint32_t count = fields - first < BATCH ? (uint32_t)(fields - first) : BATCH;
         for (uint32_t i = 0; i < count; i++)
-            put_field(batch, i, first * CORNERS, (first + i) / columns, (first + i) % columns, (double)rows, (double)columns);
+            put_field(batch, i, first * CORNERS, (first + i) / columns, (first + i) % columns, (double)rows,
+                      (double)columns);
         status = strl__scene_mesh_vertices(run->writer, batch->records, (uint64_t)count * CORNERS, err);
         if (status == STRL_OK)
             status = strl__scene_mesh_triangles(run->writer, batch->corners, 2 * (uint64_t)count, err);
@@ -62,7 +66,8 @@ static uint64_t columns_of(uint64_t fields)
 strl_status strl__scene_chessboard(strl__scene_run *run, strl_error *err)
 {
     const uint64_t fields = run->desc->triangles / 2, columns = columns_of(fields);
-    const field_batch batch = {strl__alloc(BATCH * CORNERS, RECORD_BYTES), strl__alloc(BATCH, 6 * sizeof *batch.corners)};
+    const field_batch batch = {strl__alloc(BATCH * CORNERS, RECORD_BYTES),
+                               strl__alloc(BATCH, 6 * sizeof *batch.corners)};
     strl_status status = batch.records && batch.corners
                              ? write_fields(run, &batch, columns, fields / columns, err)
                              : strl__fail(err, STRL_ERR_MEMORY, "no memory for some fields of the chessboard");
@@ -115,12 +120,14 @@ static strl_status make_tile(board *self, bool upper, bool right, strl_error *er
 }
 
 /* From the given tile of its row on. */
-static strl_status put_tiles(board *self, const board_tile *tile, uint64_t row, uint64_t first, uint32_t count, strl_error *err)
+static strl_status put_tiles(board *self, const board_tile *tile, uint64_t row, uint64_t first, uint32_t count,
+                             strl_error *err)
 {
     static const char *const names[SHADES] = {"BLACK-FIELDS", "WHITE-FIELDS"};
     strl_status status = STRL_OK;
     for (uint32_t i = 0; i < count; i++)
-        self->copies[i] = strl__copy_upright((const double[3]){(double)((first + i) * TILE), (double)(row * TILE), 0}, 0, 1);
+        self->copies[i] =
+            strl__copy_upright((const double[3]){(double)((first + i) * TILE), (double)(row * TILE), 0}, 0, 1);
     for (unsigned shade = 0; shade < SHADES && status == STRL_OK; shade++) {
         const strl__part part = {names[shade], shade, strl__affine_identity(), &tile->shade[shade]};
         if (count && part.mesh->triangle_count)
@@ -152,7 +159,8 @@ strl_status strl__scene_chessboard_copies(strl__scene_run *run, strl_error *err)
     const strl__affine upright = {.axis = {{1, 0, 0}, {0, 0, -1}, {0, 1, 0}}}; /* glTF has y up */
     const strl__affine unit = {.axis = {{1 / (double)columns, 0, 0}, {0, 1 / (double)rows, 0}, {0, 0, 1}}};
     strl__parts_writer *parts = run->parts;
-    board self = {.run = run, .columns = columns, .rows = rows, .copies = strl__alloc(columns / TILE + 1, sizeof *self.copies)};
+    board self = {
+        .run = run, .columns = columns, .rows = rows, .copies = strl__alloc(columns / TILE + 1, sizeof *self.copies)};
     strl_status status = self.copies ? parts->open_group(parts, "CHESSBOARD", &upright, err)
                                      : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for copies", run->desc->path);
     if (status == STRL_OK)

@@ -1,8 +1,8 @@
 /* Scene `isosurface`: the zero level of mixing_field.h by marching cubes, tile by tile.
  *
- * Tiles are extracted in any order by all threads and numbered and written in the order x, y, z (z fastest) by one. Of the
- * tiles that are written only the starts of their shared blocks are kept, for the current layer in x and the one before it:
- * memory grows with a layer's tiles (200 KB for a billion triangles), not with the surface. */
+ * Tiles are extracted in any order by all threads and numbered and written in the order x, y, z (z fastest) by one. Of
+ * the tiles that are written only the starts of their shared blocks are kept, for the current layer in x and the one
+ * before it: memory grows with a layer's tiles (200 KB for a billion triangles), not with the surface. */
 #include "scenes/generator.h"
 
 #include <inttypes.h>
@@ -47,7 +47,8 @@ static strl_status extract_tile(void *context, uint64_t index, unsigned slot, un
                               &run->surface.table, &run->surface.scratch[worker], &run->meshes[slot], err);
 }
 
-/* The start of a block of the neighbour below along the axes in the mask; 0 where there is none (and no corner names it). */
+/* The start of a block of the neighbour below along the axes in the mask; 0 where there is none (and no corner names
+ * it). */
 static uint64_t start_below(const extraction_run *run, const uint64_t tile[3], unsigned axes, unsigned block)
 {
     uint64_t neighbour[3];

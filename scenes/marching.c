@@ -29,8 +29,8 @@ static void edge_middle(unsigned edge, int middle[3])
     middle[second] = 2 * (int)(edge >> 1 & 1);
 }
 
-/* Length of the chord between two edges' middles, squared; a forbidden one (both on one face of the cube) costs more than all
- * the allowed ones of a loop. */
+/* Length of the chord between two edges' middles, squared; a forbidden one (both on one face of the cube) costs more
+ * than all the allowed ones of a loop. */
 static int chord_cost(unsigned edge, unsigned other)
 {
     int a[3];

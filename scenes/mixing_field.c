@@ -12,7 +12,8 @@
 #define COLUMN_SHARE 0.6f
 #define FOCUS 5.0f /* noise is halved where the coarser field is this many of its amplitudes away from zero */
 
-/* Noise amplitude of the levels that make the large shapes; the profile rises from -1 to 1. Finer ones follow by FALLOFF. */
+/* Noise amplitude of the levels that make the large shapes; the profile rises from -1 to 1. Finer ones follow by
+ * FALLOFF. */
 static const float coarse_amplitudes[] = {0.7f, 1.6f, 2.8f, 4.4f, 4.0f};
 
 enum { COARSE_LEVELS = sizeof coarse_amplitudes / sizeof coarse_amplitudes[0] };
@@ -97,8 +98,8 @@ static void fill_coarsest(const strl__field *field, const lattice_box *box, floa
     (void)field;
 }
 
-/* Along one axis: even points are (1 6 1) / 8 of the coarse ones, odd points (1 1) / 2 (the two-scale relation). `inner` is
- * the run of floats that moves as one, `outer` how often the axis is repeated. */
+/* Along one axis: even points are (1 6 1) / 8 of the coarse ones, odd points (1 1) / 2 (the two-scale relation).
+ * `inner` is the run of floats that moves as one, `outer` how often the axis is repeated. */
 static void refine_axis(const float *in, float *out, unsigned outer, size_t inner, int64_t in_first, unsigned in_side,
                         int64_t out_first, unsigned out_side)
 {

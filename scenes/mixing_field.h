@@ -1,13 +1,14 @@
-/* The scalar field whose zero level is scene `isosurface`: a turbulent mixing layer between a light fluid below and a heavy
- * one above, as after a Richtmyer-Meshkov instability.
+/* The scalar field whose zero level is scene `isosurface`: a turbulent mixing layer between a light fluid below and a
+ * heavy one above, as after a Richtmyer-Meshkov instability.
  *
- * It is a pyramid of uniform cubic B-splines. Level 0 is a height profile plus bubbles and spikes on a coarse lattice; each
- * further level refines the lattice by two (which represents the same function exactly) and adds seeded noise of its own
- * scale, weaker by a constant factor and mostly near the interface that the coarser levels have made. So more levels are the same surface with more detail, never another one.
- * A spline stays within the range of its coefficients: boxes without surface are found early, without sampling them.
+ * It is a pyramid of uniform cubic B-splines. Level 0 is a height profile plus bubbles and spikes on a coarse lattice;
+ * each further level refines the lattice by two (which represents the same function exactly) and adds seeded noise of
+ * its own scale, weaker by a constant factor and mostly near the interface that the coarser levels have made. So more
+ * levels are the same surface with more detail, never another one. A spline stays within the range of its coefficients:
+ * boxes without surface are found early, without sampling them.
  *
- * Every sample is a pure function of (seed, levels, position): two boxes agree bit by bit where they overlap. Only additions,
- * multiplications, divisions and square roots are used, so that every machine computes the same bits. */
+ * Every sample is a pure function of (seed, levels, position): two boxes agree bit by bit where they overlap. Only
+ * additions, multiplications, divisions and square roots are used, so that every machine computes the same bits. */
 #ifndef STRL_SCENES_MIXING_FIELD_H
 #define STRL_SCENES_MIXING_FIELD_H
 
@@ -49,7 +50,8 @@ typedef struct strl__field_scratch {
 /* Distance between coefficients of the finest level; its noise has wavelengths of 2 to 3 of them. */
 double strl__field_spacing(const strl__field *field);
 
-/* Fills scratch->samples; false, and nothing filled, where no sample of the box can have another sign than the others. */
+/* Fills scratch->samples; false, and nothing filled, where no sample of the box can have another sign than the others.
+ */
 bool strl__field_sample(const strl__field *field, const strl__field_box *box, strl__field_scratch *scratch);
 
 static inline const float *strl__field_at(const strl__field_scratch *scratch, unsigned x, unsigned y, unsigned z)

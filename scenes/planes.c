@@ -1,6 +1,6 @@
-/* Scenes `painted-plane` and `plain-plane`: the unit square as a regular grid with a slight jitter inside the plane. The
- * painted one carries what a simplifier must not smear: checkers, rings, strokes like those of text and thin lines, all with
- * sharp edges. The geometry of both is the same flat square, which needs two triangles. */
+/* Scenes `painted-plane` and `plain-plane`: the unit square as a regular grid with a slight jitter inside the plane.
+ * The painted one carries what a simplifier must not smear: checkers, rings, strokes like those of text and thin lines,
+ * all with sharp edges. The geometry of both is the same flat square, which needs two triangles. */
 #include "scenes/generator.h"
 
 #include <math.h>

@@ -13,37 +13,54 @@ typedef struct scene_entry {
     strl_scene_info info;
     strl_status (*generate)(strl__scene_run *run, strl_error *err);
     strl__scene_mesh_layout layout;
-    const strl__material *materials; /* [material_count] of a scene in parts: it writes to run->parts, not to run->writer */
+    /* [material_count] of a scene in parts: it writes to run->parts, not to run->writer */
+    const strl__material *materials;
     unsigned material_count;
-    strl_status (*generate_gltf)(strl__scene_run *run, strl_error *err); /* it is in parts as glTF alone, where this writes it */
+    /* it is in parts as glTF alone, where this writes it */
+    strl_status (*generate_gltf)(strl__scene_run *run, strl_error *err);
 } scene_entry;
 
-#define SCENE(scene, text, least, most) .info = {.name = (scene), .summary = (text), .triangles_min = (least), .triangles_max = (most)}
+#define SCENE(scene, text, least, most)                                                                                \
+    .info = {.name = (scene), .summary = (text), .triangles_min = (least), .triangles_max = (most)}
 
 static const scene_entry scenes[] = {
-    {SCENE("isosurface", "turbulent mixing layer: high genus, many layers, open at its four side walls only (count within 2 %)",
-           1000, 4000000000),
+    {SCENE("isosurface",
+           "turbulent mixing layer: high genus, many layers, open at its four side walls only (count within 2 %)", 1000,
+           4000000000),
      .generate = strl__scene_isosurface, .layout = STRL__SCENE_MESH_POSITION_NORMAL},
-    {SCENE("painted-plane", "square of jittered triangles with a pattern of sharp edges in vertex colours (count within 2 %)", 1000,
+    {SCENE("painted-plane",
+           "square of jittered triangles with a pattern of sharp edges in vertex colours (count within 2 %)", 1000,
            4000000000),
      .generate = strl__scene_painted_plane, .layout = STRL__SCENE_MESH_POSITION_COLOUR},
-    {SCENE("plain-plane", "the same square in one colour", 1000, 4000000000),
-     .generate = strl__scene_plain_plane, .layout = STRL__SCENE_MESH_POSITION_COLOUR},
-    {SCENE("boxes", "separate boxes of any orientation and size in a cube (count rounded down to whole boxes)", 12, 3200000000),
+    {SCENE("plain-plane", "the same square in one colour", 1000, 4000000000), .generate = strl__scene_plain_plane,
+     .layout = STRL__SCENE_MESH_POSITION_COLOUR},
+    {SCENE("boxes", "separate boxes of any orientation and size in a cube (count rounded down to whole boxes)", 12,
+           3200000000),
      .generate = strl__scene_boxes, .layout = STRL__SCENE_MESH_POSITION},
-    {SCENE("plant", "power plant of named parts, 12 to 100,000 triangles each: pipes, vessels, steel, bolts; also as glTF and OBJ",
-           10000, 4000000000),
+    {SCENE(
+         "plant",
+         "power plant of named parts, 12 to 100,000 triangles each: pipes, vessels, steel, bolts; also as glTF and OBJ",
+         10000, 4000000000),
      .generate = strl__scene_plant, .materials = strl__plant_materials, .material_count = STRL__PLANT_MATERIALS},
-    {SCENE("chessboard", "square of fixed size whose fields are black and white pairs of triangles (whole rows of fields); as glTF copies of 64 x 64 "
-           "fields", 2,
-           1000000000),
-     .generate = strl__scene_chessboard, .layout = STRL__SCENE_MESH_POSITION_COLOUR, .materials = strl__chessboard_materials,
-     .material_count = STRL__CHESSBOARD_MATERIALS, .generate_gltf = strl__scene_chessboard_copies},
-    {SCENE("landscape", "hills, houses, a forest of detailed trees; in glTF each kind is there once and has copies, other formats have "
-           "the copies' triangles (count within 2 %)", 500000, 4000000000),
-     .generate = strl__scene_landscape, .materials = strl__landscape_materials, .material_count = STRL__LANDSCAPE_MATERIALS},
-    {.info = {.name = "array", .summary = "--copies of the model --of FILE on a square grid, turned at random, as glTF with one mesh",
-              .triangles_max = UINT64_MAX, .copies = true}},
+    {SCENE(
+         "chessboard",
+         "square of fixed size whose fields are black and white pairs of triangles (whole rows of fields); as glTF copies of 64 x 64 "
+         "fields",
+         2, 1000000000),
+     .generate = strl__scene_chessboard, .layout = STRL__SCENE_MESH_POSITION_COLOUR,
+     .materials = strl__chessboard_materials, .material_count = STRL__CHESSBOARD_MATERIALS,
+     .generate_gltf = strl__scene_chessboard_copies},
+    {SCENE(
+         "landscape",
+         "hills, houses, a forest of detailed trees; in glTF each kind is there once and has copies, other formats have "
+         "the copies' triangles (count within 2 %)",
+         500000, 4000000000),
+     .generate = strl__scene_landscape, .materials = strl__landscape_materials,
+     .material_count = STRL__LANDSCAPE_MATERIALS},
+    {.info = {.name = "array",
+              .summary = "--copies of the model --of FILE on a square grid, turned at random, as glTF with one mesh",
+              .triangles_max = UINT64_MAX,
+              .copies = true}},
 };
 
 enum { SCENE_COUNT = sizeof scenes / sizeof scenes[0] };

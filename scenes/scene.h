@@ -1,6 +1,6 @@
-/* Seeded models for tests and benchmarks, streamed into a binary PLY or STL file, or, where they have parts, into glTF or
- * OBJ files, of any size in constant memory.
- * The name, the count and the seed fix every byte of the file, on every machine and for every number of threads. */
+/* Seeded models for tests and benchmarks, streamed into a binary PLY or STL file, or, where they have parts, into glTF
+ * or OBJ files, of any size in constant memory. The name, the count and the seed fix every byte of the file, on every
+ * machine and for every number of threads. */
 #ifndef STRL_SCENES_SCENE_H
 #define STRL_SCENES_SCENE_H
 
@@ -14,22 +14,24 @@
 /* What to write. Zero-initialise: every 0 takes its default. */
 typedef struct strl_scene_desc {
     const char *name; /* one of strl_scene_info's names */
-    const char
-        *path; /* the output, .ply or .stl, of parts .gltf or .obj too, of the chessboard .gltf; appears, or replaces an older file, when it is
-                * whole (platform/output.h). NAME.gltf comes with NAME_000.bin and so on, NAME.obj with NAME.mtl; the
-                * file that names the others is renamed last */
-    const char *of;        /* of the array: the file that is copied, of any kind that readers know. What it places itself is written
-                            * out; refused where meshes of 256 triangles or more become more than ten times as many by that */
-    uint64_t copies;       /* of the array; 0 = 100 */
-    const char *importer;  /* of the array: the program that reads foreign formats (readers/reader.h) */
-    uint64_t triangles; /* wanted; 0 = 1,000,000. strl_scene_info says how closely a scene keeps to it */
+    /* the output, .ply or .stl, of parts .gltf or .obj too, of the chessboard .gltf; appears, or replaces an older
+     * file, when it is whole (platform/output.h). NAME.gltf comes with NAME_000.bin and so on, NAME.obj with
+     * NAME.mtl; the file that names the others is renamed last */
+    const char *path;
+    /* of the array: the file that is copied, of any kind that readers know. What it places itself is written out;
+     * refused where meshes of 256 triangles or more become more than ten times as many by that */
+    const char *of;
+    uint64_t copies;      /* of the array; 0 = 100 */
+    const char *importer; /* of the array: the program that reads foreign formats (readers/reader.h) */
+    uint64_t triangles;   /* wanted; 0 = 1,000,000. strl_scene_info says how closely a scene keeps to it */
     uint64_t seed;
     uint64_t memory_bytes; /* budget of the buffers; 0 = 256 MiB */
     strl_pool *pool;       /* borrowed; NULL = the caller's thread alone */
     strl_cancel *cancel;   /* may be NULL */
     bool no_normals;       /* leave nx ny nz out, where the scene has them; STL has none of vertices */
     uint64_t buffer_bytes; /* most bytes of one .bin of glTF, unless one part is larger; 0 = 256 MiB */
-    bool shuffle;          /* vertices and triangles of PLY, triangles of STL, in a random order that the seed fixes */
+    /* vertices and triangles of PLY, triangles of STL, in a random order that the seed fixes */
+    bool shuffle;
 } strl_scene_desc;
 
 /* Called on the caller's thread. done and total are items of one phase (tiles, rows); false cancels. */

@@ -1,9 +1,8 @@
-/* Streams an indexed triangle mesh into a binary little-endian PLY or STL file, in the order given or in a seeded random
- * one. PLY wants its counts first and all vertices before the faces, STL wants each triangle with its corners: what cannot
- * be written yet waits in spills beside the output, and the header, of a fixed length, comes last. The output appears by
- * the final rename.
- * Order of calls: create, any mix of vertices and triangles, then finish; destroy always (without finish it removes
- * everything). A triangle may name vertices that come after it. */
+/* Streams an indexed triangle mesh into a binary little-endian PLY or STL file, in the order given or in a seeded
+ * random one. PLY wants its counts first and all vertices before the faces, STL wants each triangle with its corners:
+ * what cannot be written yet waits in spills beside the output, and the header, of a fixed length, comes last. The
+ * output appears by the final rename. Order of calls: create, any mix of vertices and triangles, then finish; destroy
+ * always (without finish it removes everything). A triangle may name vertices that come after it. */
 #ifndef STRL_SCENES_SCENE_MESH_H
 #define STRL_SCENES_SCENE_MESH_H
 

@@ -1,8 +1,9 @@
 /* See shuffle.h.
  *
- * Two passes, so that a disk is never asked for one record at a time. The output is cut into windows that fit in memory. How
- * many records fall into each is known beforehand, so one spill holds all windows side by side: the first pass appends
- * each record with its place to its window, the second loads one window after the other and lays its records out. */
+ * Two passes, so that a disk is never asked for one record at a time. The output is cut into windows that fit in
+ * memory. How many records fall into each is known beforehand, so one spill holds all windows side by side: the first
+ * pass appends each record with its place to its window, the second loads one window after the other and lays its
+ * records out. */
 #include "scenes/shuffle.h"
 
 #include <inttypes.h>

@@ -2,8 +2,8 @@
 """Runs the whole suite: what `make test` does once the packages are there.
 
 Four stages: the suite as gcc builds it with warnings as errors; the suite under AddressSanitizer and UBSan; the tests of
-threaded modules under ThreadSanitizer; a build by clang as a compile check. Every stage runs, whatever became of the one
-before it. The last line counts all of them: "N passed, N failed, N skipped".
+threaded modules under ThreadSanitizer; a build by clang as a compile check, and whether all C is laid out as .clang-format
+says. Every stage runs, whatever became of the one before it. The last line counts all of them: "N passed, N failed, N skipped".
 
     tools/run_tests.py [STAGE...] [--jobs N] [--only REGEX]       stages: gcc asan tsan clang
 """
@@ -46,6 +46,7 @@ STAGES = {
 }
 # Nothing of clang's is run: its warnings are the same without optimising.
 UNOPTIMISED = ("clang",)
+FORMAT_VERSION = "14" # of clang-format: others lay some lines out in another way
 FOLDERS = {"gcc": "test", "asan": "asan", "tsan": "tsan", "clang": "clang"}
 
 
@@ -143,6 +144,24 @@ def test(stage, jobs, only):
     return counts
 
 
+def check_format():
+    """Whether clang-format would change nothing."""
+    counts = Counts()
+    try:
+        version = subprocess.run(["clang-format", "--version"], capture_output=True, text=True, check=True).stdout
+    except (OSError, subprocess.CalledProcessError) as error:
+        version = str(error)
+    if not re.search(rf"version {FORMAT_VERSION}\.", version):
+        print(f"run_tests: the layout of C is not checked: that takes clang-format {FORMAT_VERSION} ({version.strip()})", file=sys.stderr)
+        counts.skipped = 1
+    elif run(["make", "format-check"]):
+        counts.passed = 1
+    else:
+        print("run_tests: `make format` lays it out", file=sys.stderr)
+        counts.failed = 1
+    return counts
+
+
 def run_stage(stage, options):
     targets, only = [], options.only
     if stage == "tsan":
@@ -156,6 +175,7 @@ def run_stage(stage, options):
         counts.failed = 1
     elif stage == "clang":
         counts.passed = 1
+        counts.add(check_format())
     else:
         counts = test(stage, options.jobs, only)
     return counts

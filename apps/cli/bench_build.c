@@ -209,7 +209,7 @@ typedef struct payload_set {
     size_t size, capacity;
     strl_node *nodes; /* [count], owned */
     size_t count, node_capacity;
-    strl_pm *meshes;  /* [count], by which the children are decoded; owned with what they point at */
+    strl_pm *meshes; /* [count], by which the children are decoded; owned with what they point at */
     strl_arena arena;
 } payload_set;
 
@@ -241,8 +241,8 @@ static strl_status load_payloads(payload_set *set, const char *path, strl_error 
 }
 
 /* A payload is told by its parent's mesh, whose id is lower. */
-static strl_status decode_payload(const payload_set *set, size_t index, const uint8_t *payload, strl_arena *arena, strl_pm *mesh,
-                                  strl_error *err)
+static strl_status decode_payload(const payload_set *set, size_t index, const uint8_t *payload, strl_arena *arena,
+                                  strl_pm *mesh, strl_error *err)
 {
     const strl_node *node = &set->nodes[index];
     strl_payload_reference reference, *given = NULL;
@@ -258,7 +258,8 @@ static strl_status keep_meshes(payload_set *set, strl_error *err)
 {
     const uint8_t *payload = set->bytes;
     set->meshes = strl__alloc_zero(set->count, sizeof *set->meshes);
-    strl_status status = set->meshes ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu meshes", set->count);
+    strl_status status =
+        set->meshes ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu meshes", set->count);
     for (size_t i = 0; status == STRL_OK && i < set->count; i++) {
         status = decode_payload(set, i, payload, &set->arena, &set->meshes[i], err);
         payload += set->nodes[i].payload_bytes;

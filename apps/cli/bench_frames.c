@@ -133,8 +133,9 @@ static void write_note(const walk_bench *self, strl_cull cull, strl_bench_figure
 {
     static const char *const backends[] = {
         [STRL_BACKEND_GL45] = "gl45", [STRL_BACKEND_GL3] = "gl3", [STRL_BACKEND_NULL] = "null"};
-    int used = snprintf(figure->note, sizeof figure->note, "%ux%u at 1 px%s, %s", image_size[0], image_size[1],
-                        cull == STRL_CULL_BACK ? " without back faces" : "", backends[strl_renderer_backend(self->target)]);
+    int used =
+        snprintf(figure->note, sizeof figure->note, "%ux%u at 1 px%s, %s", image_size[0], image_size[1],
+                 cull == STRL_CULL_BACK ? " without back faces" : "", backends[strl_renderer_backend(self->target)]);
     if (self->target != self->null)
         used += snprintf(figure->note + used, sizeof figure->note - (size_t)used, ": %.80s",
                          strl_renderer_device(self->target));

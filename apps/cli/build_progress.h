@@ -1,6 +1,6 @@
 /* What `stroll build` tells while it works: before the inputs are read what the build will take, then a line that says
- * stage, share, rate, time left, memory and scratch. On a terminal the line stands still and changes; elsewhere, in a log,
- * one is written each minute, so a short build says nothing. Silent under --quiet. */
+ * stage, share, rate, time left, memory and scratch. On a terminal the line stands still and changes; elsewhere, in a
+ * log, one is written each minute, so a short build says nothing. Silent under --quiet. */
 #ifndef STRL_CLI_BUILD_PROGRESS_H
 #define STRL_CLI_BUILD_PROGRESS_H
 

@@ -193,7 +193,8 @@ static int run(strl_cli_args *args)
         stop = choose(args, &names, &wanted);
     if (stop >= 0)
         return stop;
-    strl_bench bench = {.triangles = triangles, .runs = (unsigned)runs, .jobs = (unsigned)jobs, .cull = (strl_cull)cull};
+    strl_bench bench = {
+        .triangles = triangles, .runs = (unsigned)runs, .jobs = (unsigned)jobs, .cull = (strl_cull)cull};
     return run_and_print(args, &bench, wanted, parent, json);
 }
 

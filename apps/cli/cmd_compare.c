@@ -220,9 +220,9 @@ static void print_json(const compare_options *o, const compare_totals *t, bool h
            ",\"visibly_differing_pixels\":%" PRIu64
            ",\"depth_within\":%.8f,\"worst_depth_frame\":%zu,\"psnr_min_db\":%.4f,\"psnr_median_db\":%.4f,"
            "\"worst_psnr_frame\":%zu,\"least_psnr_db\":%.6g,\"holds\":%s}\n",
-           t->frames, o->error_px, t->uncovered, t->overcovered, t->worst_coverage_frame, t->both, t->either, t->differing, t->visibly_differing, depth_share(t),
-           t->worst_depth_frame, t->psnr_least, t->psnr_median, t->worst_psnr_frame, o->least_psnr_db,
-           holds ? "true" : "false");
+           t->frames, o->error_px, t->uncovered, t->overcovered, t->worst_coverage_frame, t->both, t->either,
+           t->differing, t->visibly_differing, depth_share(t), t->worst_depth_frame, t->psnr_least, t->psnr_median,
+           t->worst_psnr_frame, o->least_psnr_db, holds ? "true" : "false");
 }
 
 static void print_text(const compare_totals *t)
@@ -232,23 +232,37 @@ static void print_text(const compare_totals *t)
            t->overcovered, t->worst_coverage_frame);
     printf("depth     %.4f %% of %" PRIu64 " pixels within the range (worst frame %zu)\n", 100 * depth_share(t),
            t->both, t->worst_depth_frame);
-    printf("colour    PSNR median %.2f dB, least %.2f dB (frame %zu); %.2f %% of the covered pixels differ, %.2f %% by more than 16 of 255\n",
-           t->psnr_median, t->psnr_least, t->worst_psnr_frame, 100 * (double)t->differing / (double)t->either,
-           100 * (double)t->visibly_differing / (double)t->either);
+    printf(
+        "colour    PSNR median %.2f dB, least %.2f dB (frame %zu); %.2f %% of the covered pixels differ, %.2f %% by more than 16 of 255\n",
+        t->psnr_median, t->psnr_least, t->worst_psnr_frame, 100 * (double)t->differing / (double)t->either,
+        100 * (double)t->visibly_differing / (double)t->either);
 }
 
 static int run(strl_cli_args *args)
 {
     compare_options o = {.error_px = 1, .least_psnr_db = DEFAULT_PSNR_DB};
     const strl_cli_option options[] = {
-        {.name = "error", .kind = STRL_CLI_REAL, .value = &o.error_px, .argument = "PX",
-         .help = "pixel error that DIR_B was drawn with (1)", .least = 1e-6, .most = 1e6},
-        {.name = "psnr", .kind = STRL_CLI_REAL, .value = &o.least_psnr_db, .argument = "DB",
-         .help = "least median PSNR, meant for --supersample 4 (30)", .least = 0, .most = 100},
+        {.name = "error",
+         .kind = STRL_CLI_REAL,
+         .value = &o.error_px,
+         .argument = "PX",
+         .help = "pixel error that DIR_B was drawn with (1)",
+         .least = 1e-6,
+         .most = 1e6},
+        {.name = "psnr",
+         .kind = STRL_CLI_REAL,
+         .value = &o.least_psnr_db,
+         .argument = "DB",
+         .help = "least median PSNR, meant for --supersample 4 (30)",
+         .least = 0,
+         .most = 100},
         {.name = "json", .kind = STRL_CLI_FLAG, .value = &o.json, .help = "print one JSON object"},
     };
     const strl_cli_usage usage = {
-        .positional = "DIR_A DIR_B", .least = 2, .most = 2, .options = options,
+        .positional = "DIR_A DIR_B",
+        .least = 2,
+        .most = 2,
+        .options = options,
         .option_count = STRL_CLI_COUNT_OF(options),
         .notes = "Both are folders that `stroll render --depth` wrote with the same cameras; DIR_A is the reference.\n"
                  "Limits: where the 5x5 neighbourhood of a pixel is wholly covered (background) in A, the pixel is "

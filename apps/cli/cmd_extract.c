@@ -23,7 +23,7 @@
 typedef struct extraction {
     strl_container *container; /* owned, as all below */
     strl_output *output;
-    strl_file *out, *spill; /* out: the output's; borrowed */
+    strl_file *out, *spill;          /* out: the output's; borrowed */
     strl_writer vertices, triangles; /* of the node at hand */
     uint16_t *map;
     strl_arena arena;
@@ -35,8 +35,8 @@ typedef struct extraction {
     strl_cli_progress line;
 } extraction;
 
-/* How far apart two points a unit or more apart along some axis are at least once they are placed, along some axis of the
- * world: 1 / the greatest sum over a row of the inverse. */
+/* How far apart two points a unit or more apart along some axis are at least once they are placed, along some axis of
+ * the world: 1 / the greatest sum over a row of the inverse. */
 static double least_gap(const double m[12])
 {
     double sums = 0, determinant = 0;

@@ -15,7 +15,7 @@
 
 typedef struct level_facts {
     uint64_t nodes, vertices, base_vertices, shared_vertices, triangles, base_triangles, steps;
-    uint64_t rungs[STRL_RUNG_SAMPLED + 1];    /* nodes */
+    uint64_t rungs[STRL_RUNG_SAMPLED + 1];       /* nodes */
     uint64_t group_members[MOST_GROUP_SIZE + 2]; /* nodes by the size of their group; the last one: larger */
     double large_groups;                         /* groups larger than MOST_GROUP_SIZE */
     double boundary_steps;                       /* of groups: each member adds its share of the group's */
@@ -221,7 +221,8 @@ static void header_to_json(json_t *object, const strl_container *container, uint
     put_count(object, "placements", info->placement_count);
     put_count(object, "triangles_placed", placed < INT64_MAX ? placed : INT64_MAX);
     put_count(object, "triangles", strl_container_triangle_count(container));
-    json_object_set_new(object, "bytes_per_triangle", json_real(share(info->file_bytes, strl_container_triangle_count(container))));
+    json_object_set_new(object, "bytes_per_triangle",
+                        json_real(share(info->file_bytes, strl_container_triangle_count(container))));
 }
 
 static void print_header(const char *path, const strl_container *container, uint64_t placed)
@@ -236,7 +237,8 @@ static void print_header(const char *path, const strl_container *container, uint
     char unit[sizeof info->unit];
     format_unit(info, unit);
     printf("  unit %s, up %c, %s%s, %s\n", unit[0] ? unit : "unknown", "xyz"[info->up_axis],
-           info->has_colour ? "coloured" : "white", info->has_images ? ", images and texture coordinates" : "", info->closed_hint ? "input closed" : "input open");
+           info -> has_colour ? "coloured" : "white", info->has_images ? ", images and texture coordinates" : "",
+           info->closed_hint ? "input closed" : "input open");
     printf("  bounds %.9g %.9g %.9g to %.9g %.9g %.9g\n", info->bounds[0], info->bounds[1], info->bounds[2],
            info->bounds[3], info->bounds[4], info->bounds[5]);
     printf("  read %" PRIu64 " triangle%s; dropped %" PRIu64 " not finite, %" PRIu64 " degenerate; skipped %" PRIu64

@@ -87,7 +87,8 @@ static strl_status load_path(const char *file, strl_camera_path *path, strl_erro
     return status;
 }
 
-/* A path along the surface shows that to the probe: any size the renderer had is restored. *lacks: nodes that the surface was without. */
+/* A path along the surface shows that to the probe: any size the renderer had is restored. *lacks: nodes that the
+ * surface was without. */
 static strl_status make_path(const render_options *o, strl_render_model *model, strl_renderer *renderer,
                              strl_camera_path *path, uint32_t *lacks, strl_error *err)
 {
@@ -126,8 +127,8 @@ typedef struct lacking_images {
     uint32_t most_nodes; /* that one of them lacks */
 } lacking_images;
 
-/* What failed and was there in the end is in the lines of --stats alone. Without waiting something is always on its way: there it is what
- * the last image lacks after reads that failed. */
+/* What failed and was there in the end is in the lines of --stats alone. Without waiting something is always on its
+ * way: there it is what the last image lacks after reads that failed. */
 static void count_lacking(const render_options *o, const strl_image_stats *stats, lacking_images *lacking)
 {
     if (o->realtime)
@@ -139,8 +140,8 @@ static void count_lacking(const render_options *o, const strl_image_stats *stats
 }
 
 /* The images are written all the same. Whoever waits for them was promised all of it: a failure. */
-static strl_status judge(const render_options *o, size_t frames, const strl_image_stats *last, const lacking_images *lacking,
-                         const strl_cli_coarse *coarse, strl_error *err)
+static strl_status judge(const render_options *o, size_t frames, const strl_image_stats *last,
+                         const lacking_images *lacking, const strl_cli_coarse *coarse, strl_error *err)
 {
     if (!o->quiet)
         strl_cli_coarse_report(coarse, o->memory_bytes);
@@ -150,13 +151,16 @@ static strl_status judge(const render_options *o, size_t frames, const strl_imag
     const char *name = strl_location_shown(o->input, shown, sizeof shown);
     if (!o->realtime)
         return strl__fail(err, STRL_ERR_IO,
-                          "%s: %" PRIu64 " of %zu frame%s coarser than asked for, %" PRIu32 " node%s could not be read, the last fault: %.200s",
+                          "%s: %" PRIu64 " of %zu frame%s coarser than asked for, %" PRIu32
+                          " node%s could not be read, the last fault: %.200s",
                           name, lacking->frames, frames, frames == 1 ? " is" : "s are", lacking->most_nodes,
                           strl_cli_plural(lacking->most_nodes), last->last_fault);
     if (!o->quiet)
-        fprintf(stderr, "stroll: %s: the last frame is without %" PRIu32 " node%s that had not come; %" PRIu64 " read%s failed before it, the last because %s\n",
-                name, lacking->most_nodes, strl_cli_plural(lacking->most_nodes), last->faults, strl_cli_plural(last->faults),
-                last->last_fault);
+        fprintf(stderr,
+                "stroll: %s: the last frame is without %" PRIu32 " node%s that had not come; %" PRIu64
+                " read%s failed before it, the last because %s\n",
+                name, lacking->most_nodes, strl_cli_plural(lacking->most_nodes), last->faults,
+                strl_cli_plural(last->faults), last->last_fault);
     return STRL_OK;
 }
 
@@ -173,8 +177,12 @@ static strl_status render_frames(const render_options *o, strl_render_model *mod
 {
     strl_render_output output;
     strl_draw_options options = draw_options(o, model);
-    strl_render_output_desc desc = {.path = o->output, .stats = o->stats, .depth = o->depth,
-                                    .realtime = o->realtime, .size = {o->size[0], o->size[1]}, .cameras = path};
+    strl_render_output_desc desc = {.path = o->output,
+                                    .stats = o->stats,
+                                    .depth = o->depth,
+                                    .realtime = o->realtime,
+                                    .size = {o->size[0], o->size[1]},
+                                    .cameras = path};
     memcpy(desc.background, options.background, sizeof desc.background);
     strl_status status = strl_render_output_init(&output, &desc, err);
     if (status != STRL_OK)
@@ -219,22 +227,28 @@ static strl_status check_outputs(const render_options *o, strl_error *err)
     return status;
 }
 
-static strl_status open_renderer(const render_options *o, uint64_t supersample, strl_renderer **renderer, strl_error *err)
+static strl_status open_renderer(const render_options *o, uint64_t supersample, strl_renderer **renderer,
+                                 strl_error *err)
 {
     static const strl_backend backends[] = {STRL_BACKEND_DEFAULT, STRL_BACKEND_GL45, STRL_BACKEND_GL3,
                                             STRL_BACKEND_NULL, STRL_BACKEND_GL3};
-    const strl_renderer_desc desc = {.backend = backends[o->backend], .gles = o->backend == BACKEND_GLES,
-                                     .width = o->size[0], .height = o->size[1],
+    const strl_renderer_desc desc = {.backend = backends[o->backend],
+                                     .gles = o->backend == BACKEND_GLES,
+                                     .width = o->size[0],
+                                     .height = o->size[1],
                                      .supersample = (uint32_t)supersample,
                                      .gpu_memory_bytes = o->gpu_memory_bytes};
     return strl_renderer_create(&desc, renderer, err);
 }
 
-/* A path along the surface of a container is one for all that render it, however they draw it: it is made in a walk of its own, with
- * the defaults, that waits for all it wants, and is none where the walk can't have that. Others are made round the model that is drawn. */
-static strl_status survey_path(const render_options *o, const strl_location *location, strl_camera_path *path, strl_error *err)
+/* A path along the surface of a container is one for all that render it, however they draw it: it is made in a walk of
+ * its own, with the defaults, that waits for all it wants, and is none where the walk can't have that. Others are made
+ * round the model that is drawn. */
+static strl_status survey_path(const render_options *o, const strl_location *location, strl_camera_path *path,
+                               strl_error *err)
 {
-    const strl_render_model_desc desc = {.location = *location, .error_px = 1, .splat_px = 1, .memory_bytes = DEFAULT_MEMORY_BYTES};
+    const strl_render_model_desc desc = {
+        .location = *location, .error_px = 1, .splat_px = 1, .memory_bytes = DEFAULT_MEMORY_BYTES};
     uint32_t lacks = 0;
     strl_render_model *model = NULL;
     strl_renderer *renderer = NULL;
@@ -253,9 +267,11 @@ static strl_status survey_path(const render_options *o, const strl_location *loc
     strl_renderer_destroy(renderer);
     char shown[SHOWN_BYTES];
     if (status == STRL_OK && lacks)
-        return strl__fail(err, STRL_ERR_IO,
-                          "%s: %" PRIu32 " node%s of the surface that --path %s goes along could not be read: try again, or give a path file",
-                          strl_location_shown(o->input, shown, sizeof shown), lacks, strl_cli_plural(lacks), o->path);
+        return strl__fail(
+            err, STRL_ERR_IO,
+            "%s: %" PRIu32
+            " node%s of the surface that --path %s goes along could not be read: try again, or give a path file",
+            strl_location_shown(o->input, shown, sizeof shown), lacks, strl_cli_plural(lacks), o->path);
     return status;
 }
 
@@ -266,8 +282,13 @@ static strl_status render(render_options *o, strl_cli_progress *progress, bool *
     strl_renderer *renderer = NULL;
     strl_camera_path path = {0};
     uint32_t lacks; /* of the surface of what is no container: nothing */
-    strl_render_model_desc desc = {.full = o->full, .realtime = o->realtime, .error_px = o->error_px, .splat_px = o->splat_px,
-                                   .cull = (strl_cull)o->cull, .memory_bytes = o->memory_bytes, .progress = progress};
+    strl_render_model_desc desc = {.full = o->full,
+                                   .realtime = o->realtime,
+                                   .error_px = o->error_px,
+                                   .splat_px = o->splat_px,
+                                   .cull = (strl_cull)o->cull,
+                                   .memory_bytes = o->memory_bytes,
+                                   .progress = progress};
     strl_cli_catch_interrupts();
     strl_status status = check_outputs(o, err);
     if (status == STRL_OK)
@@ -319,56 +340,129 @@ static int check(const strl_cli_args *args, const render_options *o)
 static int parse(strl_cli_args *args, render_options *o)
 {
     const strl_cli_option options[] = {
-        {.name = "camera", .kind = STRL_CLI_STRING, .value = &o->camera, .argument = "SPEC",
+        {.name = "camera",
+         .kind = STRL_CLI_STRING,
+         .value = &o->camera,
+         .argument = "SPEC",
          .help = "one image: \"eye x y z target x y z up x y z fov DEG\" (the orbit's first frame)"},
-        {.name = "path", .kind = STRL_CLI_STRING, .value = &o->path, .argument = "FILE|orbit|walk|flythrough",
-         .help = "many images; walk and flythrough go along the surface, of a container in the same places however it is drawn"},
-        {.name = "frames", .kind = STRL_CLI_COUNT, .value = &o->frames, .given = &o->frames_given,
-         .help = "of a named path (60)", .least = 1, .most = 1e6},
+        {.name = "path",
+         .kind = STRL_CLI_STRING,
+         .value = &o->path,
+         .argument = "FILE|orbit|walk|flythrough",
+         .help =
+             "many images; walk and flythrough go along the surface, of a container in the same places however it is drawn"},
+        {.name = "frames",
+         .kind = STRL_CLI_COUNT,
+         .value = &o->frames,
+         .given = &o->frames_given,
+         .help = "of a named path (60)",
+         .least = 1,
+         .most = 1e6},
         {.name = "seed", .kind = STRL_CLI_COUNT, .value = &o->seed, .help = "of a named path (1)"},
-        {.name = "save-path", .kind = STRL_CLI_STRING, .value = &o->save_path, .argument = "FILE",
+        {.name = "save-path",
+         .kind = STRL_CLI_STRING,
+         .value = &o->save_path,
+         .argument = "FILE",
          .help = "write the cameras as JSON, for --path of another render"},
         {.name = "size", .kind = STRL_CLI_SIZE, .value = o->size, .help = "pixels of an image (1280x720)"},
-        {.name = "error", .kind = STRL_CLI_REAL, .value = &o->error_px, .argument = "PX",
-         .help = "allowed pixel error (1)", .least = 1e-6, .most = 1e6},
-        {.name = "splat", .kind = STRL_CLI_REAL, .value = &o->splat_px, .argument = "PX",
-         .help = "of sample trees: cells that cover no more than PX x PX pixels are drawn as splats of that size, which is the error that "
-                 "they are allowed then (as --error)",
-         .least = 1, .most = 64},
-        {.name = "cull", .kind = STRL_CLI_ENUM, .value = &o->cull, .argument = "none|back",
+        {.name = "error",
+         .kind = STRL_CLI_REAL,
+         .value = &o->error_px,
+         .argument = "PX",
+         .help = "allowed pixel error (1)",
+         .least = 1e-6,
+         .most = 1e6},
+        {.name = "splat",
+         .kind = STRL_CLI_REAL,
+         .value = &o->splat_px,
+         .argument = "PX",
+         .help =
+             "of sample trees: cells that cover no more than PX x PX pixels are drawn as splats of that size, which is the error that "
+             "they are allowed then (as --error)",
+         .least = 1,
+         .most = 64},
+        {.name = "cull",
+         .kind = STRL_CLI_ENUM,
+         .value = &o->cull,
+         .argument = "none|back",
          .help = "faces not to be drawn: back = those whose corners come clockwise as seen; for closed models (none)"},
-        {.name = "full", .kind = STRL_CLI_FLAG, .value = &o->full,
+        {.name = "full",
+         .kind = STRL_CLI_FLAG,
+         .value = &o->full,
          .help = "the finest level of a container; the triangles of a mesh file as read, held in memory"},
-        {.name = "realtime", .kind = STRL_CLI_REAL, .value = &o->fps, .argument = "FPS", .given = &o->realtime,
-         .value_optional = true, .help = "never wait for bytes; keep this rate (60)", .least = 1e-3, .most = 1e6},
-        {.name = "no-occlusion", .kind = STRL_CLI_FLAG, .value = &o->no_occlusion,
+        {.name = "realtime",
+         .kind = STRL_CLI_REAL,
+         .value = &o->fps,
+         .argument = "FPS",
+         .given = &o->realtime,
+         .value_optional = true,
+         .help = "never wait for bytes; keep this rate (60)",
+         .least = 1e-3,
+         .most = 1e6},
+        {.name = "no-occlusion",
+         .kind = STRL_CLI_FLAG,
+         .value = &o->no_occlusion,
          .help = "draw hidden nodes too (always so in this version)"},
-        {.name = "memory", .letter = 'm', .kind = STRL_CLI_BYTES, .value = &o->memory_bytes,
-         .help = "decoded nodes held (512M)", .least = 1 << 20, .most = 0x1p50},
-        {.name = "gpu-memory", .kind = STRL_CLI_BYTES, .value = &o->gpu_memory_bytes,
-         .help = "buffers of nodes (512M)", .least = STRL_RENDERER_LEAST_GPU_BYTES, .most = 0x1p50},
-        {.name = "supersample", .kind = STRL_CLI_COUNT, .value = &o->supersample, .argument = "K",
-         .help = "draw K times wider and higher, filter in linear light (1)", .least = 1, .most = 8},
-        {.name = "depth", .kind = STRL_CLI_FLAG, .value = &o->depth,
+        {.name = "memory",
+         .letter = 'm',
+         .kind = STRL_CLI_BYTES,
+         .value = &o->memory_bytes,
+         .help = "decoded nodes held (512M)",
+         .least = 1 << 20,
+         .most = 0x1p50},
+        {.name = "gpu-memory",
+         .kind = STRL_CLI_BYTES,
+         .value = &o->gpu_memory_bytes,
+         .help = "buffers of nodes (512M)",
+         .least = STRL_RENDERER_LEAST_GPU_BYTES,
+         .most = 0x1p50},
+        {.name = "supersample",
+         .kind = STRL_CLI_COUNT,
+         .value = &o->supersample,
+         .argument = "K",
+         .help = "draw K times wider and higher, filter in linear light (1)",
+         .least = 1,
+         .most = 8},
+        {.name = "depth",
+         .kind = STRL_CLI_FLAG,
+         .value = &o->depth,
          .help = "write linear depth too: frame_00000.pfm, 32-bit floats, infinity = background"},
-        {.name = "output", .letter = 'o', .kind = STRL_CLI_STRING, .value = &o->output, .argument = "PNG or DIR",
+        {.name = "output",
+         .letter = 'o',
+         .kind = STRL_CLI_STRING,
+         .value = &o->output,
+         .argument = "PNG or DIR",
          .help = "where images go: frame_00000.png ..., contact.png and path.json in a folder"},
-        {.name = "stats", .kind = STRL_CLI_STRING, .value = &o->stats, .argument = "FILE.jsonl",
+        {.name = "stats",
+         .kind = STRL_CLI_STRING,
+         .value = &o->stats,
+         .argument = "FILE.jsonl",
          .help = "one JSON object a frame"},
         STRL_CLI_REMOTE_OPTIONS(&o->remote),
-        {.name = "backend", .kind = STRL_CLI_ENUM, .value = &o->backend, .argument = backend_words,
+        {.name = "backend",
+         .kind = STRL_CLI_ENUM,
+         .value = &o->backend,
+         .argument = backend_words,
          .help = "what draws (auto)"},
-        {.name = "debug", .kind = STRL_CLI_ENUM, .value = &o->debug, .argument = "none|cluster|level|error",
+        {.name = "debug",
+         .kind = STRL_CLI_ENUM,
+         .value = &o->debug,
+         .argument = "none|cluster|level|error",
          .help = "colour by it (none)"},
         {.name = "wireframe", .kind = STRL_CLI_FLAG, .value = &o->wireframe, .help = "edges only"},
         {.name = "flat", .kind = STRL_CLI_FLAG, .value = &o->flat, .help = "normals of triangles instead of vertices"},
     };
     const strl_cli_usage usage = {
-        .positional = "MODEL", .least = 1, .most = 1, .options = options, .option_count = STRL_CLI_COUNT_OF(options),
-        .notes = "MODEL is a container, as a file or behind http:// or https://, or with --full also a PLY, STL, OBJ or glTF\n"
-                 "file. In the lines of --stats max_error_px is the largest pixel error of what was drawn, of splats their\n"
-                 "size, and null where the eye is inside a node's box: no pixel error bounds what is that near. allowed_error_px\n"
-                 "is --error, or more where --memory is short."};
+        .positional = "MODEL",
+        .least = 1,
+        .most = 1,
+        .options = options,
+        .option_count = STRL_CLI_COUNT_OF(options),
+        .notes =
+            "MODEL is a container, as a file or behind http:// or https://, or with --full also a PLY, STL, OBJ or glTF\n"
+            "file. In the lines of --stats max_error_px is the largest pixel error of what was drawn, of splats their\n"
+            "size, and null where the eye is inside a node's box: no pixel error bounds what is that near. allowed_error_px\n"
+            "is --error, or more where --memory is short."};
     strl_cli_list inputs;
     int stop = strl_cli_parse(args, &usage, &inputs);
     if (stop >= 0)
@@ -380,8 +474,14 @@ static int parse(strl_cli_args *args, render_options *o)
 
 static int run(strl_cli_args *args)
 {
-    render_options o = {.frames = 60, .seed = 1, .supersample = 1, .memory_bytes = DEFAULT_MEMORY_BYTES,
-                        .gpu_memory_bytes = 512ull << 20, .size = {1280, 720}, .error_px = 1, .fps = DEFAULT_FPS,
+    render_options o = {.frames = 60,
+                        .seed = 1,
+                        .supersample = 1,
+                        .memory_bytes = DEFAULT_MEMORY_BYTES,
+                        .gpu_memory_bytes = 512ull << 20,
+                        .size = {1280, 720},
+                        .error_px = 1,
+                        .fps = DEFAULT_FPS,
                         .begun_ns = strl_clock_ns()};
     strl_cli_progress progress;
     strl_error err = {0};

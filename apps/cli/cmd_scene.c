@@ -69,7 +69,8 @@ static int run(strl_cli_args *args)
          .kind = STRL_CLI_STRING,
          .value = &desc.path,
          .argument = "FILE.ply|.stl|.gltf|.obj",
-         .help = "the file to write; its ending says the format; .gltf is for array and chessboard, it and .obj for plant and landscape",
+         .help =
+             "the file to write; its ending says the format; .gltf is for array and chessboard, it and .obj for plant and landscape",
          .required = true},
         {.name = "triangles",
          .letter = 'n',
@@ -82,8 +83,14 @@ static int run(strl_cli_args *args)
          .kind = STRL_CLI_STRING,
          .value = &desc.of,
          .argument = "FILE",
-         .help = "of array: the mesh file that is copied; copies in it are written out, of meshes of 256 triangles or more up to ten times their triangles"},
-        {.name = "copies", .kind = STRL_CLI_COUNT, .value = &desc.copies, .help = "of array: how many (100)", .least = 1, .most = 16000000},
+         .help =
+             "of array: the mesh file that is copied; copies in it are written out, of meshes of 256 triangles or more up to ten times their triangles"},
+        {.name = "copies",
+         .kind = STRL_CLI_COUNT,
+         .value = &desc.copies,
+         .help = "of array: how many (100)",
+         .least = 1,
+         .most = 16000000},
         {.name = "seed", .kind = STRL_CLI_COUNT, .value = &desc.seed, .help = "another one is another model (0)"},
         {.name = "no-normals", .kind = STRL_CLI_FLAG, .value = &desc.no_normals, .help = "positions only"},
         {.name = "shuffle",
@@ -113,7 +120,8 @@ static int run(strl_cli_args *args)
     if (!info)
         return strl_cli_usage_error(args, "there is no scene \"%s\"", desc.name);
     if (info->copies != (desc.of != NULL))
-        return strl_cli_usage_error(args, info->copies ? "scene %s needs --of FILE" : "scene %s takes no --of", info->name);
+        return strl_cli_usage_error(args, info->copies ? "scene %s needs --of FILE" : "scene %s takes no --of",
+                                    info->name);
     desc.importer = strl_importer();
     if (desc.triangles < info->triangles_min || desc.triangles > info->triangles_max)
         return strl_cli_usage_error(args, "scene %s has %" PRIu64 " to %" PRIu64 " triangles, not %" PRIu64, info->name,

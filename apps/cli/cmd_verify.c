@@ -43,10 +43,9 @@ static void print_cut(const char *name, uint32_t number, const strl_verify_cut *
     char text[32] = "-"; /* nothing to measure: what was simplified was flat */
     if (ratio > 0)
         snprintf(text, sizeof text, "%.3g", ratio);
-    printf(
-        "%s %2u: error %.6g, claimed %.6g, measured %.6g from the input and %.6g to it, rms %.6g, ratio %s, %" PRIu64
-        " triangles\n",
-        name, number, cut->error, cut->claimed, cut->from_input, cut->to_input, cut->rms, text, cut->triangles);
+    printf("%s %2u: error %.6g, claimed %.6g, measured %.6g from the input and %.6g to it, rms %.6g, ratio %s, %" PRIu64
+           " triangles\n",
+           name, number, cut->error, cut->claimed, cut->from_input, cut->to_input, cut->rms, text, cut->triangles);
 }
 
 static void print_report(const char *model, const strl_verify_report *report)
@@ -239,7 +238,11 @@ static int run(strl_cli_args *args)
         {.name = "json", .kind = STRL_CLI_FLAG, .value = &json, .help = "print one JSON object"},
     };
     const strl_cli_usage usage = {
-        .positional = "MODEL", .least = 1, .most = 1, .options = options, .option_count = STRL_CLI_COUNT_OF(options),
+        .positional = "MODEL",
+        .least = 1,
+        .most = 1,
+        .options = options,
+        .option_count = STRL_CLI_COUNT_OF(options),
         .notes = "--against takes all words up to the next option: put MODEL before it, or after \"--\":\n"
                  "  stroll verify MODEL --against INPUT...\n"
                  "  stroll verify --against INPUT... -- MODEL"};

@@ -17,8 +17,8 @@ typedef struct strl_cli_coarse {
     double drawn_px;        /* largest of what was drawn; infinite where the eye was inside a node's box */
 } strl_cli_coarse;
 
-/* One frame: what was asked for, as --error and --splat (less counts as --error), what the walk allowed where --error was asked for (more
- * where its budget is tight) and what was drawn. */
+/* One frame: what was asked for, as --error and --splat (less counts as --error), what the walk allowed where --error
+ * was asked for (more where its budget is tight) and what was drawn. */
 void strl_cli_coarse_add(strl_cli_coarse *coarse, double error_px, double splat_px, double allowed_px, double drawn_px);
 /* One sentence on standard error where there was such a frame; a warning, so not for --quiet. */
 void strl_cli_coarse_report(const strl_cli_coarse *coarse, uint64_t memory_bytes);

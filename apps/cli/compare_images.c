@@ -81,7 +81,8 @@ static double psnr(const strl_compare_side *a, const strl_compare_side *b, size_
     return fmin(MOST_DB, 10 * log10(255.0 * 255.0 * 3 * (double)*either / sum));
 }
 
-static void count_differing(const strl_compare_side *a, const strl_compare_side *b, size_t pixels, strl_compare_frame *result)
+static void count_differing(const strl_compare_side *a, const strl_compare_side *b, size_t pixels,
+                            strl_compare_frame *result)
 {
     for (size_t p = 0; p < pixels; p++) {
         int most = 0;

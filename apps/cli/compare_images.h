@@ -16,13 +16,13 @@ typedef struct strl_compare_frame {
     uint64_t uncovered;   /* pixels whose 5x5 neighbourhood is wholly covered in the reference, and background here */
     uint64_t overcovered; /* the same with covered and background exchanged */
     uint64_t both;        /* pixels covered in both */
-    uint64_t
-        depth_outside; /* of them, those whose depth leaves the range of the reference's 3x3 neighbourhood, widened by
-                               error_px * z / focal_px */
-    uint64_t either;      /* pixels covered in either */
-    uint64_t differing;   /* of them, those of another colour */
+    /* of them, those whose depth leaves the range of the reference's 3x3 neighbourhood, widened by
+     * error_px * z / focal_px */
+    uint64_t depth_outside;
+    uint64_t either;            /* pixels covered in either */
+    uint64_t differing;         /* of them, those of another colour */
     uint64_t visibly_differing; /* of them, those of which a channel differs by more than 16 of 255 */
-    double psnr_db;       /* over RGB of those; at most 100; 100 where there is none */
+    double psnr_db;             /* over RGB of those; at most 100; 100 where there is none */
 } strl_compare_frame;
 
 void strl_compare_images(const strl_compare_side *reference, const strl_compare_side *image, uint32_t width,

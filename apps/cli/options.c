@@ -21,8 +21,8 @@ enum { OPTIONS_MOST = 64 };
 static const char *argument_of(const strl_cli_option *option)
 {
     static const char *const by_kind[] = {
-        [STRL_CLI_FLAG] = "", [STRL_CLI_STRING] = "TEXT", [STRL_CLI_BYTES] = "BYTES", [STRL_CLI_COUNT] = "N",
-        [STRL_CLI_REAL] = "NUMBER", [STRL_CLI_SIZE] = "WxH", [STRL_CLI_ENUM] = "WORD", [STRL_CLI_LIST] = "FILE...",
+        [STRL_CLI_FLAG] = "",       [STRL_CLI_STRING] = "TEXT", [STRL_CLI_BYTES] = "BYTES", [STRL_CLI_COUNT] = "N",
+        [STRL_CLI_REAL] = "NUMBER", [STRL_CLI_SIZE] = "WxH",    [STRL_CLI_ENUM] = "WORD",   [STRL_CLI_LIST] = "FILE...",
     };
     return option->argument ? option->argument : by_kind[option->kind];
 }
@@ -161,8 +161,8 @@ static int read_value(const strl_cli_args *args, const strl_cli_option *option, 
     case STRL_CLI_SIZE:
         if (strl_cli_read_size(word, option->value))
             return -1;
-        return strl_cli_usage_error(args, "--%s takes WxH such as 1280x720, each 1 to 16384, not \"%s\"",
-                                    option->name, word);
+        return strl_cli_usage_error(args, "--%s takes WxH such as 1280x720, each 1 to 16384, not \"%s\"", option->name,
+                                    word);
     case STRL_CLI_ENUM:
         return read_enum(args, option, word);
     case STRL_CLI_FLAG:
@@ -207,7 +207,8 @@ static int take_option(parse_state *state, const strl_cli_option *option, char *
             return -1;
         }
         take_list(state, option);
-        return ((strl_cli_list *)option->value)->count ? -1
+        return ((strl_cli_list *)option->value)->count
+                   ? -1
                    : strl_cli_usage_error(args, "--%s needs %s", option->name, argument_of(option));
     }
     char *next = state->next < args->argc ? args->argv[state->next] : NULL;
@@ -303,8 +304,7 @@ static int check_complete(const parse_state *state)
     if (state->words < usage->least)
         return missing_word(state);
     if (usage->positional && state->words > usage->most)
-        return strl_cli_usage_error(state->args, "\"%s\" is one word too many",
-                                    state->args->words[usage->most]);
+        return strl_cli_usage_error(state->args, "\"%s\" is one word too many", state->args->words[usage->most]);
     for (size_t i = 0; i < usage->option_count; i++)
         if (usage->options[i].required && !(state->seen & (uint64_t)1 << i))
             return strl_cli_usage_error(state->args, "--%s %s is missing", usage->options[i].name,

@@ -49,10 +49,10 @@ typedef struct strl_cli_list {
 typedef struct strl_cli_args {
     const char *command; /* its name, for sentences */
     const char *summary;
-    int argc;            /* words after the command's name */
+    int argc; /* words after the command's name */
     char **argv;
-    char **words;        /* room for argc positional words; strl_cli_parse fills it */
-    bool quiet;          /* set by strl_cli_parse: no progress, no warnings */
+    char **words; /* room for argc positional words; strl_cli_parse fills it */
+    bool quiet;   /* set by strl_cli_parse: no progress, no warnings */
 } strl_cli_args;
 
 typedef struct strl_cli_command {
@@ -61,8 +61,8 @@ typedef struct strl_cli_command {
     int (*run)(strl_cli_args *args);
 } strl_cli_command;
 
-#define STRL_CLI_COMMAND(name, summary, run)                 \
-    extern const strl_cli_command strl_cli_command_##name;   \
+#define STRL_CLI_COMMAND(name, summary, run)                                                                           \
+    extern const strl_cli_command strl_cli_command_##name;                                                             \
     const strl_cli_command strl_cli_command_##name = {#name, summary, run}
 
 typedef enum strl_cli_kind {
@@ -77,16 +77,16 @@ typedef enum strl_cli_kind {
 } strl_cli_kind;
 
 typedef struct strl_cli_option {
-    const char *name;     /* long name, without dashes */
-    char letter;          /* short name, 0 = none */
+    const char *name; /* long name, without dashes */
+    char letter;      /* short name, 0 = none */
     strl_cli_kind kind;
     void *value;          /* see strl_cli_kind; keeps its default where the option is not given */
     const char *argument; /* the value in the help; NULL = by kind; for ENUM the legal words */
     const char *help;     /* one line without a full stop, default in parentheses */
     bool *given;          /* set where the option is given; may be NULL */
     bool required;
-    bool value_optional;  /* REAL and COUNT: the value may be missing; then only `given` is set */
-    double least, most;   /* bounds of BYTES, COUNT and REAL, inclusive; both 0 = none (but REAL may be negative) */
+    bool value_optional; /* REAL and COUNT: the value may be missing; then only `given` is set */
+    double least, most;  /* bounds of BYTES, COUNT and REAL, inclusive; both 0 = none (but REAL may be negative) */
 } strl_cli_option;
 
 typedef struct strl_cli_usage {

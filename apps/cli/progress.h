@@ -12,12 +12,12 @@ extern "C" {
 
 /* One thread at a time. Caller's storage; no release needed after strl_cli_progress_end. */
 typedef struct strl_cli_progress {
-    bool shown;          /* there is somebody to read it */
-    bool drawn;          /* a line stands on the terminal and must be cleared */
-    const char *stage;   /* borrowed; compared by content */
-    const char *unit;    /* borrowed: "triangles", "bytes", "frames" */
-    uint64_t start_ns;   /* when the stage began */
-    uint64_t last_ns;    /* when the line was last drawn */
+    bool shown;        /* there is somebody to read it */
+    bool drawn;        /* a line stands on the terminal and must be cleared */
+    const char *stage; /* borrowed; compared by content */
+    const char *unit;  /* borrowed: "triangles", "bytes", "frames" */
+    uint64_t start_ns; /* when the stage began */
+    uint64_t last_ns;  /* when the line was last drawn */
 } strl_cli_progress;
 
 void strl_cli_progress_init(strl_cli_progress *progress, bool quiet);

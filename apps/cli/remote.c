@@ -9,7 +9,8 @@ strl_status strl_cli_check_files(const char *command, const char *const *names, 
 {
     for (size_t i = 0; i < count; i++)
         if (strl_location_is_remote(names[i]))
-            return strl__fail(err, STRL_ERR_ARGUMENT, "%s reads files, not addresses: save what is there as one first", command);
+            return strl__fail(err, STRL_ERR_ARGUMENT, "%s reads files, not addresses: save what is there as one first",
+                              command);
     return STRL_OK;
 }
 

@@ -30,7 +30,8 @@ typedef struct strl_cli_remote {
         .help = "keep nothing of what an address gave"                                                                 \
     }
 
-/* Fails where one of the names is an address: the command reads files alone. The sentence has nothing of it: it may hold a password. */
+/* Fails where one of the names is an address: the command reads files alone. The sentence has nothing of it: it may
+ * hold a password. */
 strl_status strl_cli_check_files(const char *command, const char *const *names, size_t count, strl_error *err);
 
 /* After parsing. location borrows from remote and name. A folder that was asked for has to be there or to be made;

@@ -15,7 +15,8 @@
 /* Of one image; what --stats writes. */
 typedef struct strl_image_stats {
     uint64_t frame_ns, select_ns, draw_ns; /* frame: from camera to finished pixels; select: of the last front */
-    uint64_t elapsed_ns;                   /* from the command's begin to finished pixels, opening and images before included */
+    /* from the command's begin to finished pixels, opening and images before included */
+    uint64_t elapsed_ns;
     uint64_t triangles, bytes_read, resident_bytes, gpu_bytes, uploaded_bytes;
     uint64_t splats;
     uint32_t nodes, nodes_culled, nodes_backfacing, draws, requests, missing_nodes, evictions;
@@ -42,13 +43,13 @@ struct strl_render_model {
     const strl_render_model_class *klass;
     double bounds[6]; /* world, min xyz, max xyz */
     unsigned up_axis;
-    char unit[16];    /* "" = unknown */
+    char unit[16]; /* "" = unknown */
 };
 
 typedef struct strl_render_model_desc {
     strl_location location;
-    bool full;             /* a container's finest level; an input file can be drawn in no other way */
-    bool realtime;         /* a walk that never waits */
+    bool full;     /* a container's finest level; an input file can be drawn in no other way */
+    bool realtime; /* a walk that never waits */
     double error_px, splat_px;
     strl_cull cull;
     uint64_t memory_bytes; /* of the walk's decoded nodes */

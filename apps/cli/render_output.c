@@ -167,22 +167,22 @@ static json_t *real_or_null(double value)
 /* Since the model was opened, like faults: what is of interest are differences and the last line. */
 static int add_network(json_t *line, const strl_network_stats *n)
 {
-    json_t *network = json_pack("{s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:f,s:f}", "requests", (json_int_t)n->requests, "reads",
-                                (json_int_t)n->reads, "merged_reads", (json_int_t)n->merged_reads, "retries",
-                                (json_int_t)n->retries, "failures", (json_int_t)n->failures, "bytes",
-                                (json_int_t)n->bytes, "cache_hits", (json_int_t)n->cache_hits, "cache_bytes",
-                                (json_int_t)n->cache_bytes, "latency_ms", (double)n->latency_ns * 1e-6,
-                                "bytes_per_second", n->bytes_per_second);
+    json_t *network =
+        json_pack("{s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:I,s:f,s:f}", "requests", (json_int_t)n->requests, "reads",
+                  (json_int_t)n->reads, "merged_reads", (json_int_t)n->merged_reads, "retries", (json_int_t)n->retries,
+                  "failures", (json_int_t)n->failures, "bytes", (json_int_t)n->bytes, "cache_hits",
+                  (json_int_t)n->cache_hits, "cache_bytes", (json_int_t)n->cache_bytes, "latency_ms",
+                  (double)n->latency_ns * 1e-6, "bytes_per_second", n->bytes_per_second);
     return json_object_set_new(line, "network", network);
 }
 
 static strl_status write_stats(strl_render_output *output, size_t frame, const strl_image_stats *s, strl_error *err)
 {
     /* cull_ms: frustum culling is part of selecting; occlusion will have a stage of its own. */
-    json_t *line = json_pack("{s:I,s:b,s:f,s:f,s:f,s:f,s:f}", "frame", (json_int_t)frame, "realtime", output->desc.realtime,
-                             "elapsed_ms", (double)s->elapsed_ns * 1e-6, "frame_ms", (double)s->frame_ns * 1e-6,
-                             "select_ms", (double)s->select_ns * 1e-6, "cull_ms", 0.0, "draw_ms",
-                             (double)s->draw_ns * 1e-6);
+    json_t *line =
+        json_pack("{s:I,s:b,s:f,s:f,s:f,s:f,s:f}", "frame", (json_int_t)frame, "realtime", output->desc.realtime,
+                  "elapsed_ms", (double)s->elapsed_ns * 1e-6, "frame_ms", (double)s->frame_ns * 1e-6, "select_ms",
+                  (double)s->select_ns * 1e-6, "cull_ms", 0.0, "draw_ms", (double)s->draw_ns * 1e-6);
     const struct {
         const char *name;
         uint64_t value;

@@ -13,9 +13,9 @@ typedef struct strl_render_output_desc {
     const char *path;  /* NAME.png or a folder, which is made; NULL = no images */
     const char *stats; /* NULL = none */
     bool depth;
-    bool realtime;     /* say so in the statistics */
+    bool realtime; /* say so in the statistics */
     uint32_t size[2];
-    uint8_t background[3]; /* sRGB, of the contact sheet where it has no frame */
+    uint8_t background[3];           /* sRGB, of the contact sheet where it has no frame */
     const strl_camera_path *cameras; /* borrowed */
 } strl_render_output_desc;
 

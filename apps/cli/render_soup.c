@@ -32,7 +32,7 @@ typedef struct soup_batch {
     strl_vertex *vertices; /* owned */
     uint16_t *indices;     /* owned */
     uint32_t vertex_count, index_count;
-    strl_box box;          /* model units */
+    strl_box box; /* model units */
 } soup_batch;
 
 typedef struct soup_model {
@@ -130,7 +130,8 @@ static strl_status close_batch(soup_load *load, strl_error *err)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for the list of batches");
     soup_batch batch = {.vertices = strl__alloc(load->vertex_count, sizeof *batch.vertices),
                         .indices = strl__alloc(load->index_count, sizeof *batch.indices),
-                        .vertex_count = load->vertex_count, .index_count = load->index_count};
+                        .vertex_count = load->vertex_count,
+                        .index_count = load->index_count};
     model->batches[model->batch_count++] = batch;
     if (!batch.vertices || !batch.indices)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to hold the model: %" PRIu64 " triangles are read",
@@ -247,10 +248,12 @@ static strl_status load_soup(soup_model *model, const strl_render_model_desc *de
     soup_load load = {.model = model, .progress = desc->progress};
     strl_reader_info info;
     const char *scratch = getenv("TMPDIR");
-    const strl_reader_desc reading = {.path = desc->location.name,
-                                      .scratch_dir = scratch ? scratch : "/tmp",
-                                      .memory_bytes = READER_BYTES,
-                                      .child = {.importer = strl_importer(), .memory_bytes = IMPORTER_BYTES, .go_on = go_on, .context = desc->progress}};
+    const strl_reader_desc reading = {
+        .path = desc->location.name,
+        .scratch_dir = scratch ? scratch : "/tmp",
+        .memory_bytes = READER_BYTES,
+        .child = {
+            .importer = strl_importer(), .memory_bytes = IMPORTER_BYTES, .go_on = go_on, .context = desc->progress}};
     strl_status status = strl_reader_open(&reading, &load.reader, err);
     if (status != STRL_OK)
         return status;

@@ -15,10 +15,10 @@
 
 #define READ_THREADS 2u
 #define WAIT_NS 200000u
-#define QUIET_FRONTS 16u /* without news double the wait, */
+#define QUIET_FRONTS 16u  /* without news double the wait, */
 #define MOST_DOUBLINGS 4u /* so often: a network takes its time */
-/* Fronts after which a settled image is given up where nothing is under way: two seconds of nothing. What is under way is
- * answered: a source that fails says so in its time. */
+/* Fronts after which a settled image is given up where nothing is under way: two seconds of nothing. What is under way
+ * is answered: a source that fails says so in its time. */
 #define MOST_IDLE_FRONTS 650u
 
 typedef struct walk_model {
@@ -137,8 +137,11 @@ static strl_status open_walk(walk_model *self, const strl_render_model_desc *des
     if (status != STRL_OK)
         return status;
     self->executor = (strl_executor){self->pool, submit};
-    const strl_walk_desc walk = {
-        .memory_bytes = desc->memory_bytes, .error_px = desc->error_px, .splat_px = desc->splat_px, .cull = desc->cull, .executor = &self->executor};
+    const strl_walk_desc walk = {.memory_bytes = desc->memory_bytes,
+                                 .error_px = desc->error_px,
+                                 .splat_px = desc->splat_px,
+                                 .cull = desc->cull,
+                                 .executor = &self->executor};
     status = strl_walk_open(source, &walk, &self->walk, err);
     if (status == STRL_OK) /* up axis and unit are not the walk's business */
         strl_render_container_facts(strl_walk_container(self->walk), &self->base);

@@ -1,6 +1,7 @@
 /* stroll-import FILE: imports a file by assimp and writes its triangles to standard output, in the protocol of
- * readers/import_protocol.h. Stroll runs it as a child process, because assimp holds whole scenes in memory and dies of some
- * files; the limits of both are its parent's work. Exit status: 0, or the reason of the error that the stream ends in. */
+ * readers/import_protocol.h. Stroll runs it as a child process, because assimp holds whole scenes in memory and dies of
+ * some files; the limits of both are its parent's work. Exit status: 0, or the reason of the error that the stream ends
+ * in. */
 #include <assimp/cimport.h>
 #include <assimp/config.h>
 #include <assimp/version.h>
@@ -26,7 +27,8 @@ static int usage(void)
     return 64; /* no reason of the protocol's */
 }
 
-/* The stream gets a descriptor of its own: what assimp or a library prints to standard output goes to standard error. */
+/* The stream gets a descriptor of its own: what assimp or a library prints to standard output goes to standard error.
+ */
 static int take_output(void)
 {
     int stream = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);

@@ -32,8 +32,8 @@ void import_end_without_memory(int descriptor)
 
 #ifdef IS_SANITIZED
 
-/* The sanitizer has its own operators, and address space cannot be limited under it; resident memory can. A scene is not
- * released, see main. */
+/* The sanitizer has its own operators, and address space cannot be limited under it; resident memory can. A scene is
+ * not released, see main. */
 extern "C" const char *__asan_default_options(void);
 extern "C" const char *__asan_default_options(void)
 {

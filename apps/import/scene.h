@@ -1,5 +1,5 @@
-/* A scene of assimp's as a stream: counted first, so that the stream can say what comes, then told node by node. Placements
- * are applied here, in doubles; nothing is asked of assimp but what the file says. */
+/* A scene of assimp's as a stream: counted first, so that the stream can say what comes, then told node by node.
+ * Placements are applied here, in doubles; nothing is asked of assimp but what the file says. */
 #ifndef STRL_IMPORT_SCENE_H
 #define STRL_IMPORT_SCENE_H
 
@@ -15,8 +15,9 @@ typedef struct import_refusal {
     char sentence[IMPORT_SENTENCE_BYTES];
 } import_refusal;
 
-/* extension: of the file's name, lower case, without the dot. False: refused, or the output failed; what was written then
- * is not ended. */
-bool import_scene_write(const struct aiScene *scene, const char *extension, import_output *output, import_refusal *refusal);
+/* extension: of the file's name, lower case, without the dot. False: refused, or the output failed; what was written
+ * then is not ended. */
+bool import_scene_write(const struct aiScene *scene, const char *extension, import_output *output,
+                        import_refusal *refusal);
 
 #endif

@@ -1,7 +1,7 @@
 /* Camera paths: made from a model's bounds and what lies on its surface, or read from a file, or from one
  * specification. A path is the same for equal (bounds, up axis, seed, number of frames) and equal answers of `probe`.
- * `render` asks a container for those with the default error, whatever it then draws. A container and its input file differ in them by
- * that, so to render both with the same cameras save the path of one and load it for the other. */
+ * `render` asks a container for those with the default error, whatever it then draws. A container and its input file
+ * differ in them by that, so to render both with the same cameras save the path of one and load it for the other. */
 #ifndef STRL_APPS_CAMERA_PATH_H
 #define STRL_APPS_CAMERA_PATH_H
 
@@ -23,7 +23,7 @@ typedef struct strl_camera_path {
 
 /* What a path is made round. */
 typedef struct strl_path_site {
-    double bounds[6];  /* min xyz, max xyz */
+    double bounds[6]; /* min xyz, max xyz */
     unsigned up_axis;
     double eye_height; /* of a walker, model units */
     /* Depth image of an orthographic camera (see strl_renderer_read_depth): where the model's surface is. */

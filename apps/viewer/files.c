@@ -26,8 +26,10 @@ static strl_status open_walk(const strl__viewer *v, const char *path, strl_viewe
     if (!model)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a model");
     const strl_location location = strl__viewer_locate(v, path);
-    const strl_walk_desc how = {
-        .memory_bytes = v->desc.memory_bytes, .error_px = v->desc.error_px, .splat_px = v->desc.splat_px, .cull = v->desc.cull};
+    const strl_walk_desc how = {.memory_bytes = v->desc.memory_bytes,
+                                .error_px = v->desc.error_px,
+                                .splat_px = v->desc.splat_px,
+                                .cull = v->desc.cull};
     strl_status status = strl_viewer_model_open(model, &location, &how, err);
     if (status == STRL_OK)
         *out = model;

@@ -105,8 +105,8 @@ strl_status strl__viewer_make_renderer(strl__viewer *v, strl_error *err);
 strl_status strl__viewer_set_budgets(strl__viewer *v, strl_error *err);
 void strl__viewer_poll_opener(strl__viewer *v);
 void strl__viewer_build_again(strl__viewer *v); /* of the mesh that was dropped */
-/* bookmarks: those of the model as the window has them, just read and changed. A failure is said, not returned: what cannot be
- * remembered stops nobody. */
+/* bookmarks: those of the model as the window has them, just read and changed. A failure is said, not returned: what
+ * cannot be remembered stops nobody. */
 void strl__viewer_remember(strl__viewer *v, bool bookmarks);
 
 /* frame.c */

@@ -55,7 +55,8 @@ static strl_status submit(void *context, void (*run)(void *job), void *job, strl
     return strl_pool_submit(context, run, job, err);
 }
 
-strl_status strl_viewer_model_open(strl_viewer_model *model, const strl_location *location, const strl_walk_desc *how, strl_error *err)
+strl_status strl_viewer_model_open(strl_viewer_model *model, const strl_location *location, const strl_walk_desc *how,
+                                   strl_error *err)
 {
     *model = (strl_viewer_model){0};
     strl_source *source = NULL;

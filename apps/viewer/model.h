@@ -21,7 +21,8 @@ typedef struct strl_viewer_model {
 
 /* The model stays where it is until strl_viewer_model_close; executor and labels of how it is walked are its own.
  * STRL_ERR_ARGUMENT where the file is no container. */
-strl_status strl_viewer_model_open(strl_viewer_model *model, const strl_location *location, const strl_walk_desc *how, strl_error *err);
+strl_status strl_viewer_model_open(strl_viewer_model *model, const strl_location *location, const strl_walk_desc *how,
+                                   strl_error *err);
 void strl_viewer_model_close(strl_viewer_model *model);
 
 /* Near and far of a list as seen by another camera than the walk's. False where nothing visible lies before it. */

@@ -31,9 +31,9 @@ typedef struct strl_opener_news {
 strl_status strl_opener_create(const char *cache, strl_opener **opener, strl_error *err);
 void strl_opener_destroy(strl_opener *opener); /* cancels and waits; NULL is legal */
 
-/* Refused while another file is being built. A mesh becomes FILE.stroll beside it; unless `again` is set, one that is younger
- * than the mesh and there already is taken instead. Whether files that the mesh names (images, buffers, materials) are
- * younger is not known without reading it. */
+/* Refused while another file is being built. A mesh becomes FILE.stroll beside it; unless `again` is set, one that is
+ * younger than the mesh and there already is taken instead. Whether files that the mesh names (images, buffers,
+ * materials) are younger is not known without reading it. */
 strl_status strl_opener_start(strl_opener *opener, const char *file, bool again, strl_error *err);
 void strl_opener_cancel(strl_opener *opener);
 void strl_opener_poll(strl_opener *opener, strl_opener_news *news);

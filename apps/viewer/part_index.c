@@ -25,7 +25,8 @@ struct strl_part_index {
     char *path, *cache;
     uint32_t part_count;
     double (*bounds)[6]; /* [part_count], world; the thread's until done, as all below */
-    uint32_t *slots; /* [part_count]: of the tree at work: its newest place in parts, if that is of the part and tree */
+    /* [part_count]: of the tree at work: its newest place in parts, if that is of the part and tree */
+    uint32_t *slots;
     tree_part *parts; /* of all trees, one tree after the other */
     size_t capacity, count;
     size_t *ends;               /* [tree_count]: where each tree's parts end */

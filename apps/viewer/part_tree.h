@@ -41,9 +41,9 @@ typedef struct strl_part_tree {
     uint32_t *found_before; /* [part_count + 1]: how many of the places before each one the search has found */
 } strl_part_tree;
 
-/* name(context, part, ...) tells each name (UTF-8, cut to fit). memory_bytes bounds names and nodes, but for the least of
- * both that each part needs, some 64 bytes; 0 = 512 MiB. Beyond it parts have no name, and paths are not split: a model
- * with many opens all the same. The tree is empty on failure. */
+/* name(context, part, ...) tells each name (UTF-8, cut to fit). memory_bytes bounds names and nodes, but for the least
+ * of both that each part needs, some 64 bytes; 0 = 512 MiB. Beyond it parts have no name, and paths are not split: a
+ * model with many opens all the same. The tree is empty on failure. */
 typedef strl_status (*strl_part_name_fn)(void *context, uint32_t part, char *name, size_t size, strl_error *err);
 strl_status strl_part_tree_init(strl_part_tree *tree, uint32_t part_count, uint64_t memory_bytes,
                                 strl_part_name_fn name, void *context, strl_error *err);

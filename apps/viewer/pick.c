@@ -161,7 +161,8 @@ static bool pick_item(const strl_draw_item *item, const strl_ray *world, const l
         uint32_t vertex = item->indices[k];
         for (int c = 0; c < 3; c++)
             vertex_of(item, item->indices[k + (uint32_t)c], p[c]);
-        if (!meets_triangle(p, ray, &t, normal) || t >= best->t || is_hidden(filter, item, vertex) || is_cut_off(filter, world, t) ||
+        if (!meets_triangle(p, ray, &t, normal) || t >= best->t || is_hidden(filter, item, vertex) ||
+            is_cut_off(filter, world, t) ||
             (cull == STRL_CULL_BACK && dot(normal, ray->way) > 0)) /* in the model's own space no placement mirrors */
             continue;
         *best = (hit){t, {normal[0], normal[1], normal[2]}, vertex};
@@ -193,7 +194,9 @@ static void fill(const strl_draw_item *item, const strl_ray *ray, const hit *bes
         scale = fmax(scale, sqrt(dot(item->transform + 4 * i, item->transform + 4 * i)));
     *pick = (strl_pick){.distance = best->t,
                         .error = item->error * scale,
-                        .part = item->own_part ? item->own_part - 1 : item->labels ? item->labels[best->vertex].part : UINT32_MAX,
+                        .part = item->own_part ? item->own_part - 1
+                                : item->labels ? item->labels[best->vertex].part
+                                               : UINT32_MAX,
                         .material = item->labels ? item->labels[best->vertex].material : UINT32_MAX,
                         .placement = item->placement,
                         .node = item->node};
@@ -210,7 +213,8 @@ bool strl_pick_list(const strl_draw_list *list, const strl_ray *ray, const strl_
     for (uint32_t i = 0; i < list->count; i++) {
         const strl_draw_item *item = &list->items[i];
         local_ray local;
-        if (item->draw_count == 0 || item->point_px > 0 || is_item_hidden(filter ? filter : &none, item) || !to_local(item, ray, &local) || !meets_box(item, &local, best.t))
+        if (item->draw_count == 0 || item->point_px > 0 || is_item_hidden(filter ? filter : &none, item) ||
+            !to_local(item, ray, &local) || !meets_box(item, &local, best.t))
             continue;
         if (pick_item(item, ray, &local, filter ? filter : &none, list->cull, &best))
             nearest = item;

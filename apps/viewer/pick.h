@@ -36,7 +36,8 @@ typedef struct strl_pick {
 /* Through the middle of pixel (x, y), y downward. False where the camera is degenerate. */
 bool strl_ray_through(const strl_camera *camera, double x, double y, strl_ray *ray);
 
-/* The first triangle that the ray meets, from before where the list culls backs, whether the list's camera saw it or not. False where there is none. */
+/* The first triangle that the ray meets, from before where the list culls backs, whether the list's camera saw it or
+ * not. False where there is none. */
 bool strl_pick_list(const strl_draw_list *list, const strl_ray *ray, const strl_pick_filter *filter, strl_pick *pick);
 
 /* A box round all triangles in the list whose parts have the style, world: min xyz, max xyz. False where there is none:

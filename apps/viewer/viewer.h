@@ -19,13 +19,14 @@ typedef struct strl_viewer_frame {
     double max_error_px;         /* of what was drawn; infinite where the eye is inside a node's box */
 } strl_viewer_frame;
 
-/* Zero-initialise: every 0 but location.name takes what the settings remember, else its default. Strings are borrowed for the
- * call. */
+/* Zero-initialise: every 0 but location.name takes what the settings remember, else its default. Strings are borrowed
+ * for the call. */
 typedef struct strl_viewer_desc {
     strl_location location;  /* of a container */
     const char *screenshots; /* the folder where pictures and paths go, made at the first; NULL = the current one */
     const char *settings;    /* the file that remembers; NULL = nothing is remembered */
-    const char *cache;       /* the folder for containers of meshes from folders that cannot be written; NULL = none */
+    /* the folder for containers of meshes from folders that cannot be written; NULL = none */
+    const char *cache;
     const char *camera_path; /* a path file to replay, at once; NULL = none */
     const char *journal;     /* a file for what happens, one JSON object a line; NULL = none */
     strl_backend backend;    /* STRL_BACKEND_NULL is no window's */
@@ -33,9 +34,10 @@ typedef struct strl_viewer_desc {
     double error_px;         /* 0 = 1 */
     double splat_px;         /* of sample trees, as in strl_walk_desc; 0 = error_px */
     strl_cull cull;
-    uint64_t memory_bytes;   /* of decoded nodes; 0 = 512 MiB */
+    uint64_t memory_bytes;     /* of decoded nodes; 0 = 512 MiB */
     uint64_t gpu_memory_bytes; /* of buffers of nodes; 0 = 512 MiB */
-    uint64_t frames;           /* the window closes after as many, and never rests till then; 0 = when it is told to */
+    /* the window closes after as many, and never rests till then; 0 = when it is told to */
+    uint64_t frames;
     void (*shown)(void *context, const strl_viewer_frame *frame); /* after each frame; may be NULL */
     void *context;
 } strl_viewer_desc;

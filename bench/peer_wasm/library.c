@@ -1,5 +1,5 @@
-/* libmeshoptimizer's C functions by its WebAssembly build: arguments are copied into the module's memory, results out. The
- * module's heap is a stack (sbrk), so what a call takes is given back at its end. */
+/* libmeshoptimizer's C functions by its WebAssembly build: arguments are copied into the module's memory, results out.
+ * The module's heap is a stack (sbrk), so what a call takes is given back at its end. */
 #include "meshoptimizer.h"
 
 #include <stdio.h>

@@ -343,7 +343,8 @@ static void place(const drawer *d, const strl_camera *camera, const view_basis *
 static strl_status draw(drawer *d, const strl_camera *camera, const strl_draw_list *list, strl_error *err)
 {
     view_basis basis = basis_of(camera);
-    double near = list->near_distance, far = list->far_distance * 1.0001; /* what lies at the far plane is to be seen */
+    /* what lies at the far plane is to be seen */
+    double near = list->near_distance, far = list->far_distance * 1.0001;
     glViewport(0, 0, WIDTH, HEIGHT);
     glEnable(GL_DEPTH_TEST);
     glClearColor(0.1f, 0.11f, 0.13f, 1);

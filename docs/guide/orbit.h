@@ -18,7 +18,8 @@ static strl_camera orbit(strl_walk *walk, double turn, uint32_t width, uint32_t 
         camera.target[i] = (bounds[i] + bounds[i + 3]) / 2;
         squared += (bounds[i + 3] - bounds[i]) * (bounds[i + 3] - bounds[i]);
     }
-    double radius = squared > 0 ? sqrt(squared) / 2 : 1; /* a model can be empty: a drawing of lines has no triangle */
+    /* a model can be empty: a drawing of lines has no triangle */
+    double radius = squared > 0 ? sqrt(squared) / 2 : 1;
     memcpy(camera.eye, camera.target, sizeof camera.eye);
     camera.eye[(up + 1) % 3] += 1.6 * radius * cos(turn);
     camera.eye[(up + 2) % 3] += 1.6 * radius * sin(turn);

@@ -17,12 +17,13 @@ extern "C" {
 #define STRL_ROOT_MAX_TRIANGLES 16384u
 
 typedef struct strl_build_progress {
-    const char *stage;   /* "read", "sort", "level 3", ...; static */
-    uint32_t stage_index, stage_count; /* from 1; all levels are one stage; index 0 = a resumed build checks what it has */
-    uint64_t done, total; /* items of the stage; total 0 = unknown */
-    uint64_t triangles_in; /* as announced by the inputs, until they have been read once */
-    double share;          /* of the whole build, 0 to 1 */
-    double seconds_left;   /* estimated; 0 = unknown */
+    const char *stage; /* "read", "sort", "level 3", ...; static */
+    /* from 1; all levels are one stage; index 0 = a resumed build checks what it has */
+    uint32_t stage_index, stage_count;
+    uint64_t done, total;   /* items of the stage; total 0 = unknown */
+    uint64_t triangles_in;  /* as announced by the inputs, until they have been read once */
+    double share;           /* of the whole build, 0 to 1 */
+    double seconds_left;    /* estimated; 0 = unknown */
     double triangles_per_s; /* of the whole build so far; 0 = unknown */
     uint64_t scratch_bytes; /* on disk now */
     uint64_t memory_bytes;  /* the budget; the operating system knows what is used of it */
@@ -40,24 +41,27 @@ typedef struct strl_build_estimate {
 typedef struct strl_build_desc {
     const char *const *inputs;
     uint32_t input_count;
-    const char *output;     /* as the inputs: UTF-8 paths */
-    const char *scratch;    /* folder in which OUTPUT.tmp is made, itself made where missing; NULL = beside the output */
-    uint64_t memory_bytes;  /* 0 = 1 GiB; least STRL_BUILD_LEAST_MEMORY */
-    unsigned jobs;          /* threads that work; 0 = one per processor */
-    double grid;            /* lattice step wanted, model units; 0 = chosen; rounded down to a power of two; refused where it
-                               is less than about a 2^30th of the extent */
-    bool compact;           /* for the network: a coarser lattice where grid is 0, normals of 2 x 8 bits */
-    int up_axis;            /* 1 x, 2 y, 3 z; 0 = the inputs' own */
-    const char *unit;       /* NULL = unknown */
-    const char *importer;   /* the program that reads foreign formats (readers/reader.h); NULL = as installed */
-    bool certify;           /* measure what nodes claim, and claim no more */
+    const char *output; /* as the inputs: UTF-8 paths */
+    /* folder in which OUTPUT.tmp is made, itself made where missing; NULL = beside the output */
+    const char *scratch;
+    uint64_t memory_bytes; /* 0 = 1 GiB; least STRL_BUILD_LEAST_MEMORY */
+    unsigned jobs;         /* threads that work; 0 = one per processor */
+    /* lattice step wanted, model units; 0 = chosen; rounded down to a power of two; refused where it is less than
+     * about a 2^30th of the extent */
+    double grid;
+    bool compact;         /* for the network: a coarser lattice where grid is 0, normals of 2 x 8 bits */
+    int up_axis;          /* 1 x, 2 y, 3 z; 0 = the inputs' own */
+    const char *unit;     /* NULL = unknown */
+    const char *importer; /* the program that reads foreign formats (readers/reader.h); NULL = as installed */
+    bool certify;         /* measure what nodes claim, and claim no more */
     /* A build that is stopped leaves its scratch folder, with the stages that are finished, for a later one
      * that resumes. Not set: nothing is left. */
     bool keep;
     uint64_t keep_triangles; /* of models of fewer nothing is kept: they are built at once; 0 = 65,536 */
     bool resume; /* goes on with what an earlier build of the same request has left, if anything; keeps, too */
-    double probability; /* of sample trees: that a cell of a pixel shows one of its visible triangles; 0 = 1 - 1e-6. 0 of clusters */
-    bool no_dependencies;   /* for measuring what dependencies bring: every group has one member */
+    /* of sample trees: that a cell of a pixel shows one of its visible triangles; 0 = 1 - 1e-6. 0 of clusters */
+    double probability;
+    bool no_dependencies; /* for measuring what dependencies bring: every group has one member */
     /* Called on the caller's thread, often; false cancels. May be NULL. */
     bool (*progress)(void *context, const strl_build_progress *progress);
     /* Told on the caller's thread, once for each thing amiss that does not stop the build; the sentence is
@@ -81,17 +85,19 @@ typedef struct strl_build_stage {
 typedef struct strl_build_result {
     uint64_t triangles_in, triangles_leaf;
     uint64_t dropped_nonfinite, dropped_degenerate, dropped_lines, dropped_points;
-    double dropped_longest; /* the longest edge of a triangle without area on the lattice, model units: claims leave these out */
+    /* the longest edge of a triangle without area on the lattice, model units: claims leave these out */
+    double dropped_longest;
     uint64_t missing_libraries; /* material libraries that could not be read: what they define is white */
     uint64_t missing_images;    /* images of materials that could not be used: these have their colours alone */
     uint32_t coarse_lattices;   /* 1 where the step had to be more than a sixteenth of the 1st-percentile edge */
     uint64_t vertices, nodes, groups, bytes_out, scratch_bytes;
     uint32_t parts, materials, inputs;
-    uint32_t trees;          /* what is used again and again is a tree of its own, whose triangles are counted once above */
+    /* what is used again and again is a tree of its own, whose triangles are counted once above */
+    uint32_t trees;
     uint32_t levels;         /* of the tree that has most */
     uint32_t root_triangles; /* of all roots */
     uint64_t placements;
-    uint64_t triangles_placed; /* of the trees, as often as each is placed */
+    uint64_t triangles_placed;       /* of the trees, as often as each is placed */
     double step, quantisation_error; /* of the coarsest lattice; how far it moves a point at most; model units */
     double seconds, cpu_seconds;
     strl_build_stage stages[STRL_BUILD_STAGES];
@@ -111,8 +117,8 @@ typedef struct strl_build_result {
  * asks for, and an older file of that name stays. The bytes are the same whether the build was stopped and
  * resumed, however often, or not. */
 STRL_API strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err);
-/* The same of a sample tree, for what cannot be simplified: every triangle is stored once, and what is far away is drawn by a
- * random part of its triangles and by splats. desc->certify and no_dependencies are refused. */
+/* The same of a sample tree, for what cannot be simplified: every triangle is stored once, and what is far away is
+ * drawn by a random part of its triangles and by splats. desc->certify and no_dependencies are refused. */
 STRL_API strl_status strl_build_samples(const strl_build_desc *desc, strl_build_result *result, strl_error *err);
 
 #ifdef __cplusplus

@@ -42,13 +42,14 @@ typedef enum strl_wrap { STRL_WRAP_REPEAT, STRL_WRAP_CLAMP, STRL_WRAP_MIRROR } s
 
 #define STRL_TEXCOORD_MOST 65535 /* of a code */
 
-/* The image of a material. Its colours are in the vertices already, as far as it could be read; who draws it instead takes
- * the material's colour in place of the vertices'. A vertex's coordinate is texcoord_min + code / STRL_TEXCOORD_MOST *
- * texcoord_extent: u to the right and v down from the image's upper left corner, 1 = all of it. */
+/* The image of a material. Its colours are in the vertices already, as far as it could be read; who draws it instead
+ * takes the material's colour in place of the vertices'. A vertex's coordinate is texcoord_min + code /
+ * STRL_TEXCOORD_MOST * texcoord_extent: u to the right and v down from the image's upper left corner, 1 = all of it. */
 typedef struct strl_material_image {
-    const char *reference; /* as the model names it: a URI or path beside the model; "images[3] (NAME)" where it is inside
-                              of the model's file; NULL = the material has none */
-    strl_wrap wrap[2];     /* of u, of v */
+    /* as the model names it: a URI or path beside the model; "images[3] (NAME)" where it is inside of the model's
+     * file; NULL = the material has none */
+    const char *reference;
+    strl_wrap wrap[2]; /* of u, of v */
     float texcoord_min[2], texcoord_extent[2];
 } strl_material_image;
 
@@ -69,12 +70,14 @@ STRL_API uint64_t strl_container_triangle_count(const strl_container *container)
 STRL_API strl_status strl_container_placement(strl_container *container, uint64_t index, strl_placement *placement,
                                               strl_error *err);
 /* Copies the name of part < part_count (cut to fit size >= 1 bytes, UTF-8, zero-terminated). */
-STRL_API strl_status strl_container_part(strl_container *container, uint32_t part, char *name, size_t size, strl_error *err);
+STRL_API strl_status strl_container_part(strl_container *container, uint32_t part, char *name, size_t size,
+                                         strl_error *err);
 /* The same of material < material_count; *rgba: its colour, sRGB-encoded, R lowest byte. */
 STRL_API strl_status strl_container_material(strl_container *container, uint32_t material, char *name, size_t size,
                                              uint32_t *rgba, strl_error *err);
 
-/* The image of material < material_count. reference takes its name as above, cut to fit; image->reference is that, or NULL. */
+/* The image of material < material_count. reference takes its name as above, cut to fit; image->reference is that, or
+ * NULL. */
 STRL_API strl_status strl_container_material_image(strl_container *container, uint32_t material, char *reference,
                                                    size_t size, strl_material_image *image, strl_error *err);
 
@@ -87,8 +90,8 @@ STRL_API strl_status strl_container_vertex_parts(strl_container *container, uint
                                                  uint32_t vertex_count, uint32_t *parts, uint32_t *materials,
                                                  strl_error *err);
 
-/* In the same way the texture coordinates, as codes over the range of the image of the vertex's material; 0 where that has
- * none. */
+/* In the same way the texture coordinates, as codes over the range of the image of the vertex's material; 0 where that
+ * has none. */
 STRL_API strl_status strl_container_vertex_texcoords(strl_container *container, uint32_t placement, uint32_t node,
                                                      uint32_t vertex_count, uint16_t (*texcoords)[2], strl_error *err);
 

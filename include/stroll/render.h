@@ -31,12 +31,14 @@ typedef enum strl_backend {
 /* Zero-initialise: every 0 but the size takes its default. */
 typedef struct strl_renderer_desc {
     strl_backend backend;
-    uint32_t width, height;    /* of the image, in pixels */
-    uint32_t supersample;      /* draws this many times wider and higher and filters in linear light; 0 = 1, at most 8 */
+    uint32_t width, height; /* of the image, in pixels */
+    /* draws this many times wider and higher and filters in linear light; 0 = 1, at most 8 */
+    uint32_t supersample;
     uint64_t gpu_memory_bytes; /* hard bound of all buffers of nodes, render targets apart; 0 = 512 MiB */
-    bool current_context;      /* use the GL context that is current (a window's); else a headless one is made and owned */
-    bool gles;                 /* GL3 without current_context: make an OpenGL ES context */
-    bool core_only;            /* GL3: no extension, not even clip control */
+    /* use the GL context that is current (a window's); else a headless one is made and owned */
+    bool current_context;
+    bool gles;      /* GL3 without current_context: make an OpenGL ES context */
+    bool core_only; /* GL3: no extension, not even clip control */
 } strl_renderer_desc;
 
 typedef enum strl_debug_colour {
@@ -55,16 +57,16 @@ typedef enum strl_part_style {
 /* How to draw one list. Zero-initialise: every 0 takes its default. */
 typedef struct strl_draw_options {
     strl_debug_colour debug;
-    bool wireframe;         /* OpenGL ES draws the edges of backs too, whatever the list culls */
-    bool flat;              /* normals of the triangles instead of those of the vertices */
-    bool keep;              /* draw over the last image, which had the same camera, near and far */
-    uint8_t background[3];  /* sRGB-encoded */
-    float headlight;        /* strength of the light at the eye; 0 = 0.55 */
-    double sky_up[3];       /* world direction from which the sky shines; zero = +z */
-    double section[4];      /* world: only points p with x p.x + y p.y + z p.z <= w are drawn; zero = all */
-    /* Of parts by number, strl_part_style each; parts past the end are plain. It works on items with labels, and on placements with a part of their own. NULL = all
-     * plain. Borrowed for the draw. The version tells contents apart: vertices are sent again only where it differs from that of the
-     * draw before; change it with the contents. */
+    bool wireframe;        /* OpenGL ES draws the edges of backs too, whatever the list culls */
+    bool flat;             /* normals of the triangles instead of those of the vertices */
+    bool keep;             /* draw over the last image, which had the same camera, near and far */
+    uint8_t background[3]; /* sRGB-encoded */
+    float headlight;       /* strength of the light at the eye; 0 = 0.55 */
+    double sky_up[3];      /* world direction from which the sky shines; zero = +z */
+    double section[4];     /* world: only points p with x p.x + y p.y + z p.z <= w are drawn; zero = all */
+    /* Of parts by number, strl_part_style each; parts past the end are plain. It works on items with labels, and on
+     * placements with a part of their own. NULL = all plain. Borrowed for the draw. The version tells contents apart:
+     * vertices are sent again only where it differs from that of the draw before; change it with the contents. */
     const uint8_t *part_styles;
     uint32_t part_count;
     uint64_t styles_version;
@@ -78,8 +80,8 @@ typedef struct strl_render_stats {
     uint64_t uploaded_bytes; /* vertices and indices copied to the GPU in this draw */
     uint64_t uploaded_vertices;
     uint64_t uploaded_indices;
-    uint32_t evictions;      /* nodes thrown out of the budget in this draw */
-    uint64_t gpu_bytes;      /* all buffers of nodes now; never above gpu_memory_bytes */
+    uint32_t evictions; /* nodes thrown out of the budget in this draw */
+    uint64_t gpu_bytes; /* all buffers of nodes now; never above gpu_memory_bytes */
 } strl_render_stats;
 
 /* Fails with STRL_ERR_UNSUPPORTED where the system has no such context, with STRL_ERR_LIMIT where the image

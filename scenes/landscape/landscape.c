@@ -1,5 +1,6 @@
-/* Scene `landscape`: hills with a forest of detailed trees and some houses among them, for what Klein et al. 2005 show: detail that
- * nobody can simplify, again and again. Ground is there once, in tiles; each kind of tree and house is made once and has copies.
+/* Scene `landscape`: hills with a forest of detailed trees and some houses among them, for what Klein et al. 2005 show:
+ * detail that nobody can simplify, again and again. Ground is there once, in tiles; each kind of tree and house is made
+ * once and has copies.
  *
  * The forest is a square of plots, each with a tree or a house; more triangles are more plots. */
 #include "scenes/landscape/landscape.h"
@@ -11,7 +12,7 @@
 #include "base/hash.h"
 #include "base/memory.h"
 
-#define PLOT 7.0         /* between trees */
+#define PLOT 7.0 /* between trees */
 #define GROUND_SHARE 0.06
 #define HOUSE_SHARE 0.02 /* of plots */
 enum { TILE = 64, COPIES_AT_ONCE = 4096 };
@@ -34,9 +35,9 @@ enum { KINDS = STRL__TREE_KINDS + STRL__HOUSE_KINDS };
 typedef struct landscape {
     strl__scene_run *run;
     uint64_t seed;
-    uint64_t side;  /* plots along one */
-    uint64_t plots; /* that are taken, row by row */
-    uint32_t cells; /* of the ground, along a side */
+    uint64_t side;                    /* plots along one */
+    uint64_t plots;                   /* that are taken, row by row */
+    uint32_t cells;                   /* of the ground, along a side */
     strl__part_mesh meshes[KINDS][2]; /* the second of trees: leaves */
     strl__part_mesh tile;
     strl__copy *copies; /* [COPIES_AT_ONCE] */
@@ -46,7 +47,8 @@ typedef struct landscape {
 
 static double lattice(uint64_t seed, int64_t x, int64_t y)
 {
-    return strl__landscape_random(seed ^ strl__mix64((uint64_t)x * 0x9e3779b97f4a7c15u + (uint64_t)y * 0xd1342543de82ef95u));
+    return strl__landscape_random(seed ^
+                                  strl__mix64((uint64_t)x * 0x9e3779b97f4a7c15u + (uint64_t)y * 0xd1342543de82ef95u));
 }
 
 static double noise(uint64_t seed, double x, double y)
@@ -61,14 +63,16 @@ static double noise(uint64_t seed, double x, double y)
 
 double strl__landscape_height(uint64_t seed, double x, double y)
 {
-    return 60 * noise(seed + 1, x / 400, y / 400) + 14 * noise(seed + 2, x / 90, y / 90) + 2 * noise(seed + 3, x / 20, y / 20);
+    return 60 * noise(seed + 1, x / 400, y / 400) + 14 * noise(seed + 2, x / 90, y / 90) +
+           2 * noise(seed + 3, x / 20, y / 20);
 }
 
 static void put_ground_vertex(landscape *scene, double x, double y, double step)
 {
     const double position[3] = {x, y, strl__landscape_height(scene->seed, x, y)};
-    double normal[3] = {strl__landscape_height(scene->seed, x - step, y) - strl__landscape_height(scene->seed, x + step, y),
-                        strl__landscape_height(scene->seed, x, y - step) - strl__landscape_height(scene->seed, x, y + step), 2 * step};
+    double normal[3] = {
+        strl__landscape_height(scene->seed, x - step, y) - strl__landscape_height(scene->seed, x + step, y),
+        strl__landscape_height(scene->seed, x, y - step) - strl__landscape_height(scene->seed, x, y + step), 2 * step};
     strl__normalise(normal);
     strl__part_mesh_vertex(&scene->tile, position, normal);
 }
@@ -99,8 +103,9 @@ static strl_status put_ground(landscape *scene, strl_error *err)
             snprintf(name, sizeof name, "GROUND-%u-%u", row / TILE, column / TILE);
             make_tile(scene, column, row);
             const strl__part part = {name, STRL__GRASS, strl__affine_identity(), &scene->tile};
-            status = scene->tile.failed ? strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for the ground", scene->run->desc->path)
-                                        : scene->run->parts->put_part(scene->run->parts, &part, err);
+            status = scene->tile.failed
+                         ? strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for the ground", scene->run->desc->path)
+                         : scene->run->parts->put_part(scene->run->parts, &part, err);
             if (status == STRL_OK)
                 status = strl__scene_report(scene->run, "ground", row, scene->cells, err);
         }
@@ -142,17 +147,19 @@ static strl__copy copy_at(const landscape *scene, uint64_t plot)
     double at[3] = {PLOT * ((double)(plot % scene->side) + 0.2 + 0.6 * strl__landscape_random(key)),
                     PLOT * ((double)(plot / scene->side) + 0.2 + 0.6 * strl__landscape_random(key + 1)), 0};
     at[2] = strl__landscape_height(scene->seed, at[0], at[1]) - 0.1;
-    return strl__copy_upright(at, strl__landscape_random(key + 2), is_house ? 1 : 0.7 + 0.6 * strl__landscape_random(key + 3));
+    return strl__copy_upright(at, strl__landscape_random(key + 2),
+                              is_house ? 1 : 0.7 + 0.6 * strl__landscape_random(key + 3));
 }
 
 static strl_status put_some(landscape *scene, int kind, uint32_t count, strl_error *err)
 {
-    static const char *const names[KINDS] = {"OAK", "BEECH", "BIRCH", "MAPLE", "BUSH", "HOUSE-WHITE", "HOUSE-OCHRE", "HOUSE-RED"};
+    static const char *const names[KINDS] = {"OAK",  "BEECH",       "BIRCH",       "MAPLE",
+                                             "BUSH", "HOUSE-WHITE", "HOUSE-OCHRE", "HOUSE-RED"};
     strl__parts_writer *parts = scene->run->parts;
     const bool is_tree = kind < STRL__TREE_KINDS;
     const strl__affine plain = strl__affine_identity();
-    const strl__part first = {names[kind], is_tree ? STRL__BARK : (unsigned)(STRL__WALL + kind - STRL__TREE_KINDS), plain,
-                              &scene->meshes[kind][0]};
+    const strl__part first = {names[kind], is_tree ? STRL__BARK : (unsigned)(STRL__WALL + kind - STRL__TREE_KINDS),
+                              plain, &scene->meshes[kind][0]};
     const strl__part second = {names[kind], (unsigned)(STRL__LEAVES + kind), plain, &scene->meshes[kind][1]};
     strl_status status = count ? parts->put_copies(parts, &first, scene->copies, count, err) : STRL_OK;
     if (status == STRL_OK && count && is_tree)

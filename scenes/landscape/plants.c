@@ -71,7 +71,8 @@ static void put_leaves(tree_maker *tree, const double from[3], const double to[3
     }
 }
 
-static void grow(tree_maker *tree, const double from[3], const double direction[3], double length, double radius, int depth)
+static void grow(tree_maker *tree, const double from[3], const double direction[3], double length, double radius,
+                 int depth)
 {
     double to[3];
     for (int k = 0; k < 3; k++)
@@ -96,11 +97,18 @@ void strl__landscape_tree(uint64_t seed, int kind, strl__part_mesh *wood, strl__
     static const struct {
         double height, radius, leaf;
         int leaves, depth;
-    } kinds[STRL__TREE_KINDS] = {
-        {2.6, 0.16, 0.22, 45, 4}, {3.4, 0.2, 0.26, 35, 4}, {1.8, 0.09, 0.2, 60, 3}, {4.2, 0.28, 0.3, 50, 4}, {1.2, 0.07, 0.16, 90, 3}};
+    } kinds[STRL__TREE_KINDS] = {{2.6, 0.16, 0.22, 45, 4},
+                                 {3.4, 0.2, 0.26, 35, 4},
+                                 {1.8, 0.09, 0.2, 60, 3},
+                                 {4.2, 0.28, 0.3, 50, 4},
+                                 {1.2, 0.07, 0.16, 90, 3}};
     const double origin[3] = {0}, up[3] = {0, 0, 1};
-    tree_maker tree = {.random = strl__mix64(seed + 77u * (uint64_t)(kind + 1)), .wood = wood, .leaves = leaves,
-                       .leaf = kinds[kind].leaf, .leaves_of_twig = kinds[kind].leaves, .depth = kinds[kind].depth};
+    tree_maker tree = {.random = strl__mix64(seed + 77u * (uint64_t)(kind + 1)),
+                       .wood = wood,
+                       .leaves = leaves,
+                       .leaf = kinds[kind].leaf,
+                       .leaves_of_twig = kinds[kind].leaves,
+                       .depth = kinds[kind].depth};
     wood->place = leaves->place = strl__affine_identity();
     grow(&tree, origin, up, kinds[kind].height, kinds[kind].radius, 0);
 }
@@ -112,7 +120,8 @@ static void put_windows(strl__part_mesh *mesh, const double size[3], int columns
     for (int side = 0; side < 2; side++)
         for (int storey = 0; storey < storeys; storey++)
             for (int column = 0; column < columns; column++) {
-                const double middle[3] = {(column + 0.5) / columns * size[0] - size[0] / 2, (side - 0.5) * size[1], 1.5 + 2.8 * storey};
+                const double middle[3] = {(column + 0.5) / columns * size[0] - size[0] / 2, (side - 0.5) * size[1],
+                                          1.5 + 2.8 * storey};
                 strl__part_block(mesh, middle, 1.1, 0.12, 1.4);
                 const double sill[3] = {middle[0], middle[1], middle[2] - 0.75};
                 strl__part_block(mesh, sill, 1.3, 0.3, 0.08);
@@ -136,7 +145,8 @@ void strl__landscape_house(uint64_t seed, int kind, strl__part_mesh *mesh)
     static const double sizes[STRL__HOUSE_KINDS][3] = {{9, 7, 5.6}, {12, 8, 8.4}, {16, 9, 5.6}};
     const double *size = sizes[kind];
     const double low[3] = {-size[0] / 2, -size[1] / 2, -1}, high[3] = {size[0] / 2, size[1] / 2, size[2]};
-    const double chimney[3] = {size[0] * (0.1 + 0.2 * strl__landscape_random(seed + (uint64_t)kind)), 0.8, size[2] + size[1] * 0.4};
+    const double chimney[3] = {size[0] * (0.1 + 0.2 * strl__landscape_random(seed + (uint64_t)kind)), 0.8,
+                               size[2] + size[1] * 0.4};
     mesh->place = strl__affine_identity();
     strl__part_box(mesh, low, high);
     strl__part_block(mesh, chimney, 0.8, 0.8, 2);

@@ -4,8 +4,8 @@
  * accessors in another: each array grows in a file without a name and is put in its place at the end, so that no list
  * of parts is ever in memory. A node comes after its children, hence an open group holds the numbers of its children,
  * except for the outermost one, whose children wait in a file too. Vertices and indices are collected to batches of
- * some megabytes; each kind of a batch is one bufferView, which keeps the JSON short. Copies of a part are one node with
- * EXT_mesh_gpu_instancing. */
+ * some megabytes; each kind of a batch is one bufferView, which keeps the JSON short. Copies of a part are one node
+ * with EXT_mesh_gpu_instancing. */
 #include <inttypes.h>
 #include <stdio.h>
 #include <string.h>
@@ -153,7 +153,8 @@ static strl_status flush_batch(gltf_writer *self, strl_error *err)
     uint64_t written = self->bin.offset + self->bin.used;
     if (total && written && written + total > self->desc.buffer_bytes)
         status = begin_bin(self, err);
-    for (uint64_t view = self->counts[VIEWS] > KINDS ? self->counts[VIEWS] - KINDS : 0; view < self->counts[VIEWS]; view++)
+    for (uint64_t view = self->counts[VIEWS] > KINDS ? self->counts[VIEWS] - KINDS : 0; view < self->counts[VIEWS];
+         view++)
         for (int kind = 0; kind < KINDS && status == STRL_OK; kind++) /* in the order of their numbers */
             if (self->batch[kind].used && self->batch[kind].view == view)
                 status = put_view(self, kind, err);
@@ -220,7 +221,9 @@ static strl_status put_accessor(gltf_writer *self, const batch_kind *kind, size_
                                   "{\"bufferView\":%" PRIu64
                                   ",\"byteOffset\":%zu,\"componentType\":%d,\"count\":%" PRIu32 ",\"type\":\"%s\"",
                                   kind->view, kind->used - bytes, type == FLOATS ? FLOAT : type, count,
-                                  type == FLOAT ? "VEC3" : type == FLOATS ? "VEC4" : "SCALAR");
+                                  type == FLOAT    ? "VEC3"
+                                  : type == FLOATS ? "VEC4"
+                                                   : "SCALAR");
     return status;
 }
 
@@ -359,8 +362,8 @@ static strl_status put_places(gltf_writer *self, const strl__copy *copies, uint3
     return status;
 }
 
-static strl_status put_copies(strl__parts_writer *base, const strl__part *part, const strl__copy *copies, uint32_t count,
-                              strl_error *err)
+static strl_status put_copies(strl__parts_writer *base, const strl__part *part, const strl__copy *copies,
+                              uint32_t count, strl_error *err)
 {
     gltf_writer *self = (gltf_writer *)base;
     uint64_t mesh = 0;
@@ -372,7 +375,8 @@ static strl_status put_copies(strl__parts_writer *base, const strl__part *part, 
         status = begin_element(self, NODES, err);
     if (status == STRL_OK)
         status = strl__json_print(&self->arrays[NODES], err,
-                                  "{\"name\":\"%s\",\"mesh\":%" PRIu64 ",\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":"
+                                  "{\"name\":\"%s\",\"mesh\":%" PRIu64
+                                  ",\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":"
                                   "{\"TRANSLATION\":%" PRIu64 ",\"ROTATION\":%" PRIu64 ",\"SCALE\":%" PRIu64 "}}}}",
                                   part->name, mesh, first, first + 1, first + 2);
     base->vertices += (uint64_t)count * part->mesh->vertex_count;

@@ -170,8 +170,8 @@ void strl__part_prism(strl__part_mesh *mesh, const strl__outline *outline, doubl
     put_cap(mesh, outline, length, true);
 }
 
-void strl__part_vertex_in_world(const strl__part_mesh *mesh, uint32_t vertex, const strl__affine *world, double position[3],
-                                double normal[3])
+void strl__part_vertex_in_world(const strl__part_mesh *mesh, uint32_t vertex, const strl__affine *world,
+                                double position[3], double normal[3])
 {
     const float *from = mesh->vertices + (size_t)vertex * STRL__PART_VERTEX_FLOATS;
     for (int k = 0; k < 3; k++)

@@ -1,6 +1,6 @@
-/* The mesh of one part, put together of closed solids that face outward: each solid is watertight by itself, where vertices
- * at one place count as one (they are split where the normal breaks). Shapes are put through `place`, a rotation and
- * a move. A growing array that finds no memory sets `failed`, and everything after it does nothing. */
+/* The mesh of one part, put together of closed solids that face outward: each solid is watertight by itself, where
+ * vertices at one place count as one (they are split where the normal breaks). Shapes are put through `place`, a
+ * rotation and a move. A growing array that finds no memory sets `failed`, and everything after it does nothing. */
 #ifndef STRL_SCENES_PARTS_PART_MESH_H
 #define STRL_SCENES_PARTS_PART_MESH_H
 
@@ -82,7 +82,7 @@ void strl__part_torus(strl__part_mesh *mesh, double ring, double radius, int sid
 void strl__part_bolt(strl__part_mesh *mesh, double radius, double low, double high);
 
 /* A vertex in the world: its position, and its normal of length 1. */
-void strl__part_vertex_in_world(const strl__part_mesh *mesh, uint32_t vertex, const strl__affine *world, double position[3],
-                                double normal[3]);
+void strl__part_vertex_in_world(const strl__part_mesh *mesh, uint32_t vertex, const strl__affine *world,
+                                double position[3], double normal[3]);
 
 #endif

@@ -96,7 +96,8 @@ strl_status strl__plain_writer_create(const strl__parts_desc *desc, strl__parts_
     plain_writer *self = strl__alloc_zero(1, sizeof *self);
     if (!self)
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for the writer", desc->path);
-    self->base = (strl__parts_writer){open_group, put_part, close_group, strl__parts_write_out, finish, destroy, 0, 0, 0, 0};
+    self->base =
+        (strl__parts_writer){open_group, put_part, close_group, strl__parts_write_out, finish, destroy, 0, 0, 0, 0};
     self->no_normals = desc->no_normals;
     const strl__scene_mesh_desc mesh = {.path = desc->path,
                                         .layout = desc->no_normals ? STRL__SCENE_MESH_POSITION

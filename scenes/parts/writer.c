@@ -55,12 +55,12 @@ strl_status strl__parts_writer_create(const strl__parts_desc *desc, strl__parts_
 
 strl__affine strl__copy_place(const strl__copy *copy)
 {
-    const double x = (double)copy->turn[0], y = (double)copy->turn[1], z = (double)copy->turn[2], w = (double)copy->turn[3];
+    const double x = (double)copy->turn[0], y = (double)copy->turn[1], z = (double)copy->turn[2],
+                 w = (double)copy->turn[3];
     const double s = 2 / (x * x + y * y + z * z + w * w), scale = (double)copy->scale;
-    strl__affine place = {
-        .axis = {{1 - s * (y * y + z * z), s * (x * y + z * w), s * (x * z - y * w)},
-                 {s * (x * y - z * w), 1 - s * (x * x + z * z), s * (y * z + x * w)},
-                 {s * (x * z + y * w), s * (y * z - x * w), 1 - s * (x * x + y * y)}}};
+    strl__affine place = {.axis = {{1 - s * (y * y + z * z), s * (x * y + z * w), s * (x * z - y * w)},
+                                   {s * (x * y - z * w), 1 - s * (x * x + z * z), s * (y * z + x * w)},
+                                   {s * (x * z + y * w), s * (y * z - x * w), 1 - s * (x * x + y * y)}}};
     for (int i = 0; i < 3; i++) {
         place.origin[i] = (double)copy->move[i];
         for (int k = 0; k < 3; k++)
@@ -76,8 +76,8 @@ strl__copy strl__copy_upright(const double move[3], double turns, double scale)
     return (strl__copy){{(float)move[0], (float)move[1], (float)move[2]}, {0, 0, (float)s, (float)c}, (float)scale};
 }
 
-strl_status strl__parts_write_out(strl__parts_writer *self, const strl__part *part, const strl__copy *copies, uint32_t count,
-                                  strl_error *err)
+strl_status strl__parts_write_out(strl__parts_writer *self, const strl__part *part, const strl__copy *copies,
+                                  uint32_t count, strl_error *err)
 {
     strl_status status = STRL_OK;
     for (uint32_t i = 0; i < count && status == STRL_OK; i++) {

@@ -1,7 +1,6 @@
-/* Writes a tree of named parts, one after the other, to one of several formats: glTF and OBJ keep names, materials and (glTF)
- * placements; PLY and STL keep the triangles, in the world's place.
- * Order of calls: the outermost group is opened, holds groups and parts, and is closed; then finish. destroy always;
- * without finish it removes everything. */
+/* Writes a tree of named parts, one after the other, to one of several formats: glTF and OBJ keep names, materials and
+ * (glTF) placements; PLY and STL keep the triangles, in the world's place. Order of calls: the outermost group is
+ * opened, holds groups and parts, and is closed; then finish. destroy always; without finish it removes everything. */
 #ifndef STRL_SCENES_PARTS_WRITER_H
 #define STRL_SCENES_PARTS_WRITER_H
 
@@ -28,8 +27,8 @@ typedef struct strl__part {
     const strl__part_mesh *mesh;
 } strl__part;
 
-/* Where a copy of a part is: turned by a quaternion, stretched alike in all directions, moved. As floats, which is how glTF has them:
- * files that write copies out have them in the same place. */
+/* Where a copy of a part is: turned by a quaternion, stretched alike in all directions, moved. As floats, which is how
+ * glTF has them: files that write copies out have them in the same place. */
 typedef struct strl__copy {
     float move[3], turn[4], scale;
 } strl__copy;
@@ -55,19 +54,19 @@ struct strl__parts_writer {
     strl_status (*open_group)(strl__parts_writer *self, const char *name, const strl__affine *place, strl_error *err);
     strl_status (*put_part)(strl__parts_writer *self, const strl__part *part, strl_error *err);
     strl_status (*close_group)(strl__parts_writer *self, strl_error *err);
-    /* The part as often as there are copies; its own place counts for nothing. glTF gets the mesh once, however many calls there
-     * are for it: it must stay as it is until finish. Others write copies out. */
-    strl_status (*put_copies)(strl__parts_writer *self, const strl__part *part, const strl__copy *copies, uint32_t count,
-                              strl_error *err);
+    /* The part as often as there are copies; its own place counts for nothing. glTF gets the mesh once, however many
+     * calls there are for it: it must stay as it is until finish. Others write copies out. */
+    strl_status (*put_copies)(strl__parts_writer *self, const strl__part *part, const strl__copy *copies,
+                              uint32_t count, strl_error *err);
     strl_status (*finish)(strl__parts_writer *self, strl_output_report report, void *context, strl_error *err);
     void (*destroy)(strl__parts_writer *self);
     uint64_t vertices, triangles, parts; /* each copy counts */
-    uint64_t bytes; /* of all files, once finished */
+    uint64_t bytes;                      /* of all files, once finished */
 };
 
 /* put_copies of formats without it. */
-strl_status strl__parts_write_out(strl__parts_writer *self, const strl__part *part, const strl__copy *copies, uint32_t count,
-                                  strl_error *err);
+strl_status strl__parts_write_out(strl__parts_writer *self, const strl__part *part, const strl__copy *copies,
+                                  uint32_t count, strl_error *err);
 
 /* By the path's ending: .gltf, .obj, .ply or .stl. */
 strl_status strl__parts_writer_create(const strl__parts_desc *desc, strl__parts_writer **writer, strl_error *err);

@@ -1,5 +1,5 @@
-/* Where pipe lines go: headers along the rack, lines from nozzles to headers and between nozzles, and banks under floors.
- * Every line has heights and offsets of its own, told by its number, so that few pipes meet. */
+/* Where pipe lines go: headers along the rack, lines from nozzles to headers and between nozzles, and banks under
+ * floors. Every line has heights and offsets of its own, told by its number, so that few pipes meet. */
 #include "scenes/plant/plant.h"
 
 #include <math.h>

@@ -1,4 +1,5 @@
-/* Pipe lines: a route of axis-aligned legs becomes straight runs, elbows, flanges with bolts, valves, straps and hangers. */
+/* Pipe lines: a route of axis-aligned legs becomes straight runs, elbows, flanges with bolts, valves, straps and
+ * hangers. */
 #include "scenes/plant/plant.h"
 
 #include <math.h>

@@ -1,9 +1,9 @@
 /* What the makers of a plant's pieces share.
  *
- * A unit of the plant is made of items (a floor, a vessel, a pipe line), each of some parts. An item is first made without
- * writing it, to count its triangles, and then in earnest where it fits into what is left of the budget: so the whole
- * has the wanted number of triangles without any list of what there is. Making is a pure function of the state below.
- * Lengths are metres, z is up. After a failure `status` is set and every call does nothing. */
+ * A unit of the plant is made of items (a floor, a vessel, a pipe line), each of some parts. An item is first made
+ * without writing it, to count its triangles, and then in earnest where it fits into what is left of the budget: so the
+ * whole has the wanted number of triangles without any list of what there is. Making is a pure function of the state
+ * below. Lengths are metres, z is up. After a failure `status` is set and every call does nothing. */
 #ifndef STRL_SCENES_PLANT_PLANT_H
 #define STRL_SCENES_PLANT_PLANT_H
 

@@ -138,8 +138,8 @@ static void plan_hollow(strl__plant *plant, int kind)
             unit->hollow[x][y] = true;
 }
 
-/* What makes a kind of unit: a boiler inside the frame, or a cooling tower beside it. Returns the width that it takes of the
- * ground on the right of the frame. */
+/* What makes a kind of unit: a boiler inside the frame, or a cooling tower beside it. Returns the width that it takes
+ * of the ground on the right of the frame. */
 static double make_landmark(strl__plant *plant, strl__plant_unit_kind kind, double right)
 {
     const strl__plant_unit *unit = &plant->unit;

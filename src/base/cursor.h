@@ -1,5 +1,5 @@
-/* Reading untrusted bytes: explicit little-endian reads with sticky failure. A failed cursor returns zeros and stays failed,
- * so a parser checks once, before it uses what it read. Never overlay a struct on bytes from outside. */
+/* Reading untrusted bytes: explicit little-endian reads with sticky failure. A failed cursor returns zeros and stays
+ * failed, so a parser checks once, before it uses what it read. Never overlay a struct on bytes from outside. */
 #ifndef STRL_BASE_CURSOR_H
 #define STRL_BASE_CURSOR_H
 
@@ -57,11 +57,26 @@ static inline uint64_t strl__cursor_le(strl_cursor *cursor, unsigned count)
     return bytes ? strl__load_le(bytes, count) : 0;
 }
 
-static inline uint8_t strl_cursor_u8(strl_cursor *cursor) { return (uint8_t)strl__cursor_le(cursor, 1); }
-static inline uint16_t strl_cursor_u16(strl_cursor *cursor) { return (uint16_t)strl__cursor_le(cursor, 2); }
-static inline uint32_t strl_cursor_u32(strl_cursor *cursor) { return (uint32_t)strl__cursor_le(cursor, 4); }
-static inline uint64_t strl_cursor_u64(strl_cursor *cursor) { return strl__cursor_le(cursor, 8); }
-static inline int64_t strl_cursor_i64(strl_cursor *cursor) { return (int64_t)strl__cursor_le(cursor, 8); }
+static inline uint8_t strl_cursor_u8(strl_cursor *cursor)
+{
+    return (uint8_t)strl__cursor_le(cursor, 1);
+}
+static inline uint16_t strl_cursor_u16(strl_cursor *cursor)
+{
+    return (uint16_t)strl__cursor_le(cursor, 2);
+}
+static inline uint32_t strl_cursor_u32(strl_cursor *cursor)
+{
+    return (uint32_t)strl__cursor_le(cursor, 4);
+}
+static inline uint64_t strl_cursor_u64(strl_cursor *cursor)
+{
+    return strl__cursor_le(cursor, 8);
+}
+static inline int64_t strl_cursor_i64(strl_cursor *cursor)
+{
+    return (int64_t)strl__cursor_le(cursor, 8);
+}
 
 static inline float strl_cursor_f32(strl_cursor *cursor)
 {
@@ -103,11 +118,26 @@ static inline void strl_writer_le(strl_writer *writer, unsigned count, uint64_t 
     writer->size += count;
 }
 
-static inline void strl_writer_u8(strl_writer *writer, uint8_t value) { strl_writer_le(writer, 1, value); }
-static inline void strl_writer_u16(strl_writer *writer, uint16_t value) { strl_writer_le(writer, 2, value); }
-static inline void strl_writer_u32(strl_writer *writer, uint32_t value) { strl_writer_le(writer, 4, value); }
-static inline void strl_writer_u64(strl_writer *writer, uint64_t value) { strl_writer_le(writer, 8, value); }
-static inline void strl_writer_i64(strl_writer *writer, int64_t value) { strl_writer_le(writer, 8, (uint64_t)value); }
+static inline void strl_writer_u8(strl_writer *writer, uint8_t value)
+{
+    strl_writer_le(writer, 1, value);
+}
+static inline void strl_writer_u16(strl_writer *writer, uint16_t value)
+{
+    strl_writer_le(writer, 2, value);
+}
+static inline void strl_writer_u32(strl_writer *writer, uint32_t value)
+{
+    strl_writer_le(writer, 4, value);
+}
+static inline void strl_writer_u64(strl_writer *writer, uint64_t value)
+{
+    strl_writer_le(writer, 8, value);
+}
+static inline void strl_writer_i64(strl_writer *writer, int64_t value)
+{
+    strl_writer_le(writer, 8, (uint64_t)value);
+}
 void strl_writer_f32(strl_writer *writer, float value);
 void strl_writer_f64(strl_writer *writer, double value);
 

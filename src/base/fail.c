@@ -7,8 +7,8 @@
 const char *strl_status_name(strl_status status)
 {
     static const char *const names[] = {
-        "ok", "bad argument", "out of memory", "input/output error", "disk full", "bad format",
-        "unsupported", "limit exceeded", "cancelled", "network error", "internal error",
+        "ok",          "bad argument",   "out of memory", "input/output error", "disk full",      "bad format",
+        "unsupported", "limit exceeded", "cancelled",     "network error",      "internal error",
     };
     unsigned index = (unsigned)status;
     return index < sizeof names / sizeof *names ? names[index] : "unknown status";
@@ -43,7 +43,7 @@ strl_status strl__fail_context(strl_error *err, strl_status status, const char *
     int used = vsnprintf(err->message, sizeof err->message, format, args);
     va_end(args);
     if (used > 0 && (size_t)used < sizeof err->message - 2)
-        snprintf(err->message + used, sizeof err->message - (size_t)used, ": %.*s",
-                 (int)sizeof err->message - used - 3, inner);
+        snprintf(err->message + used, sizeof err->message - (size_t)used, ": %.*s", (int)sizeof err->message - used - 3,
+                 inner);
     return err->status ? err->status : status;
 }

@@ -108,7 +108,8 @@ static bool arena_push_block(strl_arena *arena, size_t bytes)
     size_t size = bytes > ARENA_BLOCK_BYTES ? bytes : ARENA_BLOCK_BYTES;
     if (size > SIZE_MAX - sizeof(struct strl_arena_block))
         return false;
-    if (arena->limit_bytes && (arena->total_bytes > arena->limit_bytes || size > arena->limit_bytes - arena->total_bytes))
+    if (arena->limit_bytes &&
+        (arena->total_bytes > arena->limit_bytes || size > arena->limit_bytes - arena->total_bytes))
         return false;
     struct strl_arena_block *block = strl__alloc(1, sizeof *block + size);
     if (!block)

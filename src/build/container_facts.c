@@ -28,8 +28,8 @@ bool strl__shows_colour(const strl_ingest *ingest)
 strl_container_writer_desc strl_describe_container(const strl_build_context *context, const strl_ingest *ingest)
 {
     const strl_build_result *result = context->result;
-    strl_container_writer_desc desc = {.path = context->desc->output, .scratch_dir = context->scratch_dir,
-                                       .part_dir = context->part_dir};
+    strl_container_writer_desc desc = {
+        .path = context->desc->output, .scratch_dir = context->scratch_dir, .part_dir = context->part_dir};
     memcpy(desc.info.unit, ingest->unit, sizeof desc.info.unit);
     desc.info.up_axis = (uint32_t)ingest->up;
     desc.info.has_colour = strl__shows_colour(ingest);

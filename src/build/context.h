@@ -16,7 +16,7 @@ typedef struct strl_build_context {
     const strl_build_desc *desc;
     strl_build_result *result;
     strl_status (*run)(struct strl_build_context *context, strl_error *err); /* the builder's stages, of one tree */
-    struct strl_build_model *model; /* of which the tree is (model.h) */
+    struct strl_build_model *model;                                          /* of which the tree is (model.h) */
     strl_pool *pool;
     strl_spill_set *spills;
     const char *scratch_dir;

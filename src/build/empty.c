@@ -1,5 +1,5 @@
-/* The tree of a model without a triangle: one node that holds nothing, at the origin. What readers have skipped is counted in the
- * header, which is all that such a model has to tell. */
+/* The tree of a model without a triangle: one node that holds nothing, at the origin. What readers have skipped is
+ * counted in the header, which is all that such a model has to tell. */
 #include "base/fail.h"
 #include "build/container_facts.h"
 #include "geometry/payload.h"
@@ -21,8 +21,7 @@ static strl_status encode_nothing(strl_structure structure, strl_arena *arena, s
 
 strl_status strl_write_empty_tree(strl_container_writer *writer, strl_structure structure, strl_error *err)
 {
-    const strl_tree tree = {
-        .structure = structure, .step = 1, .node_count = 1, .level_count = 1, .group_count = 1};
+    const strl_tree tree = {.structure = structure, .step = 1, .node_count = 1, .level_count = 1, .group_count = 1};
     const strl_node node = {.parent = STRL_NONE,
                             .first_child = STRL_NONE,
                             .decode_parent = STRL_NONE,

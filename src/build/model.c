@@ -26,7 +26,8 @@ strl_status strl__model_run(strl_build_context *context, strl_error *err)
     return status;
 }
 
-strl_status strl__model_writer(strl_build_context *context, const strl_ingest *ingest, strl_container_writer **writer, strl_error *err)
+strl_status strl__model_writer(strl_build_context *context, const strl_ingest *ingest, strl_container_writer **writer,
+                               strl_error *err)
 {
     strl_build_model *model = context->model;
     strl_status status = STRL_OK;
@@ -38,7 +39,8 @@ strl_status strl__model_writer(strl_build_context *context, const strl_ingest *i
     return status;
 }
 
-strl_status strl__model_empty_tree(strl_build_context *context, const strl_ingest *ingest, strl_structure structure, strl_error *err)
+strl_status strl__model_empty_tree(strl_build_context *context, const strl_ingest *ingest, strl_structure structure,
+                                   strl_error *err)
 {
     strl_build_result *result = context->result;
     strl_container_writer *writer = NULL;
@@ -55,7 +57,8 @@ static void note_lattice(strl_build_context *context, const strl_ingest *ingest)
 {
     const strl_build_model *model = context->model;
     strl_build_result *result = context->result;
-    double scale = model->trees ? model->trees[model->tree].scale : 1, step = ingest->triangle_count ? ingest->step * scale : 0;
+    double scale = model->trees ? model->trees[model->tree].scale : 1,
+           step = ingest->triangle_count ? ingest->step * scale : 0;
     double moved = (double)ingest->leaf_error * step;
     result->step = step > result->step ? step : result->step;
     result->quantisation_error = moved > result->quantisation_error ? moved : result->quantisation_error;

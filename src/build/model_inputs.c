@@ -18,7 +18,8 @@
 /* ---- opening */
 
 /* Stored, never applied: what inputs say of themselves must agree, unless the caller says it. */
-static strl_status take_axes(const strl_build_context *context, const strl_reader_info *info, uint32_t input, strl_error *err)
+static strl_status take_axes(const strl_build_context *context, const strl_reader_info *info, uint32_t input,
+                             strl_error *err)
 {
     const strl_build_desc *desc = context->desc;
     strl_build_model *model = context->model;
@@ -28,8 +29,9 @@ static strl_status take_axes(const strl_build_context *context, const strl_reade
         return strl__fail(err, STRL_ERR_ARGUMENT, "%s and %s disagree about the up axis (%c and %c): say --up",
                           desc->inputs[0], desc->inputs[input], 'x' + (int)model->up, 'x' + (int)up);
     if (input > 0 && strcmp(unit, model->unit) != 0)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "%s and %s disagree about the unit (%s and %s): say --unit", desc->inputs[0],
-                          desc->inputs[input], *model->unit ? model->unit : "unknown", *unit ? unit : "unknown");
+        return strl__fail(err, STRL_ERR_ARGUMENT, "%s and %s disagree about the unit (%s and %s): say --unit",
+                          desc->inputs[0], desc->inputs[input], *model->unit ? model->unit : "unknown",
+                          *unit ? unit : "unknown");
     model->up = up;
     snprintf(model->unit, sizeof model->unit, "%s", unit);
     return STRL_OK;
@@ -97,8 +99,8 @@ static strl_status open_readers(strl_build_context *context, strl_error *err)
 
 static uint64_t expected_triangles(const strl_reader_info *info, uint64_t announced)
 {
-    /* A file may announce more than it has room for: nothing tells of a triangle in less than a byte, unless one is read
-     * many times over. */
+    /* A file may announce more than it has room for: nothing tells of a triangle in less than a byte, unless one is
+     * read many times over. */
     uint64_t triangles = info->hint_is_exact || announced < info->file_bytes ? announced : info->file_bytes;
     return triangles < MOST_TRIANGLES ? triangles : MOST_TRIANGLES;
 }
@@ -187,8 +189,8 @@ static strl_status survey_placements(strl_build_context *context, uint32_t input
     return status;
 }
 
-/* Texture coordinates are told over the range of all triangles of a material, in whatever tree they are: pieces are read
- * once more before the first tree. */
+/* Texture coordinates are told over the range of all triangles of a material, in whatever tree they are: pieces are
+ * read once more before the first tree. */
 static strl_status measure_pieces(strl_build_context *context, uint32_t input, strl_error *err)
 {
     strl_reader *reader = context->model->readers[input];
@@ -238,14 +240,17 @@ static strl_status survey_pieces(strl_build_context *context, strl_error *err)
 /* More of it where there are texture coordinates, which is known after the survey. */
 #define SCRATCH_BYTES_OF_TEXCOORDS 24u
 
-strl_status strl__model_check_disk(const strl_build_context *context, uint64_t triangles, bool has_texcoords, strl_error *err)
+strl_status strl__model_check_disk(const strl_build_context *context, uint64_t triangles, bool has_texcoords,
+                                   strl_error *err)
 {
     uint64_t free_bytes,
         needed = triangles * (SCRATCH_BYTES_OF_TRIANGLE + (has_texcoords ? SCRATCH_BYTES_OF_TEXCOORDS : 0));
     strl_status status = strl_path_free_bytes(context->scratch_dir, &free_bytes, err);
     if (!status && free_bytes < needed)
-        status = strl__fail(err, STRL_ERR_DISK_FULL, "%s has %" PRIu64 " bytes free, expected %" PRIu64 " for the scratch of %" PRIu64
-                            " triangles: name another folder by --scratch", context->scratch_dir, free_bytes, needed, triangles);
+        status = strl__fail(err, STRL_ERR_DISK_FULL,
+                            "%s has %" PRIu64 " bytes free, expected %" PRIu64 " for the scratch of %" PRIu64
+                            " triangles: name another folder by --scratch",
+                            context->scratch_dir, free_bytes, needed, triangles);
     return status;
 }
 
@@ -278,8 +283,9 @@ strl_status strl__model_open(strl_build_context *context, strl_error *err)
     strl_build_model *model = context->model;
     uint64_t certain = 0;
     model->readers = strl__alloc_zero(context->desc->input_count, sizeof *model->readers);
-    strl_status status = model->readers ? open_readers(context, err)
-                                        : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u inputs", context->desc->input_count);
+    strl_status status = model->readers
+                             ? open_readers(context, err)
+                             : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u inputs", context->desc->input_count);
     if (!status)
         status = list_trees(context, &certain, err);
     if (!status)

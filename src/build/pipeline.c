@@ -78,8 +78,8 @@ static strl_status check_inputs(const strl_build_desc *desc, const char *target,
             return strl__fail(err, STRL_ERR_ARGUMENT, "an input's name is empty, expected the name of a file to read");
         status = strl_path_stat(desc->inputs[i], &input, err);
         if (status == STRL_OK && exists && input.device == output.device && input.inode == output.inode)
-            return strl__fail(err, STRL_ERR_ARGUMENT, "the output %s is the input %s: choose another name", desc->output,
-                              desc->inputs[i]);
+            return strl__fail(err, STRL_ERR_ARGUMENT, "the output %s is the input %s: choose another name",
+                              desc->output, desc->inputs[i]);
     }
     return status;
 }
@@ -99,7 +99,8 @@ static strl_status check_request(const strl_build_desc *desc, char **target, str
 
 /* A folder of our own, in the user's where there is one: two builds of one output do not meet, and nobody else's files
  * are in it. */
-static strl_status open_scratch(const strl_build_desc *desc, const char *target, strl_scratch **scratch, strl_error *err)
+static strl_status open_scratch(const strl_build_desc *desc, const char *target, strl_scratch **scratch,
+                                strl_error *err)
 {
     const char *slash = strrchr(target, '/'), *name = slash ? slash + 1 : target;
     size_t size = strlen(desc->scratch ? desc->scratch : "") + strlen(target) + sizeof "/.tmp";
@@ -110,14 +111,16 @@ static strl_status open_scratch(const strl_build_desc *desc, const char *target,
         snprintf(path, size, "%s/%s.tmp", desc->scratch, name);
     else
         snprintf(path, size, "%s.tmp", target);
-    const strl_scratch_desc wanted = {.path = path, .parent = desc->scratch, .names = scratch_names, .keep = desc->resume};
+    const strl_scratch_desc wanted = {
+        .path = path, .parent = desc->scratch, .names = scratch_names, .keep = desc->resume};
     strl_status status = strl_scratch_create(&wanted, scratch, err);
     strl__free(path);
     return status;
 }
 
-/* Where scratch is elsewhere, what is unfinished of the output still lies beside it, to be renamed: in a folder of ours too, so
- * that the next build removes what a kill has left. *scratch: NULL where the build's own scratch is that folder. */
+/* Where scratch is elsewhere, what is unfinished of the output still lies beside it, to be renamed: in a folder of ours
+ * too, so that the next build removes what a kill has left. *scratch: NULL where the build's own scratch is that
+ * folder. */
 static strl_status open_part_scratch(const char *target, const char *own, strl_scratch **scratch, strl_error *err)
 {
     strl_file_info there, here;
@@ -136,7 +139,8 @@ static strl_status open_part_scratch(const char *target, const char *own, strl_s
     return status;
 }
 
-/* What a worker holds at most, measured on soups, scans and plants: a group's meshes, merged, and what simplifies them. */
+/* What a worker holds at most, measured on soups, scans and plants: a group's meshes, merged, and what simplifies them.
+ */
 #define WORKER_BYTES (36ull << 20)
 #define SHARED_BYTES (28ull << 20)
 
@@ -164,8 +168,10 @@ static strl_status resume(strl_build_context *context, strl_scratch *scratch, st
         strl__build_expect(context, context->progress.triangles_in);
     if (!status && !context->has_checkpoint && context->desc->warn) {
         char text[1200];
-        snprintf(text, sizeof text, "%.1000s holds no finished stage of an earlier build (one with another --scratch lies there): building from the beginning",
-                 context->scratch_dir);
+        snprintf(
+            text, sizeof text,
+            "%.1000s holds no finished stage of an earlier build (one with another --scratch lies there): building from the beginning",
+            context->scratch_dir);
         context->desc->warn(context->desc->context, text);
     }
     return status;
@@ -238,7 +244,8 @@ static strl_status run(strl_build_context *context, const char *target, strl_err
     if (!status)
         status = run_in_scratch(context, scratch, err);
     strl_scratch_destroy(parts);
-    context->result->scratch_kept = status && context->has_checkpoint && (resumes || is_stopped(context, resumes, status));
+    context->result->scratch_kept =
+        status && context->has_checkpoint && (resumes || is_stopped(context, resumes, status));
     if (context->result->scratch_kept)
         strl_scratch_leave(scratch);
     else
@@ -251,11 +258,17 @@ static strl_status build_with(strl_status (*stages)(strl_build_context *, strl_e
 {
     char *target = NULL;
     uint64_t started = strl_clock_ns(), cpu_started = strl_clock_cpu_ns();
-    strl_build_context context = {.desc = desc, .result = result, .run = stages, .keep = desc->keep || desc->resume,
+    strl_build_context context = {.desc = desc,
+                                  .result = result,
+                                  .run = stages,
+                                  .keep = desc->keep || desc->resume,
                                   .memory_bytes = desc->memory_bytes ? desc->memory_bytes : 1ull << 30};
     *result = (strl_build_result){.inputs = desc->input_count};
     strl__estimate_start(&context.estimate,
-                         stages == strl__samples_run ? STRL_BUILD_SAMPLES : desc->certify ? STRL_BUILD_CERTIFIED : STRL_BUILD_CLUSTERS, started);
+                         stages == strl__samples_run ? STRL_BUILD_SAMPLES
+                         : desc->certify             ? STRL_BUILD_CERTIFIED
+                                                     : STRL_BUILD_CLUSTERS,
+                         started);
     context.progress.memory_bytes = context.memory_bytes;
     strl_status status = check_request(desc, &target, err);
     if (!status)
@@ -271,7 +284,9 @@ static strl_status build_with(strl_status (*stages)(strl_build_context *, strl_e
 strl_status strl_build_clusters(const strl_build_desc *desc, strl_build_result *result, strl_error *err)
 {
     if (desc->probability > 0)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "--probability is of sample trees: clusters are simplified, and nothing of them is left to chance");
+        return strl__fail(
+            err, STRL_ERR_ARGUMENT,
+            "--probability is of sample trees: clusters are simplified, and nothing of them is left to chance");
     return build_with(strl__clusters_run, desc, result, err);
 }
 
@@ -281,6 +296,7 @@ strl_status strl_build_samples(const strl_build_desc *desc, strl_build_result *r
         return strl__fail(err, STRL_ERR_ARGUMENT, "a sample tree takes no %s",
                           desc->certify ? "--certify: it claims no error" : "--no-dependencies: it has none");
     if (!(desc->probability >= 0 && desc->probability < 1))
-        return strl__fail(err, STRL_ERR_ARGUMENT, "the probability of a sample is %g, expected one between 0 and 1", desc->probability);
+        return strl__fail(err, STRL_ERR_ARGUMENT, "the probability of a sample is %g, expected one between 0 and 1",
+                          desc->probability);
     return build_with(strl__samples_run, desc, result, err);
 }

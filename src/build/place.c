@@ -1,5 +1,6 @@
-/* Placements into the container: those that are near each other lie together, so that what bounds a run of them is small. Where some are
- * large beside the rest (the ground under a forest), these come first of their window: who reads over a slow link sees them with the first page. */
+/* Placements into the container: those that are near each other lie together, so that what bounds a run of them is
+ * small. Where some are large beside the rest (the ground under a forest), these come first of their window: who reads
+ * over a slow link sees them with the first page. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +15,7 @@
 /* As many as fit are put into order at once; where there are more, one such window follows the other. */
 #define SHARES_OF_MEMORY 8u
 #define LEAST_AT_ONCE 4096u
-#define LEAST_BOX 16u /* what a walk has boxes over */
+#define LEAST_BOX 16u     /* what a walk has boxes over */
 #define LARGE_SHARE 0.125 /* of the extent of all centres */
 
 /* Where a placement is. */
@@ -51,7 +52,8 @@ static void part(spot *items, size_t count, size_t left, unsigned axis)
 {
     size_t low = 0, high = count - 1;
     while (low < high) {
-        const spot pivot = items[low + strl__mix64(low ^ high << 32) % (high - low + 1)]; /* no order of the input is a bad one */
+        /* no order of the input is a bad one */
+        const spot pivot = items[low + strl__mix64(low ^ high << 32) % (high - low + 1)];
         size_t i = low, j = high;
         while (i <= j) {
             while (comes_before(&items[i], &pivot, axis))
@@ -95,8 +97,8 @@ static int by_index(const void *left, const void *right)
     return a->index < b->index ? -1 : a->index > b->index;
 }
 
-/* Halves them across their longest side, again and again; the first half is a power of two. So every 16, every 512 and so on that
- * begin at a multiple of their number are what one box of a tree of boxes holds. */
+/* Halves them across their longest side, again and again; the first half is a power of two. So every 16, every 512 and
+ * so on that begin at a multiple of their number are what one box of a tree of boxes holds. */
 static void put_in_order(spot *items, size_t count)
 {
     while (count > LEAST_BOX) {
@@ -183,7 +185,8 @@ static strl_status add_of_input(placing *p, uint32_t input, strl_error *err)
     while (!status && found) {
         status = strl_reader_next_placement(model->readers[input], &placement, &found, err);
         if (!status && found)
-            status = add(p, model->first_tree[input] + placement.piece - 1, p->part_base + placement.part + 1, placement.transform, err);
+            status = add(p, model->first_tree[input] + placement.piece - 1, p->part_base + placement.part + 1,
+                         placement.transform, err);
     }
     return status;
 }
@@ -201,12 +204,14 @@ static strl_status place_trees(strl_build_context *context, strl_error *err)
     static const double as_it_is[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     strl_build_model *model = context->model;
     placing p = {.context = context};
-    uint64_t fit = context->memory_bytes / SHARES_OF_MEMORY / (sizeof *p.items + sizeof *p.spots), all = count_placements(model);
+    uint64_t fit = context->memory_bytes / SHARES_OF_MEMORY / (sizeof *p.items + sizeof *p.spots),
+             all = count_placements(model);
     p.capacity = (size_t)(all < LEAST_AT_ONCE ? LEAST_AT_ONCE : all < fit ? all : fit / LEAST_AT_ONCE * LEAST_AT_ONCE);
     p.capacity = p.capacity < LEAST_AT_ONCE ? LEAST_AT_ONCE : p.capacity;
     p.items = strl__alloc(p.capacity, sizeof *p.items);
     p.spots = strl__alloc(p.capacity, sizeof *p.spots);
-    strl_status status = p.items && p.spots ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu placements", p.capacity);
+    strl_status status =
+        p.items && p.spots ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu placements", p.capacity);
     if (!status && model->trees[0].input == STRL_EVERY_INPUT)
         status = add(&p, 0, 0, as_it_is, err);
     for (uint32_t i = 0; i < context->desc->input_count && !status; i++) {

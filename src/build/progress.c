@@ -21,24 +21,25 @@ typedef struct stage_share {
 
 /* Measured on isosurfaces, in order, shuffled and as STL. They sum to 1. */
 static const stage_share cluster_stages[] = {{"survey", 1, 0.013},
-                                     {"read", 2, 0.043},
-                                     {"sort", 3, 0.052},
-                                     {"connect", 4, 0.07},
-                                     {"partition", 5, 0.005},
-                                     {"level 0", 6, 0.355},
-                                     {"level 1", 6, 0.152},
-                                     {"level 2", 6, 0.095},
-                                     {"level 3", 6, 0.039},
-                                     {"level 4", 6, 0.018},
-                                     {"level 5", 6, 0.009},
-                                     {"level 6", 6, 0.004},
-                                     {"level 7", 6, 0.003},
-                                     {"level 8", 6, 0.002},
-                                     {"level 9", 6, 0.002},
-                                     {"higher levels", 6, 0.003},
-                                     {"write", STRL_BUILD_STAGES, 0.135}};
+                                             {"read", 2, 0.043},
+                                             {"sort", 3, 0.052},
+                                             {"connect", 4, 0.07},
+                                             {"partition", 5, 0.005},
+                                             {"level 0", 6, 0.355},
+                                             {"level 1", 6, 0.152},
+                                             {"level 2", 6, 0.095},
+                                             {"level 3", 6, 0.039},
+                                             {"level 4", 6, 0.018},
+                                             {"level 5", 6, 0.009},
+                                             {"level 6", 6, 0.004},
+                                             {"level 7", 6, 0.003},
+                                             {"level 8", 6, 0.002},
+                                             {"level 9", 6, 0.002},
+                                             {"higher levels", 6, 0.003},
+                                             {"write", STRL_BUILD_STAGES, 0.135}};
 
-static const stage_share sample_stages[] = {{"survey", 1, 0.11}, {"read", 2, 0.17}, {"sort", 3, 0.7}, {"write", STRL_BUILD_STAGES, 0.02}};
+static const stage_share sample_stages[] = {
+    {"survey", 1, 0.11}, {"read", 2, 0.17}, {"sort", 3, 0.7}, {"write", STRL_BUILD_STAGES, 0.02}};
 
 const char *strl_build_stage_name(uint32_t stage)
 {
@@ -83,7 +84,8 @@ void strl__estimate_stage(strl_estimate *estimate, const char *stage)
 {
     bool is_sampled = estimate->kind == STRL_BUILD_SAMPLES;
     const stage_share *stages = is_sampled ? sample_stages : cluster_stages;
-    size_t count = is_sampled ? sizeof sample_stages / sizeof *sample_stages : sizeof cluster_stages / sizeof *cluster_stages;
+    size_t count =
+        is_sampled ? sizeof sample_stages / sizeof *sample_stages : sizeof cluster_stages / sizeof *cluster_stages;
     double before = 0;
     for (size_t i = 0; i < count; before += stages[i++].share) {
         if (strcmp(stages[i].name, stage) != 0)
@@ -95,14 +97,16 @@ void strl__estimate_stage(strl_estimate *estimate, const char *stage)
         estimate->stage_share = stages[i].share;
         return;
     }
-    estimate->stage_first = estimate->tree_share > 0 ? (estimate->share - estimate->tree_first) / estimate->tree_share : 0;
+    estimate->stage_first =
+        estimate->tree_share > 0 ? (estimate->share - estimate->tree_first) / estimate->tree_share : 0;
     estimate->stage_share = 0;
 }
 
 void strl__estimate_update(strl_estimate *estimate, uint64_t done, uint64_t total, uint64_t now_ns)
 {
     double part = total ? (done < total ? (double)done / (double)total : 1) : 0;
-    double reached = fmin(estimate->tree_first + estimate->tree_share * (estimate->stage_first + part * estimate->stage_share), 1);
+    double reached =
+        fmin(estimate->tree_first + estimate->tree_share * (estimate->stage_first + part * estimate->stage_share), 1);
     double grown = reached - estimate->share;
     /* Without progress time only adds up, so that a stage that stands still is seen in the end. */
     if (grown > 0) {

@@ -1,8 +1,8 @@
 /* How far a build is, and how long the rest will take.
  *
- * Every stage has a share of the whole, as measured, so that one figure grows from 0 to 1. Time per share is what the last
- * tenth of the work took, mostly: models differ in where their time goes, and a stage that is slower than it should be must
- * soon be believed. Before that there is a guess from the number of triangles. */
+ * Every stage has a share of the whole, as measured, so that one figure grows from 0 to 1. Time per share is what the
+ * last tenth of the work took, mostly: models differ in where their time goes, and a stage that is slower than it
+ * should be must soon be believed. Before that there is a guess from the number of triangles. */
 #ifndef STRL_BUILD_PROGRESS_H
 #define STRL_BUILD_PROGRESS_H
 

@@ -102,10 +102,12 @@ static strl_status compare_structure(const strl_build_context *context, strl_cur
     bool now = context->run == strl__samples_run, before = strl_cursor_u8(saved);
     double probability = strl_cursor_f64(saved);
     if (now != before)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "--structure is %s, in the build to be resumed it was %s", names[now], names[before]);
+        return strl__fail(err, STRL_ERR_ARGUMENT, "--structure is %s, in the build to be resumed it was %s", names[now],
+                          names[before]);
     return !now || probability == context->desc->probability
                ? STRL_OK
-               : strl__fail(err, STRL_ERR_ARGUMENT, "--probability is %.17g, in the build to be resumed it was %.17g (0 = the default)",
+               : strl__fail(err, STRL_ERR_ARGUMENT,
+                            "--probability is %.17g, in the build to be resumed it was %.17g (0 = the default)",
                             context->desc->probability, probability);
 }
 

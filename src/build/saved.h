@@ -12,7 +12,8 @@ typedef struct strl_saved_writer {
 
 /* Between two records: appends what there is, once it is worth it. */
 strl_status strl_saved_put(strl_saved_writer *writer, strl_error *err);
-/* Appends the rest and releases the buffer, in any case. `status`: of the writing so far, which is returned if it is a failure. */
+/* Appends the rest and releases the buffer, in any case. `status`: of the writing so far, which is returned if it is a
+ * failure. */
 strl_status strl_saved_finish(strl_saved_writer *writer, strl_status status, strl_error *err);
 
 typedef struct strl_saved_reader {

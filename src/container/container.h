@@ -1,6 +1,6 @@
-/* The container: one .stroll file, format version 1 (docs/format.md is normative). This header adds to stroll/container.h what
- * a file holds below the facts, and the rest of the blocking reader. The walk uses the same decoders through
- * container/treelet.h without ever waiting. */
+/* The container: one .stroll file, format version 1 (docs/format.md is normative). This header adds to
+ * stroll/container.h what a file holds below the facts, and the rest of the blocking reader. The walk uses the same
+ * decoders through container/treelet.h without ever waiting. */
 #ifndef STRL_CONTAINER_CONTAINER_H
 #define STRL_CONTAINER_CONTAINER_H
 
@@ -25,7 +25,8 @@ typedef enum strl_structure {
     STRL_STRUCTURE_SAMPLES = 3
 } strl_structure;
 
-/* Which rung of the simplification ladder a node's mesh needed (docs/algorithms/clusters.md); errors hold on all of them. */
+/* Which rung of the simplification ladder a node's mesh needed (docs/algorithms/clusters.md); errors hold on all of
+ * them. */
 typedef enum strl_rung {
     STRL_RUNG_TOPOLOGY,
     STRL_RUNG_SEAMS,
@@ -59,8 +60,8 @@ typedef struct strl_node {
     int64_t anchor[3];   /* lattice cell that the payload's positions are relative to */
     int64_t box_min[3];  /* lattice; encloses the node's geometry in every state and the boxes of its children */
     int64_t box_max[3];
-    int64_t
-        group_box_min[3]; /* encloses the boxes of all members and the group boxes of all groups of their children */
+    /* encloses the boxes of all members and the group boxes of all groups of their children */
+    int64_t group_box_min[3];
     int64_t group_box_max[3];
     float geometric_min, geometric_max;   /* error range in lattice units: finest state, base mesh */
     float appearance_min, appearance_max; /* the same for appearance */
@@ -75,8 +76,10 @@ typedef struct strl_node {
     strl_page_ref page;       /* the page that holds the payload */
     uint32_t payload_offset;  /* within the page */
     uint32_t payload_bytes;
-    uint32_t decode_parent; /* STRL_NONE: the payload is self-contained; else the parent, whose mesh is needed to decode it */
-    strl_cone cone; /* of the normals of all triangles of the node and of those below it; sample trees alone have one */
+    /* STRL_NONE: the payload is self-contained; else the parent, whose mesh is needed to decode it */
+    uint32_t decode_parent;
+    /* of the normals of all triangles of the node and of those below it; sample trees alone have one */
+    strl_cone cone;
 } strl_node;
 
 /* One tree. Lattice cell c is the point origin + step * c in model units. */
@@ -94,19 +97,21 @@ typedef struct strl_tree {
     float leaf_geometric;    /* lattice units: half a cell's diagonal and what ingest adds */
 } strl_tree;
 
-const strl_tree *strl_container_tree(const strl_container *container, uint32_t tree); /* borrowed; NULL out of range */
-strl_source *strl_container_source(strl_container *container);                        /* borrowed */
+/* borrowed; NULL out of range */
+const strl_tree *strl_container_tree(const strl_container *container, uint32_t tree);
+strl_source *strl_container_source(strl_container *container); /* borrowed */
 
 /* Blocking calls, for tools. A few treelets are cached. */
 strl_status strl_container_node(strl_container *container, uint32_t tree, uint32_t node, strl_node *record,
                                 strl_error *err);
 /* Where the treelet lies that holds the node's record. After strl_container_node of the same node it is known. */
-strl_status strl_container_treelet_of(strl_container *container, uint32_t tree, uint32_t node, strl_treelet_place *place,
-                                      strl_error *err);
+strl_status strl_container_treelet_of(strl_container *container, uint32_t tree, uint32_t node,
+                                      strl_treelet_place *place, strl_error *err);
 /* Bytes of memory that looking nodes up in all trees can take at most. */
 uint64_t strl_container_lookup_bytes(const strl_container *container);
-/* Reads and decodes a node's mesh into arena; the page's checksum is checked. Meshes that it is decoded by are decoded too,
- * and kept along one way from the root: to go through nodes in the order of their ids costs about twice their own decoding. */
+/* Reads and decodes a node's mesh into arena; the page's checksum is checked. Meshes that it is decoded by are decoded
+ * too, and kept along one way from the root: to go through nodes in the order of their ids costs about twice their own
+ * decoding. */
 strl_status strl_container_mesh(strl_container *container, uint32_t tree, const strl_node *record, strl_arena *arena,
                                 strl_pm *mesh, strl_error *err);
 

@@ -1,9 +1,10 @@
-/* Uniform cuts: the coarsest front of a tree with every claimed geometric error at most a given length, everywhere the same.
- * Used by `extract`, by `render --full` (length 0: all leaves in their finest state) and by tests. Of a sample tree, where
- * nodes add up, what is above the front is active with it.
+/* Uniform cuts: the coarsest front of a tree with every claimed geometric error at most a given length, everywhere the
+ * same. Used by `extract`, by `render --full` (length 0: all leaves in their finest state) and by tests. Of a sample
+ * tree, where nodes add up, what is above the front is active with it.
  *
- * A group splits while its geometric error is above the length; errors grow to the root, so a node is active when its parent's
- * group splits and its own does not, or is a leaf. Each is drawn in its coarsest state within the length, or its finest.
+ * A group splits while its geometric error is above the length; errors grow to the root, so a node is active when its
+ * parent's group splits and its own does not, or is a leaf. Each is drawn in its coarsest state within the length, or
+ * its finest.
  *
  *     strl_cut_init(&cut, container, 0, length);
  *     while ((status = strl_cut_next(&cut, &id, &record, err)) == STRL_OK && id != STRL_NONE)

@@ -157,15 +157,19 @@ static strl_status check_known_section(const strl__section *section, uint64_t fi
 static strl_status check_optional(const strl__header *header, strl_error *err)
 {
     const strl__section *sections = header->sections;
-    const uint64_t images = sections[STRL__SECTION_IMAGES - 1].item_count, materials = sections[STRL__SECTION_MATERIALS - 1].item_count;
-    const uint64_t runs = sections[STRL__SECTION_RUNS - 1].item_count, placements = sections[STRL__SECTION_PLACEMENTS - 1].item_count;
+    const uint64_t images = sections[STRL__SECTION_IMAGES - 1].item_count,
+                   materials = sections[STRL__SECTION_MATERIALS - 1].item_count;
+    const uint64_t runs = sections[STRL__SECTION_RUNS - 1].item_count,
+                   placements = sections[STRL__SECTION_PLACEMENTS - 1].item_count;
     const uint64_t of_placements = placements > STRL_RUN_PLACEMENTS ? (placements - 1) / STRL_RUN_PLACEMENTS + 1 : 0;
     if (images && images != materials)
-        return strl__fail(err, STRL_ERR_FORMAT, "section images: %" PRIu64 " items, expected one for each of %" PRIu64
-                          " materials", images, materials);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "section images: %" PRIu64 " items, expected one for each of %" PRIu64 " materials", images,
+                          materials);
     if (runs != of_placements)
-        return strl__fail(err, STRL_ERR_FORMAT, "section runs: %" PRIu64 " items, expected %" PRIu64 " for %" PRIu64 " placements",
-                          runs, of_placements, placements);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "section runs: %" PRIu64 " items, expected %" PRIu64 " for %" PRIu64 " placements", runs,
+                          of_placements, placements);
     return STRL_OK;
 }
 

@@ -58,7 +58,8 @@ static strl_status decode(strl_container *container, const strl_node *record, co
     }
     strl_status status = load_page(container, &record->page, err);
     if (status == STRL_OK)
-        status = strl_page_mesh(record, container->page, record->page.bytes, parent ? &reference : NULL, arena, NULL, mesh, err);
+        status = strl_page_mesh(record, container->page, record->page.bytes, parent ? &reference : NULL, arena, NULL,
+                                mesh, err);
     return status == STRL_OK ? check_palette(container, record, mesh, err) : status;
 }
 
@@ -72,8 +73,9 @@ static strl_status keep_parent(strl_container *container, uint32_t tree, const s
     strl_status status = STRL_OK;
     while (status == STRL_OK && node.decode_parent != STRL_NONE) {
         if (count == STRL_DECODE_CHAIN - 1)
-            return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 " of tree %" PRIu32 " is decoded by more than %u others",
-                              ids[0], tree, STRL_DECODE_CHAIN - 1);
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "node %" PRIu32 " of tree %" PRIu32 " is decoded by more than %u others", ids[0], tree,
+                              STRL_DECODE_CHAIN - 1);
         ids[count++] = node.decode_parent;
         status = strl_container_node(container, tree, ids[count - 1], &node, err);
     }

@@ -79,9 +79,10 @@ static strl_status name_fault(const strl__table *table, uint64_t item, uint32_t 
                       table->name, item, bytes, STRL__MAX_NAME_BYTES);
 }
 
-/* The name after table->last in the page that begins with item `first`, or the first one there: then it is told by nothing. */
-static strl_status next_name(strl__table *table, const uint8_t *item, uint32_t bytes, uint32_t head_bytes, uint64_t index,
-                             uint64_t first, strl_error *err)
+/* The name after table->last in the page that begins with item `first`, or the first one there: then it is told by
+ * nothing. */
+static strl_status next_name(strl__table *table, const uint8_t *item, uint32_t bytes, uint32_t head_bytes,
+                             uint64_t index, uint64_t first, strl_error *err)
 {
     strl__name *name = table->last;
     uint32_t head = head_bytes + 2, before = index == first ? 0 : name->bytes;
@@ -96,8 +97,8 @@ static strl_status next_name(strl__table *table, const uint8_t *item, uint32_t b
 }
 
 /* From the page's first name, or from the one that was asked for last where that comes before. */
-static strl_status find_name(strl_container *container, strl__table *table, uint32_t index, uint32_t head_bytes, uint8_t *head,
-                             strl_error *err)
+static strl_status find_name(strl_container *container, strl__table *table, uint32_t index, uint32_t head_bytes,
+                             uint8_t *head, strl_error *err)
 {
     const uint8_t *item;
     uint32_t bytes;
@@ -173,11 +174,12 @@ strl_status strl_container_material_image(strl_container *container, uint32_t ma
     if (size)
         reference[0] = 0;
     if (material >= container->header.info.material_count)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "there is no material %" PRIu32 ", expected less than %" PRIu32, material,
-                          container->header.info.material_count);
+        return strl__fail(err, STRL_ERR_ARGUMENT, "there is no material %" PRIu32 ", expected less than %" PRIu32,
+                          material, container->header.info.material_count);
     if (!container->header.info.has_images)
         return STRL_OK;
-    strl_status status = strl__page_table_get(&container->images, container->source, material, &item, &bytes, &first, err);
+    strl_status status =
+        strl__page_table_get(&container->images, container->source, material, &item, &bytes, &first, err);
     if (status != STRL_OK)
         return strl_source_fail(container->source, status, err);
     if (bytes == 0)
@@ -192,7 +194,8 @@ strl_status strl_container_material_image(strl_container *container, uint32_t ma
                                 strl__fail(err, STRL_ERR_FORMAT,
                                            "table of images: item %" PRIu32 " of %" PRIu32
                                            " bytes has a bad range or way to repeat, or a reference that is no UTF-8",
-                                           material, bytes), err);
+                                           material, bytes),
+                                err);
     copy_cut(text, length, reference, size);
     image->reference = reference;
     return STRL_OK;

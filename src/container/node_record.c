@@ -187,11 +187,13 @@ static strl_status check_counts(const strl_node *node, uint32_t id, const strl_t
             return status;
     }
     if ((node->rung == STRL_RUNG_SAMPLED) != (tree->structure == STRL_STRUCTURE_SAMPLES))
-        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": the rung is %" PRIu32 ", expected %d %s in a tree of structure %d", id,
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node %" PRIu32 ": the rung is %" PRIu32 ", expected %d %s in a tree of structure %d", id,
                           node->rung, STRL_RUNG_SAMPLED, tree->structure == STRL_STRUCTURE_SAMPLES ? "alone" : "never",
                           (int)tree->structure);
     if (tree->structure == STRL_STRUCTURE_SAMPLES && node->decode_parent != STRL_NONE)
-        return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": decode parent is %" PRIu32 ", expected none in a sample tree", id,
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "node %" PRIu32 ": decode parent is %" PRIu32 ", expected none in a sample tree", id,
                           node->decode_parent);
     if (node->group_size == 0)
         return strl__fail(err, STRL_ERR_FORMAT, "node %" PRIu32 ": the group's size is 0, expected at least 1", id);
@@ -210,8 +212,9 @@ static strl_status check_cone(const strl_node *node, uint32_t id, const strl_tre
     if (has_axis == has_cosine && (!has_axis || tree->structure == STRL_STRUCTURE_SAMPLES))
         return STRL_OK;
     return strl__fail(err, STRL_ERR_FORMAT,
-                      "node %" PRIu32 ": its cone has the axis %d %d %d and the cosine %u, expected %s in a tree of structure %d", id,
-                      cone->axis[0], cone->axis[1], cone->axis[2], cone->cosine,
+                      "node %" PRIu32
+                      ": its cone has the axis %d %d %d and the cosine %u, expected %s in a tree of structure %d",
+                      id, cone->axis[0], cone->axis[1], cone->axis[2], cone->cosine,
                       tree->structure == STRL_STRUCTURE_SAMPLES ? "both or neither" : "none", (int)tree->structure);
 }
 

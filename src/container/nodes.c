@@ -1,5 +1,6 @@
 /* Node records for tools that may wait: a few treelets are kept. A treelet is found through the one
- * that names it; a tool that asks for a node whose treelet no treelet read so far has named pays for a scan from the root. */
+ * that names it; a tool that asks for a node whose treelet no treelet read so far has named pays for a scan from the
+ * root. */
 #include <inttypes.h>
 
 #include "base/fail.h"
@@ -139,8 +140,8 @@ strl_status strl_container_node(strl_container *container, uint32_t tree, uint32
     return strl_source_fail(container->source, status, err);
 }
 
-strl_status strl_container_treelet_of(strl_container *container, uint32_t tree, uint32_t node, strl_treelet_place *place,
-                                      strl_error *err)
+strl_status strl_container_treelet_of(strl_container *container, uint32_t tree, uint32_t node,
+                                      strl_treelet_place *place, strl_error *err)
 {
     *place = (strl_treelet_place){0};
     strl_treelet *treelet = NULL;

@@ -38,7 +38,7 @@ struct strl_container {
     uint64_t uses;
     uint8_t *page; /* the last page read, owned */
     size_t page_capacity;
-    strl_page_ref page_ref; /* bytes 0 = none */
+    strl_page_ref page_ref;                  /* bytes 0 = none */
     strl__kept_mesh kept[STRL_DECODE_CHAIN]; /* by their depth in a chain */
 };
 

@@ -80,7 +80,8 @@ static strl_status check_mesh(const strl_node *record, const strl_pm *mesh, strl
 static strl_status check_head(const strl_node *record, const strl_brick_head *head, strl_error *err)
 {
     if (head->error[0] > record->geometric_max)
-        return strl__fail(err, STRL_ERR_FORMAT, "a brick has cells of the size %g, expected at most %g from its node's record",
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "a brick has cells of the size %g, expected at most %g from its node's record",
                           (double)head->error[0], (double)record->geometric_max);
     for (uint32_t i = 0; i < strl_brick_splats(head); i++)
         for (int axis = 0; axis < 3; axis++) {
@@ -101,7 +102,8 @@ static strl_status find_payload(const strl_node *record, const uint8_t *page, si
     *head = (strl_brick_head){0};
     *payload = NULL;
     *head_bytes = 0;
-    if (record->payload_bytes == 0 || record->payload_offset > size || record->payload_bytes > size - record->payload_offset)
+    if (record->payload_bytes == 0 || record->payload_offset > size ||
+        record->payload_bytes > size - record->payload_offset)
         return strl__fail(err, STRL_ERR_FORMAT, "its %" PRIu32 " bytes pass the end of a page of %zu bytes",
                           record->payload_bytes, size);
     *payload = page + record->payload_offset;
@@ -112,8 +114,8 @@ static strl_status find_payload(const strl_node *record, const uint8_t *page, si
     return status ? status : check_head(record, head, err);
 }
 
-strl_status strl_page_head(const strl_node *record, const void *page, size_t size, strl_arena *arena, strl_brick_head *head,
-                           strl_error *err)
+strl_status strl_page_head(const strl_node *record, const void *page, size_t size, strl_arena *arena,
+                           strl_brick_head *head, strl_error *err)
 {
     const uint8_t *payload;
     size_t bytes;
@@ -140,8 +142,9 @@ void strl_page_place(strl_payload_reference *reference, const int64_t anchor[3],
         reference->offset[axis] = (int32_t)(uint32_t)((uint64_t)anchor[axis] - (uint64_t)record->anchor[axis]);
 }
 
-static strl_status decode(const strl_node *record, const uint8_t *page, size_t size, const strl_payload_reference *reference,
-                          strl_arena *arena, strl_brick_head *head, strl_pm *mesh, strl_error *err)
+static strl_status decode(const strl_node *record, const uint8_t *page, size_t size,
+                          const strl_payload_reference *reference, strl_arena *arena, strl_brick_head *head,
+                          strl_pm *mesh, strl_error *err)
 {
     const uint8_t *payload;
     size_t head_bytes;
@@ -149,12 +152,14 @@ static strl_status decode(const strl_node *record, const uint8_t *page, size_t s
     if (status == STRL_OK)
         status = check_sizes(record, payload + head_bytes, record->payload_bytes - head_bytes, err);
     if (status == STRL_OK)
-        status = strl_payload_decode(payload + head_bytes, record->payload_bytes - head_bytes, reference, arena, mesh, err);
+        status =
+            strl_payload_decode(payload + head_bytes, record->payload_bytes - head_bytes, reference, arena, mesh, err);
     return status == STRL_OK ? check_mesh(record, mesh, err) : status;
 }
 
-strl_status strl_page_mesh(const strl_node *record, const void *page, size_t size, const strl_payload_reference *reference,
-                           strl_arena *arena, strl_brick_head *head, strl_pm *mesh, strl_error *err)
+strl_status strl_page_mesh(const strl_node *record, const void *page, size_t size,
+                           const strl_payload_reference *reference, strl_arena *arena, strl_brick_head *head,
+                           strl_pm *mesh, strl_error *err)
 {
     strl_brick_head unwanted;
     *mesh = (strl_pm){0};

@@ -16,14 +16,15 @@ static strl_status decode(const strl_container *container, uint64_t index, const
     for (int i = 0; i < 12; i++)
         placement->transform[i] = strl_cursor_f64(&in);
     if (in.failed || strl_cursor_left(&in))
-        return strl__fail(err, STRL_ERR_FORMAT,
-                          "placement %" PRIu64 ": %" PRIu32 " bytes, expected %u", index, bytes, STRL__PLACEMENT_BYTES);
+        return strl__fail(err, STRL_ERR_FORMAT, "placement %" PRIu64 ": %" PRIu32 " bytes, expected %u", index, bytes,
+                          STRL__PLACEMENT_BYTES);
     if (placement->tree >= container->header.info.tree_count)
         return strl__fail(err, STRL_ERR_FORMAT,
                           "placement %" PRIu64 ": tree is %" PRIu32 ", expected less than %" PRIu32, index,
                           placement->tree, container->header.info.tree_count);
     if (placement->own_part > container->header.info.part_count)
-        return strl__fail(err, STRL_ERR_FORMAT, "placement %" PRIu64 ": part is %" PRIu32 ", expected less than %" PRIu32, index,
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "placement %" PRIu64 ": part is %" PRIu32 ", expected less than %" PRIu32, index,
                           placement->own_part - 1, container->header.info.part_count);
     for (int i = 0; i < 12; i++)
         if (!isfinite(placement->transform[i]))
@@ -39,7 +40,8 @@ strl_status strl_container_placement(strl_container *container, uint64_t index, 
     uint32_t bytes;
     *placement = (strl_placement){0};
     uint64_t first;
-    strl_status status = strl__page_table_get(&container->placements, container->source, index, &item, &bytes, &first, err);
+    strl_status status =
+        strl__page_table_get(&container->placements, container->source, index, &item, &bytes, &first, err);
     if (status == STRL_OK)
         status = decode(container, index, item, bytes, placement, err);
     return strl_source_fail(container->source, status, err);
@@ -61,13 +63,14 @@ static uint32_t placements_of(const strl_container *container, uint32_t run)
 static bool is_box(const strl_run *facts)
 {
     for (int axis = 0; axis < 3; axis++)
-        if (!isfinite(facts->box_min[axis]) || !isfinite(facts->box_max[axis]) || facts->box_min[axis] > facts->box_max[axis])
+        if (!isfinite(facts->box_min[axis]) || !isfinite(facts->box_max[axis]) ||
+            facts->box_min[axis] > facts->box_max[axis])
             return false;
     return true;
 }
 
-static strl_status decode_run(const strl_container *container, uint32_t run, const uint8_t *item, uint32_t bytes, strl_run *facts,
-                              strl_error *err)
+static strl_status decode_run(const strl_container *container, uint32_t run, const uint8_t *item, uint32_t bytes,
+                              strl_run *facts, strl_error *err)
 {
     strl_cursor in = strl_cursor_make(item, bytes);
     for (int axis = 0; axis < 3; axis++)
@@ -85,15 +88,19 @@ static strl_status decode_run(const strl_container *container, uint32_t run, con
     facts->page.checksum = strl_cursor_u64(&in);
     uint32_t expected = 4 + placements_of(container, run) * (4 + STRL__PLACEMENT_BYTES);
     if (in.failed || strl_cursor_left(&in))
-        return strl__fail(err, STRL_ERR_FORMAT, "run %" PRIu32 ": %" PRIu32 " bytes, expected %u", run, bytes, STRL__RUN_BYTES);
+        return strl__fail(err, STRL_ERR_FORMAT, "run %" PRIu32 ": %" PRIu32 " bytes, expected %u", run, bytes,
+                          STRL__RUN_BYTES);
     if (!is_box(facts))
-        return strl__fail(err, STRL_ERR_FORMAT, "run %" PRIu32 ": its box is not finite, or a min is above its max", run);
+        return strl__fail(err, STRL_ERR_FORMAT, "run %" PRIu32 ": its box is not finite, or a min is above its max",
+                          run);
     if (!(facts->far.area >= 0) || !isfinite(facts->far.area) || facts->far.normal[1] > STRL_OCT_MAX)
-        return strl__fail(err, STRL_ERR_FORMAT, "run %" PRIu32 ": its area is %g, the second number of its normal %u, expected finite, >= 0, and at most %d",
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "run %" PRIu32
+                          ": its area is %g, the second number of its normal %u, expected finite, >= 0, and at most %d",
                           run, (double)facts->far.area, facts->far.normal[1], STRL_OCT_MAX);
     if (facts->page.bytes != expected)
-        return strl__fail(err, STRL_ERR_FORMAT, "run %" PRIu32 ": its page has %" PRIu32 " bytes, expected %" PRIu32, run,
-                          facts->page.bytes, expected);
+        return strl__fail(err, STRL_ERR_FORMAT, "run %" PRIu32 ": its page has %" PRIu32 " bytes, expected %" PRIu32,
+                          run, facts->page.bytes, expected);
     return strl__ref_check(&facts->page, container->header.info.file_bytes, "page of placements", err);
 }
 
@@ -109,30 +116,34 @@ strl_status strl_container_run(strl_container *container, uint32_t run, strl_run
     return strl_source_fail(container->source, status, err);
 }
 
-strl_status strl_run_check(const strl_container *container, uint32_t run, const strl_run *facts, const void *data, size_t size,
-                           strl_error *err)
+strl_status strl_run_check(const strl_container *container, uint32_t run, const strl_run *facts, const void *data,
+                           size_t size, strl_error *err)
 {
     const uint8_t *bytes = data;
     uint32_t count = placements_of(container, run);
     uint64_t found = strl__checksum(bytes, size);
     if (size != facts->page.bytes || found != facts->page.checksum)
         return strl__fail(err, STRL_ERR_FORMAT,
-                          "page of placements at byte %" PRIu64 ": %zu bytes with the checksum %016" PRIx64 ", expected %" PRIu32
-                          " with %016" PRIx64, facts->page.offset, size, found, facts->page.bytes, facts->page.checksum);
+                          "page of placements at byte %" PRIu64 ": %zu bytes with the checksum %016" PRIx64
+                          ", expected %" PRIu32 " with %016" PRIx64,
+                          facts->page.offset, size, found, facts->page.bytes, facts->page.checksum);
     bool good = strl__load_le(bytes, 4) == count;
     for (uint32_t i = 0; i < count; i++)
         good = good && strl__load_le(bytes + 4 + (size_t)4 * i, 4) == (i + 1) * STRL__PLACEMENT_BYTES;
     return good ? STRL_OK
-                : strl__fail(err, STRL_ERR_FORMAT, "page of placements at byte %" PRIu64 ": it is not one of %" PRIu32 " placements",
+                : strl__fail(err, STRL_ERR_FORMAT,
+                             "page of placements at byte %" PRIu64 ": it is not one of %" PRIu32 " placements",
                              facts->page.offset, count);
 }
 
-strl_status strl_run_placement(const strl_container *container, uint64_t index, const void *data, strl_placement *placement,
-                               strl_error *err)
+strl_status strl_run_placement(const strl_container *container, uint64_t index, const void *data,
+                               strl_placement *placement, strl_error *err)
 {
-    uint32_t count = placements_of(container, (uint32_t)(index / STRL_RUN_PLACEMENTS)), within = index % STRL_RUN_PLACEMENTS;
+    uint32_t count = placements_of(container, (uint32_t)(index / STRL_RUN_PLACEMENTS)),
+             within = index % STRL_RUN_PLACEMENTS;
     const uint8_t *items = (const uint8_t *)data + 4 + (size_t)4 * count;
-    return decode(container, index, items + (size_t)within * STRL__PLACEMENT_BYTES, STRL__PLACEMENT_BYTES, placement, err);
+    return decode(container, index, items + (size_t)within * STRL__PLACEMENT_BYTES, STRL__PLACEMENT_BYTES, placement,
+                  err);
 }
 
 void strl_placed_box(const strl_tree *tree, const double transform[12], const int64_t min[3], const int64_t max[3],

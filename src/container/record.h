@@ -1,5 +1,5 @@
-/* Encoding, decoding and checking of the format's records; shared by writer and reader, so that the writer never writes what
- * the reader would refuse. Pure functions; thread-safe. Internal. */
+/* Encoding, decoding and checking of the format's records; shared by writer and reader, so that the writer never writes
+ * what the reader would refuse. Pure functions; thread-safe. Internal. */
 #ifndef STRL_CONTAINER_RECORD_H
 #define STRL_CONTAINER_RECORD_H
 

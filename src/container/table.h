@@ -1,4 +1,5 @@
-/* Paged tables of byte strings: docs/format.md, "Paged tables". One codec for placements, parts and materials. Internal. */
+/* Paged tables of byte strings: docs/format.md, "Paged tables". One codec for placements, parts and materials.
+ * Internal. */
 #ifndef STRL_CONTAINER_TABLE_H
 #define STRL_CONTAINER_TABLE_H
 

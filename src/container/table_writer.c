@@ -1,4 +1,5 @@
-/* Writing paged tables, bottom-up: a page of each depth is in memory; a full one is written and named in the one above. */
+/* Writing paged tables, bottom-up: a page of each depth is in memory; a full one is written and named in the one above.
+ */
 #include <string.h>
 
 #include "base/fail.h"

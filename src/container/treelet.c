@@ -1,4 +1,5 @@
-/* Treelets: docs/format.md, "Treelets: pages of node records". Nothing of a treelet is used before its checksum was right. */
+/* Treelets: docs/format.md, "Treelets: pages of node records". Nothing of a treelet is used before its checksum was
+ * right. */
 #include "container/treelet.h"
 
 #include <inttypes.h>

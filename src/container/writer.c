@@ -27,7 +27,8 @@ static strl_status open_files(strl_container_writer *writer, const strl_containe
     writer->path = strl__strdup(desc->path);
     if (!writer->path)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory to create %s", desc->path);
-    strl_status status = strl_output_open(desc->path, desc->part_dir ? desc->part_dir : desc->scratch_dir, &writer->output, err);
+    strl_status status =
+        strl_output_open(desc->path, desc->part_dir ? desc->part_dir : desc->scratch_dir, &writer->output, err);
     if (status != STRL_OK)
         return status;
     writer->sink.file = strl_output_file(writer->output);
@@ -131,8 +132,8 @@ static uint32_t shared_bytes(const strl__name *last, const uint8_t *name, uint32
 }
 
 /* Told by the name before it in its page (docs/format.md, "Part"). head has room for the two bytes behind it. */
-static strl_status add_after(strl_container_writer *writer, strl__page_table_writer *table, strl__name *last, uint8_t *head,
-                             uint32_t head_bytes, const uint8_t *name, uint32_t bytes, strl_error *err)
+static strl_status add_after(strl_container_writer *writer, strl__page_table_writer *table, strl__name *last,
+                             uint8_t *head, uint32_t head_bytes, const uint8_t *name, uint32_t bytes, strl_error *err)
 {
     uint32_t shared = shared_bytes(last, name, bytes);
     if (strl__page_table_writer_begins(table, head_bytes + 2 + bytes - shared))
@@ -143,8 +144,8 @@ static strl_status add_after(strl_container_writer *writer, strl__page_table_wri
     return strl__page_table_writer_add(table, &writer->sink, head, head_bytes + 2, name + shared, bytes - shared, err);
 }
 
-static strl_status add_name(strl_container_writer *writer, strl__page_table_writer *table, strl__name *last, uint8_t *head,
-                            uint32_t head_bytes, const char *name, strl_error *err)
+static strl_status add_name(strl_container_writer *writer, strl__page_table_writer *table, strl__name *last,
+                            uint8_t *head, uint32_t head_bytes, const char *name, strl_error *err)
 {
     uint8_t clean[STRL__MAX_NAME_BYTES];
     size_t bytes = 0;
@@ -176,8 +177,8 @@ strl_status strl_container_writer_add_material(strl_container_writer *writer, co
 }
 
 /* References are told whole: there are few. */
-static strl_status add_image(strl_container_writer *writer, const uint8_t *head, uint32_t head_bytes, const char *reference,
-                             strl_error *err)
+static strl_status add_image(strl_container_writer *writer, const uint8_t *head, uint32_t head_bytes,
+                             const char *reference, strl_error *err)
 {
     uint8_t clean[STRL__MAX_NAME_BYTES];
     size_t bytes = 0;
@@ -188,7 +189,8 @@ static strl_status add_image(strl_container_writer *writer, const uint8_t *head,
     else if (strl__page_table_writer_count(writer->images) >= STRL_NONE - 1)
         status = strl__fail(err, STRL_ERR_LIMIT, "a container holds at most %" PRIu32 " images", STRL_NONE - 1);
     else
-        status = strl__page_table_writer_add(writer->images, &writer->sink, head, head_bytes, clean, (uint32_t)bytes, err);
+        status =
+            strl__page_table_writer_add(writer->images, &writer->sink, head, head_bytes, clean, (uint32_t)bytes, err);
     writer->failed |= status != STRL_OK;
     return status;
 }

@@ -35,7 +35,8 @@ strl_status strl__writing_close_page(strl_container_writer *writer, strl_error *
     return status;
 }
 
-/* Reads records [first, first + count) from the spill into the treelet at `bytes`; children: ids [begin, end) of their children. */
+/* Reads records [first, first + count) from the spill into the treelet at `bytes`; children: ids [begin, end) of their
+ * children. */
 static strl_status gather(strl_container_writer *writer, uint32_t first, uint32_t count, uint8_t *bytes,
                           uint64_t children[2], strl_error *err)
 {
@@ -210,7 +211,8 @@ static strl_status add_node(strl_container_writer *writer, const strl_node *reco
         writer->page.failed |= !strl__grow(&writer->page.data, &writer->page.capacity, STRL__NODE_BYTES, 1);
     if (writer->page.failed)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a page of %zu bytes", writer->page.size + payload_bytes);
-    writer->pending_decoded_bytes += (uint32_t)strl_node_decoded_bytes(node); /* far below 2^32: see the closing rule */
+    /* far below 2^32: see the closing rule */
+    writer->pending_decoded_bytes += (uint32_t)strl_node_decoded_bytes(node);
     count_node(&writer->trees[writer->header.info.tree_count].facts, node, writer->next_id);
     writer->next_id++;
     writer->next_child += node->child_count;

@@ -1,4 +1,5 @@
-/* Runs of placements: what those of one page look like from outside, so that who walks reads the pages that he comes near. */
+/* Runs of placements: what those of one page look like from outside, so that who walks reads the pages that he comes
+ * near. */
 #include <inttypes.h>
 #include <math.h>
 
@@ -7,7 +8,8 @@
 #include "container/writing.h"
 
 /* A piece of what has been written. *data is the caller's. */
-static strl_status read_back(strl_container_writer *writer, uint64_t offset, uint32_t bytes, uint8_t **data, strl_error *err)
+static strl_status read_back(strl_container_writer *writer, uint64_t offset, uint32_t bytes, uint8_t **data,
+                             strl_error *err)
 {
     *data = strl__alloc(bytes, 1);
     if (!*data)
@@ -48,7 +50,8 @@ static strl_status find_facts(strl_container_writer *writer, strl_run *facts, st
         strl_placed_box(&tree->facts, placement->transform, tree->facts.box_min, tree->facts.box_max, low, high);
         for (int axis = 0; axis < 3; axis++) {
             if (!isfinite(low[axis]) || !isfinite(high[axis]))
-                return strl__fail(err, STRL_ERR_LIMIT, "the placed model reaches beyond the numbers of a double on axis %d", axis);
+                return strl__fail(err, STRL_ERR_LIMIT,
+                                  "the placed model reaches beyond the numbers of a double on axis %d", axis);
             facts->box_min[axis] = fmin(facts->box_min[axis], low[axis]);
             facts->box_max[axis] = fmax(facts->box_max[axis], high[axis]);
         }

@@ -24,7 +24,7 @@ struct strl_container_writer {
     strl_placement run[STRL_RUN_PLACEMENTS]; /* the last ones, of a page that has not ended */
     uint32_t run_count;
     strl__name last_part, last_material; /* what was added last */
-    strl__written_tree *trees; /* [tree_count], owned, up to STRL__MAX_TREES */
+    strl__written_tree *trees;           /* [tree_count], owned, up to STRL__MAX_TREES */
     size_t tree_capacity;
     bool bounds_begun;
     bool in_tree; /* the tree at hand is trees[tree_count], not counted yet */

@@ -1,5 +1,6 @@
-/* Camera arithmetic. The image of a perspective camera is a pyramid with its apex in the eye and no far end; what of a box
- * can be seen is the convex polytope box /\ pyramid, and every bound here is taken over the vertices of that polytope. */
+/* Camera arithmetic. The image of a perspective camera is a pyramid with its apex in the eye and no far end; what of a
+ * box can be seen is the convex polytope box /\ pyramid, and every bound here is taken over the vertices of that
+ * polytope. */
 #include "frame/view.h"
 
 #include <math.h>
@@ -33,7 +34,8 @@ static void cross(const double a[3], const double b[3], double out[3])
     out[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* False where the vector has no direction. Scales first: squares of tiny or huge coordinates leave the range of double. */
+/* False where the vector has no direction. Scales first: squares of tiny or huge coordinates leave the range of double.
+ */
 static bool normalise(double v[3])
 {
     double largest = fmax(fabs(v[0]), fmax(fabs(v[1]), fabs(v[2])));
@@ -262,8 +264,9 @@ static seen see_box(const strl_view *view, const strl_box *box)
     return all;
 }
 
-/* error focal |p| / (z (z - error)) is at most focal error x max(|p| / z) / (min z - error). |p| / z is convex in the image plane, so its
- * largest value over a polytope is at a vertex; min z is too. Both only shrink with the box: nested boxes have ordered bounds. */
+/* error focal |p| / (z (z - error)) is at most focal error x max(|p| / z) / (min z - error). |p| / z is convex in the
+ * image plane, so its largest value over a polytope is at a vertex; min z is too. Both only shrink with the box: nested
+ * boxes have ordered bounds. */
 strl_sight strl_view_sight(const strl_view *view, const strl_box *box)
 {
     strl_sight sight = {

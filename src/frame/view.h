@@ -29,9 +29,9 @@ bool strl_view_init(strl_view *view, const strl_camera *camera);
 const char *strl_view_fault(const strl_camera *camera);
 /* Conservative: false only where the box is certainly outside the image (or wholly behind the eye). */
 bool strl_view_sees(const strl_view *view, const strl_box *box);
-/* The largest displacement in pixels, anywhere in the image, that a length `error` (world units) can cause at a point of the box that lies in front of
- * the eye: an upper bound of error * focal * |p| / (z (z - error)). Infinity where z - error can reach 0 within the image;
- * 0 where the box cannot be in the image. */
+/* The largest displacement in pixels, anywhere in the image, that a length `error` (world units) can cause at a point
+ * of the box that lies in front of the eye: an upper bound of error * focal * |p| / (z (z - error)). Infinity where z -
+ * error can reach 0 within the image; 0 where the box cannot be in the image. */
 double strl_view_error_px(const strl_view *view, const strl_box *box, double error);
 /* What the image shows of a box, as far as pixel errors depend on it: measured once, it projects many errors. */
 typedef struct strl_sight {
@@ -44,7 +44,8 @@ typedef struct strl_sight {
 } strl_sight;
 
 strl_sight strl_view_sight(const strl_view *view, const strl_box *box);
-/* strl_view_error_px(view, box, error) is strl_sight_error_px(strl_view_sight(view, box), error). Never decreases with error. */
+/* strl_view_error_px(view, box, error) is strl_sight_error_px(strl_view_sight(view, box), error). Never decreases with
+ * error. */
 double strl_sight_error_px(const strl_sight *sight, double error);
 /* The largest error that is no more than px > 0 pixels; INFINITY where all are. */
 double strl_sight_error_of(const strl_sight *sight, double px);

@@ -7,18 +7,19 @@
 #include "geometry/near.h"
 
 #define NO_INDEX UINT32_MAX
-#define AROUND_MAX 64u   /* triangles near a collapse that pieces are measured against at first */
-#define WIDER_MAX 256u   /* the same where that was not enough */
-#define FEW_PIECES 64u    /* more than this are not all looked at for one triangle */
-#define FIRST_REACH 1.5   /* of the distance of a piece's middle: what lies so near is looked at */
-#define FARTHEST 0x1p34   /* lattice units: nothing is farther apart */
+#define AROUND_MAX 64u  /* triangles near a collapse that pieces are measured against at first */
+#define WIDER_MAX 256u  /* the same where that was not enough */
+#define FEW_PIECES 64u  /* more than this are not all looked at for one triangle */
+#define FIRST_REACH 1.5 /* of the distance of a piece's middle: what lies so near is looked at */
+#define FARTHEST 0x1p34 /* lattice units: nothing is farther apart */
 #define QUARTERINGS 2u
 #define LEAST_REACH 0.03125 /* of the bound that is good enough */
 #define REACH_GROWTH 5.6
 /* Of the largest coordinate: what doubles cannot tell apart in the points of fragments and their distances. */
 #define ROUNDING 0x1p-34
 
-/* A triangle is near enough where it is not much farther than a piece has been found to be: claims are the larger of both. */
+/* A triangle is near enough where it is not much farther than a piece has been found to be: claims are the larger of
+ * both. */
 #define SLACK 1.1
 /* Of the bound that is good enough: a piece within so much of a likely triangle is measured against that alone. */
 #define LIKELY_SHARE 0.5
@@ -30,25 +31,25 @@ typedef struct link {
 
 typedef struct tracker {
     const strl_mesh *mesh;
-    strl_facet *piece;        /* [piece_count] */
+    strl_facet *piece;               /* [piece_count] */
     uint32_t own_count, piece_count; /* own ones come first */
-    strl_near tree, piece_tree; /* over facet, as it was and as it is now, and over piece */
-    uint32_t (*point)[3];     /* per triangle */
-    bool *gone;               /* per triangle */
-    uint32_t *head, *tail;    /* per point: corners, 4 * triangle + 0, 1, 2 */
-    uint32_t (*next)[3];      /* per corner: the next at its point */
-    strl_facet *facet;        /* per triangle, as it is now */
-    float *up, *down;         /* per triangle; per piece */
-    uint32_t *first_link;     /* per triangle */
-    link *links;              /* owned; grows */
+    strl_near tree, piece_tree;      /* over facet, as it was and as it is now, and over piece */
+    uint32_t (*point)[3];            /* per triangle */
+    bool *gone;                      /* per triangle */
+    uint32_t *head, *tail;           /* per point: corners, 4 * triangle + 0, 1, 2 */
+    uint32_t (*next)[3];             /* per corner: the next at its point */
+    strl_facet *facet;               /* per triangle, as it is now */
+    float *up, *down;                /* per triangle; per piece */
+    uint32_t *first_link;            /* per triangle */
+    link *links;                     /* owned; grows */
     size_t link_count, link_capacity;
     uint32_t free_link;
     uint32_t *stamp, *piece_stamp, tick; /* per triangle, per piece */
     double most_up, most_down, granted;
     uint32_t near[STRL_COVER_MAX];
-    uint32_t *found;          /* [own_count] gathered pieces */
+    uint32_t *found; /* [own_count] gathered pieces */
     uint32_t found_count;
-    uint32_t *star;           /* [triangle_count] triangles that a collapse changed */
+    uint32_t *star; /* [triangle_count] triangles that a collapse changed */
     uint32_t star_count;
     uint32_t around[WIDER_MAX], around_count;
     bool used[WIDER_MAX];
@@ -190,8 +191,12 @@ static void normal_of_star(const tracker *t, double normal[3])
 static double measure_piece(tracker *t, const strl_facet *piece, double enough)
 {
     memset(t->used, 0, t->around_count);
-    return strl_cover_bound(piece, &(strl_cover){.by = t->by, .prisms = t->prisms, .count = t->around_count, .enough = enough,
-                                                 .take = note_used, .context = t});
+    return strl_cover_bound(piece, &(strl_cover){.by = t->by,
+                                                 .prisms = t->prisms,
+                                                 .count = t->around_count,
+                                                 .enough = enough,
+                                                 .take = note_used,
+                                                 .context = t});
 }
 
 static bool keep_measure(tracker *t, uint32_t piece, double bound)
@@ -210,7 +215,8 @@ static double measure_facet(tracker *t, const strl_facet *facet, const uint32_t 
     return strl_cover_bound(facet, &(strl_cover){.by = t->piece, .pick = piece, .count = count, .enough = enough});
 }
 
-/* Against all pieces that are near enough: what is within a part of that does mostly. A facet near too many goes in quarters. */
+/* Against all pieces that are near enough: what is within a part of that does mostly. A facet near too many goes in
+ * quarters. */
 static double measure_near(tracker *t, const strl_facet *facet, double enough, unsigned quarterings)
 {
     double bound = INFINITY;
@@ -275,8 +281,8 @@ static bool prepare(tracker *t, const strl_mesh *mesh, strl_arena *arena)
     t->star = strl_arena_alloc(arena, n, sizeof *t->star);
     t->head = strl_arena_alloc(arena, mesh->point_count, sizeof *t->head);
     t->tail = strl_arena_alloc(arena, mesh->point_count, sizeof *t->tail);
-    if (!t->point || !t->next || !t->gone || !t->facet || !t->up || !t->first_link || !t->stamp || !t->star || !t->head ||
-        !t->tail)
+    if (!t->point || !t->next || !t->gone || !t->facet || !t->up || !t->first_link || !t->stamp || !t->star ||
+        !t->head || !t->tail)
         return false;
     memset(t->head, 0xff, mesh->point_count * sizeof *t->head);
     memset(t->first_link, 0xff, n * sizeof *t->first_link);
@@ -291,7 +297,8 @@ static bool prepare(tracker *t, const strl_mesh *mesh, strl_arena *arena)
     return strl_near_create(&t->tree, t->facet, n, arena);
 }
 
-/* Pieces come in the order of the triangles that they are or were: the next piece belongs to the next triangle, or to the same. */
+/* Pieces come in the order of the triangles that they are or were: the next piece belongs to the next triangle, or to
+ * the same. */
 static bool is_near_likely(tracker *t, const strl_facet *piece, double *bound)
 {
     double reach = LIKELY_SHARE * (fmax(t->most_down, t->granted) - piece->claim);
@@ -309,15 +316,16 @@ static bool is_near_likely(tracker *t, const strl_facet *piece, double *bound)
 }
 
 /* A piece against the triangles within reach, and one that surely counts. */
-static double measure_within(tracker *t, const strl_facet *piece, const double along[3], double reach, uint32_t most, double enough)
+static double measure_within(tracker *t, const strl_facet *piece, const double along[3], double reach, uint32_t most,
+                             double enough)
 {
     t->around_count = 1 + strl_near_list(&t->tree, piece, reach, t->around + 1, most);
     take_around(t, along);
     return measure_piece(t, piece, enough);
 }
 
-/* A piece against the triangles near it, before the first collapse. What reaches beyond the mesh, at a boundary, may be nearest to
- * one that is farther than its middle: no farther than the bound, though. */
+/* A piece against the triangles near it, before the first collapse. What reaches beyond the mesh, at a boundary, may be
+ * nearest to one that is farther than its middle: no farther than the bound, though. */
 static bool measure_first(tracker *t, uint32_t id)
 {
     const strl_facet *piece = &t->piece[id];
@@ -381,7 +389,8 @@ static void carry_out(tracker *t, uint32_t u, uint32_t v)
     t->head[u] = NO_INDEX;
 }
 
-/* A piece against all triangles in reach, whether or not they hang together with what the collapse changed, and along its own normal. */
+/* A piece against all triangles in reach, whether or not they hang together with what the collapse changed, and along
+ * its own normal. */
 static double measure_wider(tracker *t, const strl_facet *piece, double enough)
 {
     double along[3], bound = INFINITY;
@@ -477,8 +486,8 @@ static bool track(tracker *t, const strl_simplified *simplified, double rounding
     return true;
 }
 
-strl_status strl_certify(const strl_mesh *mesh, const strl_simplified *simplified, const strl_older *older, strl_arena *arena,
-                         strl_certificate *certificate, strl_error *err)
+strl_status strl_certify(const strl_mesh *mesh, const strl_simplified *simplified, const strl_older *older,
+                         strl_arena *arena, strl_certificate *certificate, strl_error *err)
 {
     size_t states = (size_t)simplified->collapse_count + 1;
     certificate->down = strl_arena_alloc(arena, states, sizeof(float));

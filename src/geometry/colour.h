@@ -25,7 +25,9 @@ static inline uint32_t strl_rgba_multiply(uint32_t a, uint32_t b)
     uint32_t product = ((a >> 24) * (b >> 24) + 127) / 255 << 24;
     for (unsigned shift = 0; shift < 24; shift += 8) {
         unsigned one = a >> shift & 255, other = b >> shift & 255;
-        unsigned code = one == 255 ? other : other == 255 ? one : strl_srgb_encode(strl_srgb_decode(one) * strl_srgb_decode(other));
+        unsigned code = one == 255     ? other
+                        : other == 255 ? one
+                                       : strl_srgb_encode(strl_srgb_decode(one) * strl_srgb_decode(other));
         product |= code << shift;
     }
     return product;

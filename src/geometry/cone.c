@@ -42,7 +42,8 @@ bool strl_cone_is_empty(const strl_cone *cone)
     return cone->cosine > 0 && !cone->axis[0] && !cone->axis[1] && !cone->axis[2];
 }
 
-/* a b - c d to within two units in the last place: of a face that is nearly a line plain products would leave noise (Kahan). */
+/* a b - c d to within two units in the last place: of a face that is nearly a line plain products would leave noise
+ * (Kahan). */
 static double difference_of_products(double a, double b, double c, double d)
 {
     double cd = c * d, lost = fma(-c, d, cd);

@@ -1,5 +1,6 @@
-/* Cones that hold the normals of faces (Shirman and Abi-Ezzi 1993): where all directions of a cone point away from the eye, so do all
- * faces. Whatever is rounded here is rounded so that the cone gets wider. Pure functions; thread-safe. */
+/* Cones that hold the normals of faces (Shirman and Abi-Ezzi 1993): where all directions of a cone point away from the
+ * eye, so do all faces. Whatever is rounded here is rounded so that the cone gets wider. Pure functions; thread-safe.
+ */
 #ifndef STRL_GEOMETRY_CONE_H
 #define STRL_GEOMETRY_CONE_H
 
@@ -19,8 +20,8 @@ typedef struct strl_cone {
 strl_cone strl_cone_empty(void);
 bool strl_cone_is_empty(const strl_cone *cone);
 
-/* The unit normal of the face with these two edges, which lie counter-clockwise where it is seen from. Edges of whole numbers up to
- * 2^53 are taken exactly. False where the face has no area. */
+/* The unit normal of the face with these two edges, which lie counter-clockwise where it is seen from. Edges of whole
+ * numbers up to 2^53 are taken exactly. False where the face has no area. */
 bool strl_cone_normal(const double edge[3], const double next[3], double normal[3]);
 /* A cone round these unit vectors, close to the smallest. */
 strl_cone strl_cone_around(const double (*normal)[3], size_t count);

@@ -5,7 +5,8 @@
 
 /* Fragments that wait for the facets still to come; what does not fit is not cut any further. */
 #define WAITING_MAX 32u
-/* A triangle near more facets than this is halved first, so often at most, and while that leaves at most such a share of them. */
+/* A triangle near more facets than this is halved first, so often at most, and while that leaves at most such a share
+ * of them. */
 #define PROGRESS 0.75
 #define CROWD 16u
 #define HALVINGS 9u
@@ -121,7 +122,7 @@ typedef struct work {
     const strl_cover *cover;
     double along[3];
     double bound;
-    double limit; /* a bound so large is good enough */
+    double limit;  /* a bound so large is good enough */
     unsigned cuts; /* that settle may still make */
     strl_fragment waiting[WAITING_MAX];
     uint32_t waiting_count;
@@ -193,7 +194,8 @@ static const strl_prism *prism_of(const work *w, uint32_t facet, strl_prism *own
 }
 
 /* Where the corners are to one side of a prism, and whether none is inside, or none outside, by more than the slack. */
-static void classify(const strl_prism *p, unsigned e, const strl_fragment *fragment, double *side, bool *none_in, bool *none_out)
+static void classify(const strl_prism *p, unsigned e, const strl_fragment *fragment, double *side, bool *none_in,
+                     bool *none_out)
 {
     double least = INFINITY, most = -INFINITY;
     for (uint32_t i = 0; i < fragment->count; i++) {
@@ -205,8 +207,8 @@ static void classify(const strl_prism *p, unsigned e, const strl_fragment *fragm
     *none_out = least >= -p->slack[e];
 }
 
-/* The part within the prism, into *inside; what is cut off goes to the end of the waiting ones. False where nothing is within, or
- * no room is left: then nothing was cut. */
+/* The part within the prism, into *inside; what is cut off goes to the end of the waiting ones. False where nothing is
+ * within, or no room is left: then nothing was cut. */
 static bool cut_by_prism(work *w, const strl_prism *p, const strl_fragment *fragment, strl_fragment *inside)
 {
     double side[STRL_FRAGMENT_MAX];
@@ -305,8 +307,8 @@ static bool halve(const strl_fragment *fragment, double *side)
     return true;
 }
 
-/* One fragment by what is nearest to its middle: given away where that is near enough, else cut along that prism, else halved. The
- * middle's own distance cannot be bettered, so nothing much less is aimed at. */
+/* One fragment by what is nearest to its middle: given away where that is near enough, else cut along that prism, else
+ * halved. The middle's own distance cannot be bettered, so nothing much less is aimed at. */
 static void settle(work *w, uint32_t near)
 {
     strl_fragment fragment = w->waiting[--w->waiting_count], inside;
@@ -338,7 +340,8 @@ static void settle(work *w, uint32_t near)
     w->waiting_count = waiting + 2;
 }
 
-/* Moves the facets whose boxes are within the limit of the fragment's to the front of the first `count`; how many they are. */
+/* Moves the facets whose boxes are within the limit of the fragment's to the front of the first `count`; how many they
+ * are. */
 static uint32_t find_near(work *w, const strl_fragment *fragment, uint32_t count)
 {
     double least[3] = {INFINITY, INFINITY, INFINITY}, most[3] = {-INFINITY, -INFINITY, -INFINITY};

@@ -68,12 +68,15 @@ static double triangle_area(const strl_pm *mesh, const uint16_t corner[3], doubl
 /* The finest ones. What they hide tells how large the faces are: of parallel ones as much, of others half. */
 static void add_splats(strl_far_sums *sums, const strl_brick_head *head)
 {
-    for (uint32_t i = head->level_count > 1 ? head->splat_end[head->level_count - 2] : 0; i < strl_brick_splats(head); i++) {
+    for (uint32_t i = head->level_count > 1 ? head->splat_end[head->level_count - 2] : 0; i < strl_brick_splats(head);
+         i++) {
         const strl_splat *splat = &head->splat[i];
-        double length = fmax(splat->parallel / 255.0, 0.5), area = ldexp(splat->coverage / 255.0, 2 * splat->side) / length;
+        double length = fmax(splat->parallel / 255.0, 0.5),
+               area = ldexp(splat->coverage / 255.0, 2 * splat->side) / length;
         float line[3];
         strl_splat_line(splat, line);
-        add_face(sums, area, splat->rgba, (const double[3]){length * (double)line[0], length * (double)line[1], length * (double)line[2]});
+        add_face(sums, area, splat->rgba,
+                 (const double[3]){length * (double)line[0], length * (double)line[1], length * (double)line[2]});
     }
 }
 

@@ -1,5 +1,5 @@
-/* A piece of a model in memory while it is built: points (topological vertices, one per lattice position), wedges (a point
- * with one set of attributes: the render vertices) and triangles. Plain arrays, owned by an arena. */
+/* A piece of a model in memory while it is built: points (topological vertices, one per lattice position), wedges (a
+ * point with one set of attributes: the render vertices) and triangles. Plain arrays, owned by an arena. */
 #ifndef STRL_GEOMETRY_MESH_H
 #define STRL_GEOMETRY_MESH_H
 
@@ -18,8 +18,9 @@ typedef struct strl_wedge {
     uint32_t palette;   /* opaque: wedges of different palette are never merged into one */
 } strl_wedge;
 
-/* Where the points of a piece of surface have gone since the start: every way from a point to its image lies in this box.
- * Boxes of successive moves add up, so moves to and fro do not count twice as they would as lengths. Lattice units. */
+/* Where the points of a piece of surface have gone since the start: every way from a point to its image lies in this
+ * box. Boxes of successive moves add up, so moves to and fro do not count twice as they would as lengths. Lattice
+ * units. */
 typedef struct strl_drift {
     float least[3], most[3]; /* least <= 0 <= most */
 } strl_drift;
@@ -39,7 +40,7 @@ static inline float strl_drift_length(const strl_drift *drift)
 #define STRL_ROUND_UP (1 + 2.4e-7f)
 
 /* Point flags. */
-#define STRL_POINT_KEPT 1u    /* must not be removed: another node has it too, or the caller says so */
+#define STRL_POINT_KEPT 1u /* must not be removed: another node has it too, or the caller says so */
 /* Known to nodes outside the piece: its attributes stay, and it must not get into parts that do not have it yet. */
 #define STRL_POINT_OUTSIDE 2u
 
@@ -52,9 +53,10 @@ typedef struct strl_mesh {
     uint32_t (*triangle)[3]; /* [triangle_count] wedges, counter-clockwise; three different points */
     strl_drift *drift;       /* [triangle_count] of this piece of surface */
     float start_error;       /* lattice units: distance of the start from the input, to be added to every drift */
-    float most_error;        /* no point can be further from the input than this: both lie in one box of such a diagonal; 0 = not known */
-    float *deviation;        /* [triangle_count] how much its attributes have changed so far, 0..1 */
-    float *shift;            /* [triangle_count] appearance error so far, lattice units */
+    /* no point can be further from the input than this: both lie in one box of such a diagonal; 0 = not known */
+    float most_error;
+    float *deviation; /* [triangle_count] how much its attributes have changed so far, 0..1 */
+    float *shift;     /* [triangle_count] appearance error so far, lattice units */
 } strl_mesh;
 
 /* The geometric error of a surface that has drifted so far at most: lattice units. */

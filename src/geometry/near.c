@@ -142,7 +142,8 @@ uint32_t strl_near_find(const strl_near *tree, const double p[3], uint32_t guess
         }
         if (node->count)
             continue;
-        uint32_t near = box_distance2(&tree->nodes[node->first], p) <= box_distance2(&tree->nodes[node->first + 1], p) ? 0 : 1;
+        uint32_t near =
+            box_distance2(&tree->nodes[node->first], p) <= box_distance2(&tree->nodes[node->first + 1], p) ? 0 : 1;
         stack[top++] = node->first + 1 - near;
         stack[top++] = node->first + near;
     }

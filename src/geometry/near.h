@@ -33,7 +33,8 @@ bool strl_near_create(strl_near *tree, const strl_facet *facet, uint32_t count, 
 void strl_near_update(strl_near *tree, uint32_t facet);
 /* The facet nearest to p, and its distance, claims left out. guess: a facet that is likely near. */
 uint32_t strl_near_find(const strl_near *tree, const double p[3], uint32_t guess, double *distance);
-/* Facets whose boxes meet the box of `facet`, widened by `reach`: the first `most` of them. Returns how many there are in found. */
+/* Facets whose boxes meet the box of `facet`, widened by `reach`: the first `most` of them. Returns how many there are
+ * in found. */
 uint32_t strl_near_list(const strl_near *tree, const strl_facet *facet, double reach, uint32_t *found, uint32_t most);
 
 #endif

@@ -14,15 +14,16 @@
 #include "geometry/progressive.h"
 #include "stroll/error.h"
 
-/* The finest state of another mesh, by which a payload is told: what the base mesh has of it is copied. Borrowed arrays of a
- * mesh that satisfies the invariants of progressive.h, all of it the same when the payload is decoded; strides in bytes. */
+/* The finest state of another mesh, by which a payload is told: what the base mesh has of it is copied. Borrowed arrays
+ * of a mesh that satisfies the invariants of progressive.h, all of it the same when the payload is decoded; strides in
+ * bytes. */
 typedef struct strl_payload_reference {
     uint32_t vertex_count, triangle_count;
-    const void *position;           /* int32_t[3] a vertex */
-    const void *normal;             /* uint16_t[2] a vertex, octahedral, 10 bits each */
+    const void *position; /* int32_t[3] a vertex */
+    const void *normal;   /* uint16_t[2] a vertex, octahedral, 10 bits each */
     size_t position_stride, normal_stride;
-    const uint16_t (*triangle)[3];  /* [triangle_count] */
-    int32_t offset[3];              /* to be added to its positions, modulo 2^32: its anchor less the payload's */
+    const uint16_t (*triangle)[3]; /* [triangle_count] */
+    int32_t offset[3];             /* to be added to its positions, modulo 2^32: its anchor less the payload's */
 } strl_payload_reference;
 
 /* offset stays 0. */
@@ -52,7 +53,7 @@ strl_status strl_payload_peek(const void *data, size_t size, strl_payload_sizes 
  * STRL_ERR_FORMAT; whatever is accepted satisfies every invariant of progressive.h. Scratch memory comes and goes apart
  * from the arena, within what its limit leaves. reference: what the payload was encoded with; another one gives another
  * mesh or a failure. Thread-safe on different arenas. */
-strl_status strl_payload_decode(const void *data, size_t size, const strl_payload_reference *reference, strl_arena *arena,
-                                strl_pm *pm, strl_error *err);
+strl_status strl_payload_decode(const void *data, size_t size, const strl_payload_reference *reference,
+                                strl_arena *arena, strl_pm *pm, strl_error *err);
 
 #endif

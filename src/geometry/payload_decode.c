@@ -29,7 +29,8 @@ static strl_status read_head(strl_cursor *cursor, strl_payload_sizes *sizes, str
         return strl__fail(err, STRL_ERR_FORMAT, "node payload has version %u and flags %u, expected 1 and at most 15",
                           version, head->flags);
     if (head->normal_bits != 8 && head->normal_bits != 10)
-        return strl__fail(err, STRL_ERR_FORMAT, "node payload has normals of 2 x %u bits, expected 8 or 10", head->normal_bits);
+        return strl__fail(err, STRL_ERR_FORMAT, "node payload has normals of 2 x %u bits, expected 8 or 10",
+                          head->normal_bits);
     if (sizes->triangle_count > STRL_PM_MAX_TRIANGLES || sizes->base_triangle_count > sizes->triangle_count ||
         sizes->base_vertex_count > sizes->vertex_count || sizes->palette_count < 1 ||
         sizes->step_count > sizes->vertex_count - sizes->base_vertex_count)
@@ -71,7 +72,8 @@ static strl_status decode_parts(struct strl__decoder *d, strl_cursor *cursor)
 {
     const strl_payload_sizes *sizes = &d->sizes;
     uint64_t items = (uint64_t)sizes->vertex_count + sizes->triangle_count + sizes->palette_count;
-    strl_status status = strl__streams_read(cursor, strl__stream_count(d->pm->texcoord != NULL), cursor->size, items, d->scratch, &d->in, d->err);
+    strl_status status = strl__streams_read(cursor, strl__stream_count(d->pm->texcoord != NULL), cursor->size, items,
+                                            d->scratch, &d->in, d->err);
     if (status)
         return status;
     d->from = strl_arena_alloc(d->scratch, (size_t)sizes->base_vertex_count + 3, sizeof *d->from);
@@ -105,8 +107,8 @@ static void reserve(const struct strl__decoder *d, size_t size, const strl_arena
     strl_arena_rewind(scratch, empty);
 }
 
-strl_status strl_payload_decode(const void *data, size_t size, const strl_payload_reference *reference, strl_arena *arena,
-                                strl_pm *pm, strl_error *err)
+strl_status strl_payload_decode(const void *data, size_t size, const strl_payload_reference *reference,
+                                strl_arena *arena, strl_pm *pm, strl_error *err)
 {
     strl_cursor cursor = strl_cursor_make(data, size);
     strl_pm mesh = {0};

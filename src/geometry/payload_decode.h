@@ -13,8 +13,8 @@ struct strl__decoder {
     struct strl__mesh mesh;
     strl_pm *pm;
     const strl_payload_reference *reference; /* or NULL */
-    uint32_t copied;       /* vertices copied from it: the first numbers */
-    uint16_t *copied_from; /* [base vertices + 3], vertices of the reference; copied of them hold */
+    uint32_t copied;                         /* vertices copied from it: the first numbers */
+    uint16_t *copied_from;                   /* [base vertices + 3], vertices of the reference; copied of them hold */
     uint16_t *from; /* [base vertices + 3], the vertex that predicts colour and palette index */
     strl_arena *scratch;
     strl_error *err;

@@ -6,8 +6,8 @@
 #include "geometry/payload_reference.h"
 
 /* Inlined with `most` a constant, by which it divides. */
-static inline __attribute__((always_inline)) void set_normal(uint16_t normal[2], const uint32_t predicted[2], uint32_t a,
-                                                             uint32_t b, uint32_t most)
+static inline __attribute__((always_inline)) void set_normal(uint16_t normal[2], const uint32_t predicted[2],
+                                                             uint32_t a, uint32_t b, uint32_t most)
 {
     normal[0] = (uint16_t)strl__normal_widen((predicted[0] + strl__unzigzag(a)) & most, most);
     normal[1] = (uint16_t)strl__normal_widen((predicted[1] + strl__unzigzag(b)) & most, most);

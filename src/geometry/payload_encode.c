@@ -73,7 +73,8 @@ static bool init(struct strl__encoder *e)
 static void write_head(const strl_pm *pm, bool copies, strl_writer *writer)
 {
     strl_writer_u8(writer, 1);
-    strl_writer_u8(writer, (uint8_t)((pm->colour ? 1 : 0) | (pm->palette_index ? 2 : 0) | (copies ? 4 : 0) | (pm->texcoord ? 8 : 0)));
+    strl_writer_u8(writer, (uint8_t)((pm->colour ? 1 : 0) | (pm->palette_index ? 2 : 0) | (copies ? 4 : 0) |
+                                     (pm->texcoord ? 8 : 0)));
     strl_writer_u8(writer, (uint8_t)strl__normal_bits(pm));
     strl_writer_u16(writer, (uint16_t)pm->vertex_count);
     strl_writer_u16(writer, (uint16_t)pm->vertex_end[0]);

@@ -10,8 +10,8 @@
 struct strl__encoder {
     const strl_pm *pm;
     const strl_payload_reference *reference; /* or NULL */
-    uint32_t copied;         /* vertices copied from it: the first numbers */
-    uint16_t *copied_from;   /* [copied], vertices of the reference */
+    uint32_t copied;                         /* vertices copied from it: the first numbers */
+    uint16_t *copied_from;                   /* [copied], vertices of the reference */
     struct strl__streams_out out;
     struct strl__mesh mesh;  /* vertices and triangles as the decoder numbers them */
     uint16_t *number;        /* [pm vertices], the decoder's number of a vertex; steps' vertices keep theirs */

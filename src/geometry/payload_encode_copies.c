@@ -1,5 +1,6 @@
-/* Writing what a base mesh has of its reference. Triangles are the same where their corners lie at the same places in the
- * same order; which vertices correspond follows from the triangles. docs/format-payload.md, "Copies", is normative. */
+/* Writing what a base mesh has of its reference. Triangles are the same where their corners lie at the same places in
+ * the same order; which vertices correspond follows from the triangles. docs/format-payload.md, "Copies", is normative.
+ */
 #include "geometry/payload_encode.h"
 
 #include <string.h>
@@ -13,7 +14,7 @@ struct matcher {
     struct strl__copy copy;
     uint32_t *place_bucket; /* the least vertex of the base mesh at each place */
     uint32_t place_mask;
-    uint32_t *place;        /* [base vertices], that vertex */
+    uint32_t *place;         /* [base vertices], that vertex */
     uint32_t *bucket, *next; /* triangles of the base mesh by the places of their corners */
     uint32_t mask;
 };
@@ -47,8 +48,8 @@ static unsigned first_corner(const uint32_t place[3])
 static uint32_t triangle_slot(const struct matcher *m, const uint32_t place[3])
 {
     unsigned first = first_corner(place);
-    uint64_t key = (uint64_t)place[first] | (uint64_t)place[strl__next3(first)] << 16 |
-                   (uint64_t)place[strl__last3(first)] << 32;
+    uint64_t key =
+        (uint64_t)place[first] | (uint64_t)place[strl__next3(first)] << 16 | (uint64_t)place[strl__last3(first)] << 32;
     return (uint32_t)strl__mix64(key) & m->mask;
 }
 
@@ -89,7 +90,8 @@ static bool is_numbered(const struct strl__encoder *e, uint32_t vertex)
     return number < e->mesh.vertex_count && e->vertex[number] == vertex;
 }
 
-/* Whether the reference's corners can be the base triangle's from its corner `first` on: vertices correspond one to one. */
+/* Whether the reference's corners can be the base triangle's from its corner `first` on: vertices correspond one to
+ * one. */
 static bool agrees(const struct matcher *m, const uint16_t from[3], uint32_t t, unsigned first)
 {
     for (unsigned k = 0; k < 3; k++) {

@@ -102,8 +102,8 @@ void strl__normal_predict(const uint64_t sum[4], uint32_t most, uint32_t predict
     y ^= (y ^ folded_y) & lower;
     x = (x ^ west) - west;
     y = (y ^ south) - south;
-    /* One division for both. The quotients are below 2^11 and a multiple of 1 / 2^22 away from the next integer, so that
-     * with half a unit added to the dividend no rounding reaches it. */
+    /* One division for both. The quotients are below 2^11 and a multiple of 1 / 2^22 away from the next integer, so
+     * that with half a unit added to the dividend no rounding reaches it. */
     double inverse = 0.5 / length;
     predicted[0] = (uint32_t)(((uint32_t)(x + length) * most + (uint32_t)length + 0.5) * inverse);
     predicted[1] = (uint32_t)(((uint32_t)(y + length) * most + (uint32_t)length + 0.5) * inverse);

@@ -24,9 +24,9 @@ struct strl__chunk {
 
 struct strl__mesh {
     int32_t (*position)[3];
-    uint64_t *triangle;        /* [triangles], the corners a, b, c in 16 bits each, a lowest, and a again */
-    struct strl__chunk *chunk; /* vertex v's is number v; behind those of all vertices lie the older ones */
-    uint32_t chunk_count, free_chunk; /* older chunks come from a list of free ones, or from the end */
+    uint64_t *triangle;                    /* [triangles], the corners a, b, c in 16 bits each, a lowest, and a again */
+    struct strl__chunk *chunk;             /* vertex v's is number v; behind those of all vertices lie the older ones */
+    uint32_t chunk_count, free_chunk;      /* older chunks come from a list of free ones, or from the end */
     uint16_t *twin;                        /* [vertices], rings of vertices known to share a position */
     uint32_t vertex_count, triangle_count; /* so far */
 };
@@ -82,7 +82,8 @@ static inline void strl__mesh_add_triangle(struct strl__mesh *mesh, uint32_t a, 
 
 static inline bool strl__is_at(const int32_t p[3], const int32_t q[3])
 {
-    return ((p[0] ^ q[0]) | (p[1] ^ q[1]) | (p[2] ^ q[2])) == 0; /* one branch: on coarse lattices the parts cannot be foreseen */
+    /* one branch: on coarse lattices the parts cannot be foreseen */
+    return ((p[0] ^ q[0]) | (p[1] ^ q[1]) | (p[2] ^ q[2])) == 0;
 }
 
 static inline bool strl__same_position(const int32_t (*position)[3], uint32_t a, uint32_t b)
@@ -112,7 +113,8 @@ struct strl__star {
 bool strl__star_init(struct strl__star *star, uint32_t vertices, uint32_t triangles, strl_arena *scratch);
 
 /* Sets a place; returns its x. */
-static inline uint16_t strl__star_set(const struct strl__star *star, const uint64_t *triangle, uint32_t place, uint32_t corner)
+static inline uint16_t strl__star_set(const struct strl__star *star, const uint64_t *triangle, uint32_t place,
+                                      uint32_t corner)
 {
     uint64_t wings = triangle[corner >> 2] >> (16 * strl__next3(corner & 3));
     star->corner[place] = corner;
@@ -171,8 +173,8 @@ static inline void strl__star_keep(const struct strl__star *star, struct strl__m
     chunk->count = kept;
 }
 
-/* The corners at `moved` places, for which star->moves is set, go from the star's vertex to another one; the last of them
- * comes to its front. Clears star->moves. False where the y of such a place is at the other vertex's position. */
+/* The corners at `moved` places, for which star->moves is set, go from the star's vertex to another one; the last of
+ * them comes to its front. Clears star->moves. False where the y of such a place is at the other vertex's position. */
 static inline bool strl__star_move(struct strl__star *star, struct strl__mesh *mesh, uint32_t from, uint32_t to,
                                    const uint32_t *place, uint32_t moved)
 {

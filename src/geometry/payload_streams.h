@@ -32,8 +32,8 @@ enum {
     STRL__STREAM_PALETTE_INDEX = STRL__STREAM_NORMAL + 2,
     STRL__STREAM_COLOUR,
     STRL__STREAM_PALETTE = STRL__STREAM_COLOUR + 4,
-    STRL__STREAM_SELECT = STRL__STREAM_PALETTE + 3, /* one a context */
-    STRL__STREAM_COPY_NORMAL = STRL__STREAM_SELECT + 4, /* STRL__SELECT_CONTEXTS */
+    STRL__STREAM_SELECT = STRL__STREAM_PALETTE + 3,       /* one a context */
+    STRL__STREAM_COPY_NORMAL = STRL__STREAM_SELECT + 4,   /* STRL__SELECT_CONTEXTS */
     STRL__STREAM_TEXCOORD = STRL__STREAM_COPY_NORMAL + 2, /* only in payloads with texture coordinates */
     STRL__STREAM_COUNT = STRL__STREAM_TEXCOORD + 2
 };
@@ -128,8 +128,8 @@ struct strl__streams_in {
 };
 
 /* Decodes all streams from what is left of cursor, into scratch. payload_bytes: the whole payload's size. */
-strl_status strl__streams_read(strl_cursor *cursor, unsigned stream_count, size_t payload_bytes, uint64_t item_count, strl_arena *scratch,
-                               struct strl__streams_in *streams, strl_error *err);
+strl_status strl__streams_read(strl_cursor *cursor, unsigned stream_count, size_t payload_bytes, uint64_t item_count,
+                               strl_arena *scratch, struct strl__streams_in *streams, strl_error *err);
 
 static inline uint32_t strl__pull(struct strl__streams_in *streams, unsigned id)
 {

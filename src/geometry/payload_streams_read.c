@@ -223,8 +223,8 @@ static uint8_t *padded_copy(strl_cursor *cursor, size_t bytes, strl_arena *scrat
     return copy;
 }
 
-strl_status strl__streams_read(strl_cursor *cursor, unsigned stream_count, size_t payload_bytes, uint64_t item_count, strl_arena *scratch,
-                               struct strl__streams_in *streams, strl_error *err)
+strl_status strl__streams_read(strl_cursor *cursor, unsigned stream_count, size_t payload_bytes, uint64_t item_count,
+                               strl_arena *scratch, struct strl__streams_in *streams, strl_error *err)
 {
     *streams = (struct strl__streams_in){0};
     uint64_t item_limit = (uint64_t)payload_bytes * STRL__MAX_ITEMS_A_BYTE;

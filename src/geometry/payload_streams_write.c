@@ -120,7 +120,8 @@ void strl__streams_bits(const struct strl__streams_out *streams, double bits[STR
         bits[id] = 5;
         if (stream->count)
             bits[id] += bit_length((uint32_t)stream->count) + 5.;
-        bits[id] += table.mode == STRL__MODE_TABLE ? table_bits(&table, count) : (double)table.mode * (double)stream->count;
+        bits[id] +=
+            table.mode == STRL__MODE_TABLE ? table_bits(&table, count) : (double)table.mode * (double)stream->count;
     }
 }
 

@@ -20,9 +20,8 @@ bool strl_pm_create(strl_pm *pm, bool has_colours, bool has_palette_indices, boo
     pm->appearance_error = strl_arena_alloc(arena, states, sizeof *pm->appearance_error);
     pm->palette = strl_arena_alloc(arena, pm->palette_count, sizeof *pm->palette);
     return pm->position && pm->normal && (pm->colour || !has_colours) && (pm->palette_index || !has_palette_indices) &&
-           (pm->texcoord || !has_texcoords) &&
-           pm->parent && pm->triangle && pm->vertex_end && pm->triangle_end && pm->geometric_error &&
-           pm->appearance_error && pm->palette;
+           (pm->texcoord || !has_texcoords) && pm->parent && pm->triangle && pm->vertex_end && pm->triangle_end &&
+           pm->geometric_error && pm->appearance_error && pm->palette;
 }
 
 static strl_status check_counts(const strl_pm *pm, strl_error *err)

@@ -60,8 +60,8 @@ typedef struct strl_pm {
     strl_palette_entry *palette; /* [palette_count] */
 } strl_pm;
 
-/* Gives the mesh its arrays, from the arena and unset: the four counts are set and within the limits above. False without
- * memory. */
+/* Gives the mesh its arrays, from the arena and unset: the four counts are set and within the limits above. False
+ * without memory. */
 bool strl_pm_create(strl_pm *pm, bool has_colours, bool has_palette_indices, bool has_texcoords, strl_arena *arena);
 
 /* Checks every invariant that this file states (of the limit of moves only the moved corners): counts, order, errors,

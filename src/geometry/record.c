@@ -51,13 +51,13 @@ static bool allocate(strl_pm *pm, uint32_t vertices, uint32_t triangles, uint32_
     pm->triangle_end = strl_arena_alloc_zero(arena, (size_t)steps + 2, sizeof *pm->triangle_end);
     pm->geometric_error = strl_arena_alloc(arena, (size_t)steps + 1, sizeof(float));
     pm->appearance_error = strl_arena_alloc(arena, (size_t)steps + 1, sizeof(float));
-    return pm->position && pm->normal && pm->colour && pm->texcoord && pm->palette_index && pm->parent && pm->triangle &&
-           pm->vertex_end && pm->triangle_end && pm->geometric_error && pm->appearance_error;
+    return pm->position && pm->normal && pm->colour && pm->texcoord && pm->palette_index && pm->parent &&
+           pm->triangle && pm->vertex_end && pm->triangle_end && pm->geometric_error && pm->appearance_error;
 }
 
 /* Palette ids in order of first use by wedges. */
-static bool fill_palette(strl_pm *pm, const strl_simplified *simplified, const ordering *o, const strl_palette_entry *palette,
-                         strl_arena *arena)
+static bool fill_palette(strl_pm *pm, const strl_simplified *simplified, const ordering *o,
+                         const strl_palette_entry *palette, strl_arena *arena)
 {
     uint32_t capacity = 16, *ids = strl_arena_alloc(arena, capacity, sizeof *ids), last = 0;
     pm->palette_count = 0;
@@ -153,12 +153,13 @@ strl_status strl_pm_record(const strl_mesh *mesh, const strl_simplified *simplif
     ordering order;
     for (uint32_t w = 0; w < simplified->wedge_count; w++)
         if (simplified->wedge[w].palette >= palette_count)
-            return strl__fail(err, STRL_ERR_FORMAT, "a wedge has entry %u of a palette of %u", simplified->wedge[w].palette,
-                              palette_count);
+            return strl__fail(err, STRL_ERR_FORMAT, "a wedge has entry %u of a palette of %u",
+                              simplified->wedge[w].palette, palette_count);
     if (simplified->wedge_count > STRL_PM_MAX_VERTICES || mesh->triangle_count > STRL_PM_MAX_TRIANGLES)
         return strl__fail(err, STRL_ERR_LIMIT, "a node has %u vertices and %u triangles; the limits are %u and %u",
                           simplified->wedge_count, mesh->triangle_count, STRL_PM_MAX_VERTICES, STRL_PM_MAX_TRIANGLES);
-    if (!order_vertices(mesh, simplified, arena, &order) || !allocate(pm, simplified->wedge_count, mesh->triangle_count, simplified->collapse_count, arena) ||
+    if (!order_vertices(mesh, simplified, arena, &order) ||
+        !allocate(pm, simplified->wedge_count, mesh->triangle_count, simplified->collapse_count, arena) ||
         !fill_palette(pm, simplified, &order, palette, arena))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", mesh->triangle_count);
     fill_vertices(pm, mesh, simplified, &order);

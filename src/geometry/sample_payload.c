@@ -48,7 +48,8 @@ static void push_splat(struct strl__streams_out *streams, const strl_splat *spla
     uint8_t green = (uint8_t)(colour_of(splat->rgba, 0) - colour_of(before->rgba, 0));
     for (unsigned k = 0; k < 4; k++)
         strl__push(streams, COLOUR + k,
-                   byte_residual(colour_of(splat->rgba, k), (uint8_t)(colour_of(before->rgba, k) + (k == 1 || k == 2 ? green : 0))));
+                   byte_residual(colour_of(splat->rgba, k),
+                                 (uint8_t)(colour_of(before->rgba, k) + (k == 1 || k == 2 ? green : 0))));
 }
 
 static void push_runs(struct strl__streams_out *streams, const strl_brick_head *head)
@@ -88,16 +89,20 @@ strl_status strl_brick_head_write(const strl_brick_head *head, strl_writer *writ
 static strl_status read_levels(strl_cursor *cursor, strl_brick_head *head, strl_error *err)
 {
     if (head->level_count < 1 || head->level_count > STRL_BRICK_LEVELS)
-        return strl__fail(err, STRL_ERR_FORMAT, "a brick has %u levels, expected 1 to %u", head->level_count, STRL_BRICK_LEVELS);
+        return strl__fail(err, STRL_ERR_FORMAT, "a brick has %u levels, expected 1 to %u", head->level_count,
+                          STRL_BRICK_LEVELS);
     for (uint32_t i = 0; i < head->level_count; i++) {
         head->error[i] = strl_cursor_f32(cursor);
         head->splat_end[i] = strl_cursor_u16(cursor);
         if (!(head->error[i] >= 0) || isinf(head->error[i]) || (i && head->error[i] > head->error[i - 1]))
-            return strl__fail(err, STRL_ERR_FORMAT, "level %u of a brick has the size %g, expected one from 0 to that of the level above",
-                              i, (double)head->error[i]);
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "level %u of a brick has the size %g, expected one from 0 to that of the level above", i,
+                              (double)head->error[i]);
         if (head->splat_end[i] > STRL_BRICK_SPLATS || (i && head->splat_end[i] < head->splat_end[i - 1]))
-            return strl__fail(err, STRL_ERR_FORMAT, "the splats of level %u of a brick end at %u, expected at most %u and no less than those above",
-                              i, head->splat_end[i], STRL_BRICK_SPLATS);
+            return strl__fail(
+                err, STRL_ERR_FORMAT,
+                "the splats of level %u of a brick end at %u, expected at most %u and no less than those above", i,
+                head->splat_end[i], STRL_BRICK_SPLATS);
     }
     return STRL_OK;
 }
@@ -138,10 +143,11 @@ static strl_status take_splats(struct strl__streams_in *streams, strl_brick_head
     for (uint32_t i = 0; i < strl_brick_splats(head); i++) {
         strl_splat splat = {.side = pull_byte(streams, SIDE, before.side)};
         if (splat.side > STRL_SPLAT_MOST_SIDE)
-            return strl__fail(err, STRL_ERR_FORMAT, "a splat has a side of 2^%u lattice units, at most 2^%u is allowed", splat.side,
-                              STRL_SPLAT_MOST_SIDE);
+            return strl__fail(err, STRL_ERR_FORMAT, "a splat has a side of 2^%u lattice units, at most 2^%u is allowed",
+                              splat.side, STRL_SPLAT_MOST_SIDE);
         if (!pull_centre(streams, &before, &splat))
-            return strl__fail(err, STRL_ERR_FORMAT, "a splat lies further from its brick's anchor than 32 bits can say");
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "a splat lies further from its brick's anchor than 32 bits can say");
         splat.coverage = (uint8_t)(255u - strl__pull(streams, COVERAGE));
         for (unsigned k = 0; k < 2; k++)
             splat.normal[k] = pull_byte(streams, NORMAL, before.normal[k]);
@@ -152,27 +158,30 @@ static strl_status take_splats(struct strl__streams_in *streams, strl_brick_head
     return STRL_OK;
 }
 
-static strl_status take_runs(struct strl__streams_in *streams, uint32_t triangles, strl_brick_head *head, strl_error *err)
+static strl_status take_runs(struct strl__streams_in *streams, uint32_t triangles, strl_brick_head *head,
+                             strl_error *err)
 {
     uint64_t sum = 0;
     for (uint64_t i = 0, before = UINT64_MAX; i < head->run_count; i++) {
         uint64_t up = strl__pull(streams, LEVEL);
         up += up >= before;
         if (up > head->level_count)
-            return strl__fail(err, STRL_ERR_FORMAT, "run %" PRIu64 " of a brick is %" PRIu64 " levels above the finest of %u", i, up,
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "run %" PRIu64 " of a brick is %" PRIu64 " levels above the finest of %u", i, up,
                               head->level_count);
         uint64_t count = (uint64_t)strl__pull(streams, COUNT + (up > 0)) + 1;
         head->run[i] = (strl_brick_run){head->level_count - (uint32_t)up, (uint32_t)count};
         before = up;
         sum += count;
     }
-    return sum == triangles ? STRL_OK
-                            : strl__fail(err, STRL_ERR_FORMAT, "the runs of a brick have %" PRIu64 " triangles, its mesh has %u", sum,
-                                         triangles);
+    return sum == triangles
+               ? STRL_OK
+               : strl__fail(err, STRL_ERR_FORMAT, "the runs of a brick have %" PRIu64 " triangles, its mesh has %u",
+                            sum, triangles);
 }
 
-static strl_status read_streams(strl_cursor *cursor, uint32_t triangles, strl_arena *arena, strl_arena *scratch, strl_brick_head *head,
-                                strl_error *err)
+static strl_status read_streams(strl_cursor *cursor, uint32_t triangles, strl_arena *arena, strl_arena *scratch,
+                                strl_brick_head *head, strl_error *err)
 {
     struct strl__streams_in streams;
     strl_status status = strl__streams_read(cursor, STREAMS, cursor->size, 0, scratch, &streams, err);
@@ -181,7 +190,8 @@ static strl_status read_streams(strl_cursor *cursor, uint32_t triangles, strl_ar
     uint32_t splats = strl_brick_splats(head);
     head->run_count = streams.stream[LEVEL].count;
     if (streams.stream[SIDE].count != splats || head->run_count > triangles)
-        return strl__fail(err, STRL_ERR_FORMAT, "a brick of %u triangles has %u runs, and %u splats, of which its levels have %u", triangles,
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "a brick of %u triangles has %u runs, and %u splats, of which its levels have %u", triangles,
                           head->run_count, streams.stream[SIDE].count, splats);
     head->splat = strl_arena_alloc(arena, splats, sizeof *head->splat);
     head->run = strl_arena_alloc(arena, head->run_count, sizeof *head->run);
@@ -191,12 +201,13 @@ static strl_status read_streams(strl_cursor *cursor, uint32_t triangles, strl_ar
     if (!status)
         status = take_runs(&streams, triangles, head, err);
     if (!status && !strl__streams_done(&streams))
-        status = strl__fail(err, STRL_ERR_FORMAT, "the streams of a brick's head are not all as long as its splats and runs ask");
+        status = strl__fail(err, STRL_ERR_FORMAT,
+                            "the streams of a brick's head are not all as long as its splats and runs ask");
     return status;
 }
 
-strl_status strl_brick_head_read(const void *data, size_t size, uint32_t triangles, strl_arena *arena, strl_brick_head *head,
-                                 size_t *bytes, strl_error *err)
+strl_status strl_brick_head_read(const void *data, size_t size, uint32_t triangles, strl_arena *arena,
+                                 strl_brick_head *head, size_t *bytes, strl_error *err)
 {
     strl_cursor cursor = strl_cursor_make(data, size);
     *head = (strl_brick_head){0};

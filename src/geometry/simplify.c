@@ -7,10 +7,11 @@
 #include "geometry/simplify_plan.h"
 
 #define ESTIMATE_SHARE 0.5f /* of what is likely: too little costs time, too much spoils the order */
-#define FREE_DIVISOR 8   /* collapses that add no error go on below the target, down to this part of it */
-#define LADDER_RATIO 4.f /* the first rung gives up where its next collapse costs so many times its middle one */
-#define SMALL_SHARE 5e-4 /* of a piece's diagonal: errors below are never out of proportion */
-#define LARGE_SHARE 0.01 /* of a piece's diagonal: errors above are out of proportion where not even half of what is wanted is done */
+#define FREE_DIVISOR 8      /* collapses that add no error go on below the target, down to this part of it */
+#define LADDER_RATIO 4.f    /* the first rung gives up where its next collapse costs so many times its middle one */
+#define SMALL_SHARE 5e-4    /* of a piece's diagonal: errors below are never out of proportion */
+/* of a piece's diagonal: errors above are out of proportion where not even half of what is wanted is done */
+#define LARGE_SHARE 0.01
 #define LEAST_ERROR 1.f  /* lattice units: below, all errors count as equal */
 #define MEAN_COSINE 0.7f /* normals that are further apart belong to two faces: no mean says what either looks like */
 
@@ -98,8 +99,8 @@ static void map_wedges(simplifier *s, const strl_star *star, uint32_t to, strl_s
     }
 }
 
-void strl__apply_collapse(simplifier *s, const strl_star *star, const collapse_plan *plan, const collapse_effect *effect,
-                          strl_simplified *result)
+void strl__apply_collapse(simplifier *s, const strl_star *star, const collapse_plan *plan,
+                          const collapse_effect *effect, strl_simplified *result)
 {
     uint32_t u = star->point, v = plan->to;
     s->moves += strl__moves_of(s, star, v);
@@ -146,8 +147,8 @@ static void mark_stale(simplifier *s, uint32_t point, float key)
         heap_push(s, point, key);
 }
 
-/* What a collapse of the point will cost at least, roughly, without a plan: its triangles have drifted so far already, and the
- * nearest of its neighbours is so far off their planes. Most points of a mesh are never planned for this. */
+/* What a collapse of the point will cost at least, roughly, without a plan: its triangles have drifted so far already,
+ * and the nearest of its neighbours is so far off their planes. Most points of a mesh are never planned for this. */
 static float estimate_key(const simplifier *s, uint32_t point)
 {
     const quadric *q = &s->quadrics[point];
@@ -232,7 +233,8 @@ static double diagonal_of(const strl_mesh *mesh)
     return sqrt(squared);
 }
 
-/* Plans the point anew. True where the plan is to be carried out at once: then it is in s->plan[point], s->star and s->effect. */
+/* Plans the point anew. True where the plan is to be carried out at once: then it is in s->plan[point], s->star and
+ * s->effect. */
 static bool plan_again(simplifier *s, uint32_t point)
 {
     collapse_plan *plan = &s->plan[point];
@@ -247,11 +249,13 @@ static bool plan_again(simplifier *s, uint32_t point)
     return false;
 }
 
-/* Brings star and effect of a plan back. False where it cannot be carried out any more, because the other side has changed since. */
+/* Brings star and effect of a plan back. False where it cannot be carried out any more, because the other side has
+ * changed since. */
 static bool recall_plan(simplifier *s, uint32_t point)
 {
     collapse_plan again;
-    if (!strl__star_gather(s, point, &s->star) || s->star.count == 0 || !strl__may_collapse(s, &s->star, s->plan[point].to))
+    if (!strl__star_gather(s, point, &s->star) || s->star.count == 0 ||
+        !strl__may_collapse(s, &s->star, s->plan[point].to))
         return false;
     strl__plan_collapse(s, &s->star, s->plan[point].to, &again, &s->effect);
     again.key = s->plan[point].key; /* what was compared */
@@ -277,16 +281,16 @@ static uint32_t next_point(simplifier *s)
     return plan_again(s, point) ? point : NO_INDEX;
 }
 
-/* What the first rung may cost: a few times what the first half of its collapses did, and while they are not done, an error that is
- * no longer small for such a piece or such a start. */
+/* What the first rung may cost: a few times what the first half of its collapses did, and while they are not done, an
+ * error that is no longer small for such a piece or such a start. */
 static float first_rung_limit(const simplifier *s, float start)
 {
     float large = strl__larger(LADDER_RATIO * start, (float)(LARGE_SHARE * s->diagonal));
     return smaller(s->desc->error_limit, strl__larger(large, s->desc->even_error));
 }
 
-/* Collapses on the present rung up to `limit`; with `adaptive`, stops where keys leave those of the first half of what is wanted
- * far behind: then the next rungs do the same for less. Returns the largest key. */
+/* Collapses on the present rung up to `limit`; with `adaptive`, stops where keys leave those of the first half of what
+ * is wanted far behind: then the next rungs do the same for less. Returns the largest key. */
 static float run_rung(simplifier *s, float limit, bool adaptive, strl_simplified *result)
 {
     uint32_t all = s->mesh->triangle_count, target = s->desc->target_triangles;
@@ -322,8 +326,8 @@ static float run_rung(simplifier *s, float limit, bool adaptive, strl_simplified
     return reached;
 }
 
-/* The next limit: at least twice as much, and no more rounds in which nothing can happen. A point joins another of its cell only
- * where an edge lies in one cell, or nearly so. */
+/* The next limit: at least twice as much, and no more rounds in which nothing can happen. A point joins another of its
+ * cell only where an edge lies in one cell, or nearly so. */
 static float next_limit(const simplifier *s, float limit, float most, bool changed)
 {
     float least = smaller(s->least_left, s->shortest_edge);
@@ -344,9 +348,11 @@ static void retry_failures(simplifier *s)
 /* All rungs up to one error, then all again up to twice that, until the target is met. False without memory. */
 static bool climb_ladder(simplifier *s, float start, strl_arena *arena, strl_simplified *result)
 {
-    float limit = start, most = smaller(s->desc->error_limit, 2 * strl__larger(start, (float)s->diagonal)); /* nothing is further away */
+    /* nothing is further away */
+    float limit = start, most = smaller(s->desc->error_limit, 2 * strl__larger(start, (float)s->diagonal));
     bool changed = true;
-    while (s->triangles_left > s->desc->target_triangles && s->triangles_left > s->desc->soft_triangles && limit < most) {
+    while (s->triangles_left > s->desc->target_triangles && s->triangles_left > s->desc->soft_triangles &&
+           limit < most) {
         uint32_t before = result->collapse_count;
         limit = next_limit(s, limit, most, changed);
         if (changed)
@@ -365,7 +371,8 @@ static bool climb_ladder(simplifier *s, float start, strl_arena *arena, strl_sim
     return true;
 }
 
-static strl_status simplify(simplifier *s, strl_arena *work, strl_arena *arena, strl_simplified *result, strl_error *err)
+static strl_status simplify(simplifier *s, strl_arena *work, strl_arena *arena, strl_simplified *result,
+                            strl_error *err)
 {
     const strl_simplify_desc *desc = s->desc;
     if (!strl__simplify_load(s, work, arena, result))

@@ -1,5 +1,5 @@
-/* The bound of one collapse (geometry/simplify.h says why it is one). All in double: lattice offsets of a node are below 2^31,
- * so products of two are exact to a relative 2^-52. */
+/* The bound of one collapse (geometry/simplify.h says why it is one). All in double: lattice offsets of a node are
+ * below 2^31, so products of two are exact to a relative 2^-52. */
 #include <math.h>
 #include <string.h>
 
@@ -10,20 +10,22 @@ static double cross2(double as, double at, double bs, double bt)
     return as * bt - at * bs;
 }
 
-/* The fan as the collapse u -> v sees it, flat: point 0 is v and the origin, the others follow counter-clockwise. Triangle m
- * lies between the points m and m + 1 (the last one between the last point and v); an old one has its apex in u, a new one in v. */
+/* The fan as the collapse u -> v sees it, flat: point 0 is v and the origin, the others follow counter-clockwise.
+ * Triangle m lies between the points m and m + 1 (the last one between the last point and v); an old one has its apex
+ * in u, a new one in v. */
 typedef struct view {
     const simplifier *s;
     const strl_star *star;
-    uint32_t n;                  /* points */
-    uint32_t v_at;               /* in the fan */
-    uint32_t first, end;         /* old triangles that there are */
+    uint32_t n;                                               /* points */
+    uint32_t v_at;                                            /* in the fan */
+    uint32_t first, end;                                      /* old triangles that there are */
     double s_of[RING_ROOM], t_of[RING_ROOM], h_of[RING_ROOM]; /* two coordinates across the normal, one along it */
-    double us, ut, uh;           /* u, or its nearest point on the new boundary edge */
-    double moved[3];             /* from u to that point; 0 for a closed fan */
-    double side[RING_ROOM];      /* of u seen along the new spoke to each point: > 0 = at its left */
-    uint32_t image;              /* the new triangle that holds u */
-    double least[RING_ROOM], most[RING_ROOM]; /* per new triangle: how far the new surface lies above the old one; the patches agree on the rim */
+    double us, ut, uh;                                        /* u, or its nearest point on the new boundary edge */
+    double moved[3];                                          /* from u to that point; 0 for a closed fan */
+    double side[RING_ROOM]; /* of u seen along the new spoke to each point: > 0 = at its left */
+    uint32_t image;         /* the new triangle that holds u */
+    /* per new triangle: how far the new surface lies above the old one; the patches agree on the rim */
+    double least[RING_ROOM], most[RING_ROOM];
 } view;
 
 /* u slides to the new boundary edge first. */
@@ -43,7 +45,8 @@ static void slide_to_edge(view *w)
         w->moved[k] = fan->x[k][v] + along * d[k];
     double flat[3];
     for (unsigned k = 0; k < 3; k++)
-        flat[k] = w->moved[0] * fan->axis[k][0] + w->moved[1] * fan->axis[k][1] + w->moved[2] * fan->axis[k][2] - fan->flat[k][v];
+        flat[k] = w->moved[0] * fan->axis[k][0] + w->moved[1] * fan->axis[k][1] + w->moved[2] * fan->axis[k][2] -
+                  fan->flat[k][v];
     w->us = flat[0], w->ut = flat[1], w->uh = flat[2];
 }
 
@@ -82,7 +85,8 @@ static bool is_height_field(const view *w)
     double above_u[RING_ROOM], old_area[RING_ROOM], new_area[RING_ROOM];
     unsigned crossings = 0, folded = 0;
     for (uint32_t m = 0, lanes = strl__lanes(w->n); m < lanes; m++) {
-        double as = w->s_of[m] - w->us, at = w->t_of[m] - w->ut, bs = w->s_of[m + 1] - w->us, bt = w->t_of[m + 1] - w->ut;
+        double as = w->s_of[m] - w->us, at = w->t_of[m] - w->ut, bs = w->s_of[m + 1] - w->us,
+               bt = w->t_of[m + 1] - w->ut;
         above_u[m] = at;
         old_area[m] = cross2(as, at, bs, bt);
         new_area[m] = cross2(w->s_of[m], w->t_of[m], w->s_of[m + 1], w->t_of[m + 1]);
@@ -97,7 +101,8 @@ static bool is_height_field(const view *w)
     return !folded && (!w->star->closed || crossings == 1);
 }
 
-/* The new spokes turn counter-clockwise round v, so the last one with u at its left begins the new triangle that holds u. */
+/* The new spokes turn counter-clockwise round v, so the last one with u at its left begins the new triangle that holds
+ * u. */
 static void find_image(view *w)
 {
     w->image = 1;
@@ -133,7 +138,7 @@ static inline void spoke_difference(const float u[4], const float x[4], float al
 /* What is looked at along spokes. */
 typedef struct watch {
     bool colours, normals;
-    uint32_t own, target;        /* wedges of u and v */
+    uint32_t own, target;         /* wedges of u and v */
     uint32_t wedge[2 * RING_MAX]; /* of the ring's points, in fan order */
     float normal_squared;
 } watch;
@@ -145,18 +150,21 @@ static void watch_crossing(const view *w, watch *seen, uint32_t old, uint32_t ne
     uint32_t x = seen->wedge[w->v_at + old], y = seen->wedge[w->v_at + new];
     float d[4];
     if (seen->normals) {
-        spoke_difference(s->normal[seen->own], s->normal[x], (float)along, s->normal[seen->target], s->normal[y], (float)on_new, d);
+        spoke_difference(s->normal[seen->own], s->normal[x], (float)along, s->normal[seen->target], s->normal[y],
+                         (float)on_new, d);
         seen->normal_squared = strl__larger(seen->normal_squared, d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
     }
     if (seen->colours) {
-        spoke_difference(s->colour[seen->own], s->colour[x], (float)along, s->colour[seen->target], s->colour[y], (float)on_new, d);
+        spoke_difference(s->colour[seen->own], s->colour[x], (float)along, s->colour[seen->target], s->colour[y],
+                         (float)on_new, d);
         for (unsigned k = 0; k < 3; k++)
             effect->spoke_colour = strl__larger(effect->spoke_colour, fabsf(d[k]));
     }
 }
 
-/* Where old spokes u-x cross new ones v-y: the gaps, for the triangles on both sides of the new spoke, and the attributes. The spoke
- * v-y divides the ring in two; the old spokes that cross it are those to the part in which u is not. */
+/* Where old spokes u-x cross new ones v-y: the gaps, for the triangles on both sides of the new spoke, and the
+ * attributes. The spoke v-y divides the ring in two; the old spokes that cross it are those to the part in which u is
+ * not. */
 static void note_crossings(view *w, watch *seen, collapse_effect *effect)
 {
     for (uint32_t j = 2; j + 2 <= w->n; j++) {
@@ -191,7 +199,8 @@ static void add_box(float to[6], const float box[6])
         to[k] = (to[k] + box[k]) * STRL_ROUND_UP;
 }
 
-/* What a gap of one below and above adds to a drift: the normal's positive and negative parts, of which one of each two is 0. */
+/* What a gap of one below and above adds to a drift: the normal's positive and negative parts, of which one of each two
+ * is 0. */
 static void list_gap_reaches(const double normal[3], float below[8], float above[8])
 {
     for (unsigned k = 0; k < 3; k++) {
@@ -202,8 +211,9 @@ static void list_gap_reaches(const double normal[3], float below[8], float above
     below[6] = below[7] = above[6] = above[7] = 0;
 }
 
-/* A new triangle overlaps the old triangles between v and itself on its side of u; the one that holds u may overlap all.
- * (An old triangle whose base lies beyond a new spoke has its apex, u, on this side of it, or both on the other.) */
+/* A new triangle overlaps the old triangles between v and itself on its side of u; the one that holds u may overlap
+ * all. (An old triangle whose base lies beyond a new spoke has its apex, u, on this side of it, or both on the other.)
+ */
 static void drift_by_height(const view *w, collapse_effect *effect)
 {
     const strl_star *star = w->star;
@@ -363,9 +373,9 @@ static float longest_straight(const simplifier *s, const strl_star *star, uint32
     return sqrtf(longest) * (1 + 1e-6f); /* whatever the rounding, a bound */
 }
 
-/* Every point of the star goes towards v by a share of the way from u. A vanishing triangle (u, v, x) falls onto the edge v-x. Where
- * no triangle of the star keeps that edge, another one at v takes its drift over; where none keeps the edge at all, its points
- * are still within |v - x| of v, which the caller knows to stay. */
+/* Every point of the star goes towards v by a share of the way from u. A vanishing triangle (u, v, x) falls onto the
+ * edge v-x. Where no triangle of the star keeps that edge, another one at v takes its drift over; where none keeps the
+ * edge at all, its points are still within |v - x| of v, which the caller knows to stay. */
 static void drift_straight(const simplifier *s, const strl_star *star, uint32_t to, collapse_effect *effect)
 {
     double way[3];

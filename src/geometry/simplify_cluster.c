@@ -1,12 +1,13 @@
-/* The last two rungs of the ladder: points that share a cell of a grid merge, the grid growing until the target is met. Points of
- * different components merge first of all (rung DISJOINT); points of one component only where CLUSTERING is allowed.
- * The error of such a merge is the full way that the point goes, so the claim stays a bound. */
+/* The last two rungs of the ladder: points that share a cell of a grid merge, the grid growing until the target is met.
+ * Points of different components merge first of all (rung DISJOINT); points of one component only where CLUSTERING is
+ * allowed. The error of such a merge is the full way that the point goes, so the claim stays a bound. */
 #include <math.h>
 
 #include "base/hash.h"
 #include "geometry/simplify_plan.h"
 
-/* Cells of the grid, of the error that merging may make: from their corners to their middles it is less far, and what drifted before counts too. */
+/* Cells of the grid, of the error that merging may make: from their corners to their middles it is less far, and what
+ * drifted before counts too. */
 #define CELL_SHARE 0.75
 
 typedef struct cell_slot {
@@ -85,7 +86,8 @@ static bool prepare(clustering *c, simplifier *s, strl_arena *arena)
         const uint32_t *point = s->faces[t].point;
         for (unsigned k = 0; k < 3 && !s->faces[t].gone; k++) {
             unite(c->component, point[0], point[k]);
-            shortest = fmin(shortest, strl__distance2(s->sites[point[k]].position, s->sites[point[(k + 1) % 3]].position));
+            shortest =
+                fmin(shortest, strl__distance2(s->sites[point[k]].position, s->sites[point[(k + 1) % 3]].position));
         }
     }
     s->shortest_edge = (float)sqrt(shortest);
@@ -136,12 +138,13 @@ static void choose_representatives(clustering *c, double size)
     }
 }
 
-/* Whether some triangle of the star becomes the double of one at `to`, with which it may go (duplicates.c). The star's stamps must be in
- * force. */
+/* Whether some triangle of the star becomes the double of one at `to`, with which it may go (duplicates.c). The star's
+ * stamps must be in force. */
 static bool makes_double(const simplifier *s, const strl_star *star, uint32_t to)
 {
     uint32_t scanned = 0;
-    for (uint32_t corner = s->sites[to].head, next; corner != NO_INDEX && scanned < SCAN_MAX; corner = next, scanned++) {
+    for (uint32_t corner = s->sites[to].head, next; corner != NO_INDEX && scanned < SCAN_MAX;
+         corner = next, scanned++) {
         const face *f = &s->faces[corner >> 2];
         unsigned c = corner & 3;
         next = f->next[c];
@@ -155,8 +158,8 @@ static bool makes_double(const simplifier *s, const strl_star *star, uint32_t to
     return false;
 }
 
-/* Whether a triangle of the star has another corner in the star's cell: it will vanish when that one comes too. Merging points of triangles
- * that reach further costs error and takes nothing away. */
+/* Whether a triangle of the star has another corner in the star's cell: it will vanish when that one comes too. Merging
+ * points of triangles that reach further costs error and takes nothing away. */
 static bool can_take_away(const clustering *c, const strl_star *star, const cell_slot *slot, double size)
 {
     for (uint32_t i = 0; i < star->neighbour_count; i++) {
@@ -170,8 +173,8 @@ static bool can_take_away(const clustering *c, const strl_star *star, const cell
     return false;
 }
 
-/* A merge that takes no triangle away must not gather so many that the point cannot move any more: where all points are such hubs,
- * nothing goes on. */
+/* A merge that takes no triangle away must not gather so many that the point cannot move any more: where all points are
+ * such hubs, nothing goes on. */
 static bool makes_hub(const simplifier *s, const strl_star *star, uint32_t to)
 {
     return s->sites[to].degree + star->count > STAR_MAX && strl__star_uses(s, star, to) == 0;

@@ -108,8 +108,8 @@ static bool allocate(simplifier *s, strl_arena *arena)
     s->heap = strl_arena_alloc(arena, points + HEAP_WAYS, sizeof *s->heap);
     s->plan = strl_arena_alloc_zero(arena, points, sizeof *s->plan);
     s->known = strl_arena_alloc_zero(arena, points, sizeof *s->known);
-    return s->sites && s->faces && s->pulls && s->quadrics && s->normal && s->colour && s->normal_sum && s->heap && s->plan &&
-           s->known;
+    return s->sites && s->faces && s->pulls && s->quadrics && s->normal && s->colour && s->normal_sum && s->heap &&
+           s->plan && s->known;
 }
 
 static bool allocate_result(const simplifier *s, strl_simplified *result, strl_arena *arena)
@@ -125,8 +125,8 @@ static bool allocate_result(const simplifier *s, strl_simplified *result, strl_a
     result->drift = strl_arena_alloc(arena, triangles, sizeof *result->drift);
     result->deviation = strl_arena_alloc(arena, triangles, sizeof *result->deviation);
     result->shift = strl_arena_alloc(arena, triangles, sizeof *result->shift);
-    return result->collapses && result->wedge && result->wedge_parent && result->normal && result->removed_at && result->corner && result->drift &&
-           result->deviation && result->shift;
+    return result->collapses && result->wedge && result->wedge_parent && result->normal && result->removed_at &&
+           result->corner && result->drift && result->deviation && result->shift;
 }
 
 void strl__append_corner(simplifier *s, uint32_t point, uint32_t corner)
@@ -145,8 +145,11 @@ static void load_points(simplifier *s)
 {
     const strl_mesh *mesh = s->mesh;
     for (uint32_t p = 0; p < mesh->point_count; p++) {
-        s->sites[p] = (site){.head = NO_INDEX, .tail = NO_INDEX, .only_wedge = NO_INDEX,
-                             .flags = mesh->flags[p], .holders = mesh->holders ? mesh->holders[p] : 0};
+        s->sites[p] = (site){.head = NO_INDEX,
+                             .tail = NO_INDEX,
+                             .only_wedge = NO_INDEX,
+                             .flags = mesh->flags[p],
+                             .holders = mesh->holders ? mesh->holders[p] : 0};
         for (unsigned k = 0; k < 3; k++)
             s->sites[p].position[k] = mesh->position[p][k];
     }

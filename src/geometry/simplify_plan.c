@@ -83,7 +83,8 @@ static bool keeps_orientation(const simplifier *s, const strl_star *star, uint32
     return true;
 }
 
-/* The link condition: u and v share exactly the neighbours that the triangles of their edge name. The star's stamps must be in force. */
+/* The link condition: u and v share exactly the neighbours that the triangles of their edge name. The star's stamps
+ * must be in force. */
 static bool link_is_disk(const simplifier *s, const strl_star *star, uint32_t to)
 {
     uint64_t seen[2] = {0, 0}; /* of 2 * STAR_MAX neighbours */
@@ -99,7 +100,8 @@ static bool link_is_disk(const simplifier *s, const strl_star *star, uint32_t to
                 seen[at / 64] |= UINT64_C(1) << at % 64;
         }
     }
-    return (unsigned)__builtin_popcountll(seen[0]) + (unsigned)__builtin_popcountll(seen[1]) == strl__star_uses(s, star, to);
+    return (unsigned)__builtin_popcountll(seen[0]) + (unsigned)__builtin_popcountll(seen[1]) ==
+           strl__star_uses(s, star, to);
 }
 
 bool strl__leaves_surface_at(const simplifier *s, const strl_star *star, uint32_t to)
@@ -144,7 +146,8 @@ bool strl__may_collapse(const simplifier *s, const strl_star *star, uint32_t to)
     if ((v->flags & STRL_POINT_OUTSIDE) && (u->holders & ~v->holders))
         return false; /* a node that outsiders do not know would come to share this point with them */
     if (star->on_boundary && !(uses & 1))
-        return false; /* the rim collapses along itself only: an open edge then always ends at rim points of the input */
+        return false; /* the rim collapses along itself only: an open edge then always ends at rim points of the input
+                       */
     if (s->rung < STRL_SIMPLIFY_SEAMS && !star->manifold)
         return false;
     return wedges_can_follow(s, star, to) && keeps_orientation(s, star, to) && strl__leaves_surface_at(s, star, to) &&
@@ -202,7 +205,8 @@ static float attribute_change(const simplifier *s, const strl_star *star, uint32
     return worst;
 }
 
-void strl__plan_collapse(const simplifier *s, const strl_star *star, uint32_t to, collapse_plan *plan, collapse_effect *effect)
+void strl__plan_collapse(const simplifier *s, const strl_star *star, uint32_t to, collapse_plan *plan,
+                         collapse_effect *effect)
 {
     strl__collapse_effect(s, star, to, effect);
     float deviation = effect->all.of[REACH_DEVIATION], change = attribute_change(s, star, to, effect);
@@ -233,7 +237,8 @@ static void list_costs(const simplifier *s, const strl_star *star, double *cost)
         double length = 0;
         for (unsigned k = 0; k < 3; k++)
             length += (u[k] - v->position[k]) * (u[k] - v->position[k]);
-        cost[i] = strl__quadric_at(q, v->position) + v->own_cost + 1e-4 * length * length; /* flat regions: the nearest */
+        /* flat regions: the nearest */
+        cost[i] = strl__quadric_at(q, v->position) + v->own_cost + 1e-4 * length * length;
     }
 }
 

@@ -6,12 +6,13 @@
 /* Larger than any difference of attributes. */
 #define OTHER_PALETTE 1e6f
 
-/* Attributes that differ by more are not merged where no triangle says that they go on into each other: a normal by 44 degrees, or
- * a third of black to white. */
+/* Attributes that differ by more are not merged where no triangle says that they go on into each other: a normal by 44
+ * degrees, or a third of black to white. */
 #define UNLIKE 0.3f
 
-/* Then a wedge goes with its triangles where they reach so many times the way that it goes: what falls onto a wedge that looks otherwise
- * shows as far as they reach. Where they are as small as the way, the error covers that, and each wedge costs bytes. */
+/* Then a wedge goes with its triangles where they reach so many times the way that it goes: what falls onto a wedge
+ * that looks otherwise shows as far as they reach. Where they are as small as the way, the error covers that, and each
+ * wedge costs bytes. */
 #define CARRY_REACH 4.0
 
 /* Stamps for `count` neighbours, and one more; all begin anew where numbers end. */
@@ -169,7 +170,8 @@ static void flatten(const simplifier *s, strl_star *star, const uint8_t *order)
     fan->has_axes = find_axes(fan);
     for (unsigned k = 0; k < 3 && fan->has_axes; k++) {
         for (uint32_t i = 0; i < lanes; i++)
-            fan->flat[k][i] = fan->x[0][i] * fan->axis[k][0] + fan->x[1][i] * fan->axis[k][1] + fan->x[2][i] * fan->axis[k][2];
+            fan->flat[k][i] =
+                fan->x[0][i] * fan->axis[k][0] + fan->x[1][i] * fan->axis[k][1] + fan->x[2][i] * fan->axis[k][2];
         repeat(fan->flat[k], n);
     }
 }
@@ -258,7 +260,8 @@ static double squared_reach(const simplifier *s, const strl_star *u_star, uint32
     double most = 0;
     const double *v = s->sites[to].position;
     for (uint32_t i = 0; i < u_star->count; i++) {
-        if (s->corner[u_star->triangle[i]][u_star->corner[i]] != wedge || u_star->next[i] == to || u_star->previous[i] == to)
+        if (s->corner[u_star->triangle[i]][u_star->corner[i]] != wedge || u_star->next[i] == to ||
+            u_star->previous[i] == to)
             continue;
         double next = strl__distance2(s->sites[u_star->next[i]].position, v);
         double previous = strl__distance2(s->sites[u_star->previous[i]].position, v);
@@ -279,7 +282,8 @@ uint32_t strl__wedge_target(const simplifier *s, const strl_star *u_star, uint32
 {
     const site *u = &s->sites[u_star->point], *v = &s->sites[to];
     *fate = WEDGE_EXACT;
-    if (u->only_wedge != NO_INDEX && v->only_wedge != NO_INDEX && u->palette == v->palette && strl__star_uses(s, u_star, to))
+    if (u->only_wedge != NO_INDEX && v->only_wedge != NO_INDEX && u->palette == v->palette &&
+        strl__star_uses(s, u_star, to))
         return v->only_wedge;
     uint32_t best = wedge_beside(s, u_star, to, wedge);
     if (best != NO_INDEX)

@@ -20,8 +20,8 @@ typedef enum strl_found {
 strl_status strl_folder_open(const char *path, strl_folder **folder, strl_error *err);
 void strl_folder_close(strl_folder *folder); /* NULL is legal */
 
-/* A regular file, to read. name: components between single slashes, none of them "." or "..". Links are followed as far as
- * they stay in the folder where the kernel can watch over that (Linux 5.6), else not at all. */
+/* A regular file, to read. name: components between single slashes, none of them "." or "..". Links are followed as far
+ * as they stay in the folder where the kernel can watch over that (Linux 5.6), else not at all. */
 strl_found strl_folder_open_file(strl_folder *folder, const char *name, strl_file **file, strl_error *err);
 
 /* Told of each entry of a folder but "." and "..", in no order; false ends the listing. */

@@ -1,6 +1,6 @@
-/* A scratch folder: made for one run, held by a lock, removed with the files that the run put there, or left for a later
- * run to go on with. A folder that is there already is taken over only where an earlier run of this program left it,
- * which its lock file and the names of its files tell, or where nothing is in it; any other is refused as it is. */
+/* A scratch folder: made for one run, held by a lock, removed with the files that the run put there, or left for a
+ * later run to go on with. A folder that is there already is taken over only where an earlier run of this program left
+ * it, which its lock file and the names of its files tell, or where nothing is in it; any other is refused as it is. */
 #ifndef STRL_PLATFORM_SCRATCH_H
 #define STRL_PLATFORM_SCRATCH_H
 

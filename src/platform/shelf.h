@@ -1,5 +1,5 @@
-/* A folder of small files of one user that several processes share without a lock: a file appears under its name when it is whole,
- * and not before. The time of its last change is the time of its last use. */
+/* A folder of small files of one user that several processes share without a lock: a file appears under its name when
+ * it is whole, and not before. The time of its last change is the time of its last use. */
 #ifndef STRL_PLATFORM_SHELF_H
 #define STRL_PLATFORM_SHELF_H
 
@@ -35,7 +35,7 @@ typedef struct strl_shelf_piece {
  * the bytes are in "name.XXXXXXXX.part", XXXXXXXX being what nothing else is called by, which a kill leaves
  * behind. Not forced to the disk. */
 strl_status strl_shelf_put(const char *path, const char *name, const strl_shelf_piece *pieces, size_t count,
-                            strl_error *err);
+                           strl_error *err);
 /* Now is its last use. Nothing happens where that cannot be noted. */
 void strl_shelf_touch(const char *path, const char *name);
 

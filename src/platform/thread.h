@@ -18,7 +18,8 @@ typedef pthread_once_t strl_once;
 strl_status strl_thread_start(strl_thread **thread, void (*run)(void *context), void *context, strl_error *err);
 void strl_thread_join(strl_thread *thread); /* waits and releases; NULL is legal */
 
-/* Runs `run` in the first call of this `once`, a static of the caller's, whichever thread that is; others wait for it. */
+/* Runs `run` in the first call of this `once`, a static of the caller's, whichever thread that is; others wait for it.
+ */
 void strl_once_run(strl_once *once, void (*run)(void));
 
 void strl_mutex_init(strl_mutex *mutex);
@@ -32,13 +33,13 @@ void strl_condition_wait(strl_condition *condition, strl_mutex *mutex);
 void strl_condition_signal(strl_condition *condition);
 void strl_condition_broadcast(strl_condition *condition);
 
-uint64_t strl_clock_ns(void);     /* monotonic */
+uint64_t strl_clock_ns(void);      /* monotonic */
 uint64_t strl_clock_wall_ns(void); /* since 1970, as the system's clock is set */
-uint64_t strl_clock_cpu_ns(void); /* processor time of this process, all threads */
+uint64_t strl_clock_cpu_ns(void);  /* processor time of this process, all threads */
 void strl_sleep_ns(uint64_t ns);
-unsigned strl_cpu_count(void);              /* processors this process may use, at least 1 */
-/* What this thread has made the system fetch from a disk so far and waited for: blocks of 512 bytes and pages, as the system
- * counts them. It does not grow where a thread never waits for a disk. */
+unsigned strl_cpu_count(void); /* processors this process may use, at least 1 */
+/* What this thread has made the system fetch from a disk so far and waited for: blocks of 512 bytes and pages, as the
+ * system counts them. It does not grow where a thread never waits for a disk. */
 uint64_t strl_thread_disk_waits(void);
 uint64_t strl_process_rss_bytes(void);      /* the operating system's resident set now; 0 where it does not tell */
 uint64_t strl_process_peak_rss_bytes(void); /* the operating system's peak resident set, children included */

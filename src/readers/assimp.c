@@ -46,14 +46,12 @@
 
 /* What assimp 5 lists, less what Stroll reads itself, and xml, which may be anything. */
 static const char *const extensions[] = {
-    "3d",        "3ds",     "3mf",  "ac",    "ac3d", "acc",      "amf",    "ase",
-    "ask",       "assbin",  "b3d",  "blend", "bsp",  "bvh",      "cob",    "csm",
-    "dae",       "dxf",     "enff", "fbx",   "hmp",  "ifc",      "ifczip", "iqm",
-    "irr",       "irrmesh", "lwo",  "lws",   "lxo",  "md2",      "md3",    "md5anim",
-    "md5camera", "md5mesh", "mdc",  "mdl",   "mesh", "mesh.xml", "mot",    "ms3d",
-    "ndo",       "nff",     "off",  "ogex",  "pk3",  "pmx",      "prj",    "q3o",
-    "q3s",       "raw",     "scn",  "sib",   "smd",  "step",     "stp",    "ter",
-    "uc",        "vta",     "x",    "x3d",   "x3db", "xgl",      "zae",    "zgl",
+    "3d",      "3ds", "3mf", "ac",      "ac3d",     "acc",  "amf",  "ase",  "ask", "assbin",  "b3d",
+    "blend",   "bsp", "bvh", "cob",     "csm",      "dae",  "dxf",  "enff", "fbx", "hmp",     "ifc",
+    "ifczip",  "iqm", "irr", "irrmesh", "lwo",      "lws",  "lxo",  "md2",  "md3", "md5anim", "md5camera",
+    "md5mesh", "mdc", "mdl", "mesh",    "mesh.xml", "mot",  "ms3d", "ndo",  "nff", "off",     "ogex",
+    "pk3",     "pmx", "prj", "q3o",     "q3s",      "raw",  "scn",  "sib",  "smd", "step",    "stp",
+    "ter",     "uc",  "vta", "x",       "x3d",      "x3db", "xgl",  "zae",  "zgl",
 };
 
 const char *strl__assimp_extension(const char *path)
@@ -138,8 +136,7 @@ static strl_status start_child(import_run *run, strl_error *err)
     bool found;
     char *program = find_importer(run->child->importer, &found);
     /* A name that begins with a dash must not be taken for an option. */
-    char *path =
-        reader->path[0] == '-' ? strl_path_join(".", reader->path) : strl__strdup(reader->path);
+    char *path = reader->path[0] == '-' ? strl_path_join(".", reader->path) : strl__strdup(reader->path);
     strl_status status = STRL_OK;
     if (!program || !path)
         status = strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", reader->path);
@@ -198,11 +195,10 @@ static strl_status check_start(import_run *run, strl_error *err)
     strl__import_facts facts;
     uint64_t free_bytes;
     if (memcmp(run->start, STRL_IMPORT_MAGIC, STRL_IMPORT_MAGIC_BYTES) != 0)
-        return strl__fail(
-            err, STRL_ERR_FORMAT,
-            "%s: the stream of triangles that was imported from it is broken: expected "
-            "the word " STRL_IMPORT_MAGIC " at byte 0",
-            reader->path);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "%s: the stream of triangles that was imported from it is broken: expected "
+                          "the word " STRL_IMPORT_MAGIC " at byte 0",
+                          reader->path);
     if (!strl__import_facts_parse(run->start, &facts))
         return STRL_OK; /* an error, or what the scan refuses */
     strl_status status = strl_path_free_bytes(reader->scratch_dir, &free_bytes, err);
@@ -210,8 +206,7 @@ static strl_status check_start(import_run *run, strl_error *err)
         status = strl__fail(err, STRL_ERR_DISK_FULL,
                             "%s has %" PRIu64 " bytes free, expected %" PRIu64 " for the %" PRIu64
                             " triangles of %s: name another folder by --scratch",
-                            reader->scratch_dir, free_bytes, facts.stream_most, facts.triangles,
-                            reader->path);
+                            reader->scratch_dir, free_bytes, facts.stream_most, facts.triangles, reader->path);
     run->spool_most = facts.stream_most;
     return status;
 }
@@ -243,8 +238,7 @@ static strl_status listen(import_run *run, strl_error *err)
     strl_status status = STRL_OK;
     while (!status && !ended) {
         size_t got = 0;
-        status =
-            strl_process_read(run->process, STEP_NS, run->buffer, COPY_BYTES, &got, &ended, err);
+        status = strl_process_read(run->process, STEP_NS, run->buffer, COPY_BYTES, &got, &ended, err);
         if (!status)
             status = check_cancel(run, err);
         if (!status && strl_clock_ns() > run->deadline_ns)
@@ -263,8 +257,7 @@ static strl_status fail_end(import_run *run, const strl_process_end *end, strl_e
     const char *path = run->reader->path, *said = strl_process_complaint(run->process);
     if (end->cpu_exhausted)
         return fail_time(run, true, err);
-    if (strstr(said, "bad_alloc") || strstr(said, "annot allocate memory") ||
-        strstr(said, "failed to map segment"))
+    if (strstr(said, "bad_alloc") || strstr(said, "annot allocate memory") || strstr(said, "failed to map segment"))
         return fail_memory(run, said, err);
     if (end->signal == SIGKILL)
         return strl__fail(err, STRL_ERR_MEMORY,
@@ -276,8 +269,7 @@ static strl_status fail_end(import_run *run, const strl_process_end *end, strl_e
                           "%s: assimp, which imports it, was ended by signal %d (%s): the file is "
                           "broken, or nothing it can import; convert it to PLY, OBJ or glTF",
                           path, end->signal, strl_signal_name(end->signal));
-    return strl__fail(err, STRL_ERR_FORMAT,
-                      "%s: the program that imports it ended with status %d%s%s", path,
+    return strl__fail(err, STRL_ERR_FORMAT, "%s: the program that imports it ended with status %d%s%s", path,
                       end->exit_status, *said ? ": " : "", said);
 }
 
@@ -291,8 +283,7 @@ static strl_status judge(import_run *run, strl_error *err)
                           "%s: the program that imports it has closed its output but did not end "
                           "within %u s, and was stopped: convert it to PLY, OBJ or glTF",
                           run->reader->path, END_SECONDS);
-    run->reader->costs =
-        (strl_reader_costs){run->spool_bytes, end.peak_rss_bytes + run->own_rss_bytes};
+    run->reader->costs = (strl_reader_costs){run->spool_bytes, end.peak_rss_bytes + run->own_rss_bytes};
     if (end.signal)
         return fail_end(run, &end, err);
     strl_error told = {0};
@@ -309,14 +300,12 @@ static void set_limits(import_run *run)
 {
     const strl_reader_child *child = run->child;
     uint64_t megabytes = run->reader->opened.bytes >> 20;
-    uint64_t seconds = megabytes < CPU_SECONDS_MOST
-                           ? CPU_SECONDS_LEAST + megabytes * CPU_SECONDS_A_MEGABYTE
-                           : CPU_SECONDS_MOST;
+    uint64_t seconds =
+        megabytes < CPU_SECONDS_MOST ? CPU_SECONDS_LEAST + megabytes * CPU_SECONDS_A_MEGABYTE : CPU_SECONDS_MOST;
     seconds = seconds < CPU_SECONDS_MOST ? seconds : CPU_SECONDS_MOST;
     run->memory_bytes = child->memory_bytes ? child->memory_bytes : CHILD_MEMORY_DEFAULT;
     run->cpu_seconds = child->cpu_seconds ? child->cpu_seconds : seconds;
-    run->deadline_ns =
-        strl_clock_ns() + run->cpu_seconds * SECONDS_A_CPU_SECOND * (uint64_t)NS_PER_S;
+    run->deadline_ns = strl_clock_ns() + run->cpu_seconds * SECONDS_A_CPU_SECOND * (uint64_t)NS_PER_S;
     run->spool_most = sizeof run->start + STRL_IMPORT_TEXT_MOST;
 }
 
@@ -337,8 +326,7 @@ static strl_status assimp_open(strl_reader *reader, strl_error *err)
     strl__import *state = reader->state;
     import_run run = {.reader = reader, .child = &reader->child};
     if (!reader->scratch_dir)
-        return strl__fail(err, STRL_ERR_ARGUMENT,
-                          "%s: its triangles need a scratch folder, and none was given",
+        return strl__fail(err, STRL_ERR_ARGUMENT, "%s: its triangles need a scratch folder, and none was given",
                           reader->path);
     strl_status status = strl_file_create_nameless(reader->scratch_dir, &state->spool, err);
     state->owns_spool = true;

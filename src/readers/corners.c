@@ -9,14 +9,12 @@
 #define CORNERS_MAX ((size_t)1 << SLOT_BITS)
 #define RESIDENT_GOAL 4096u /* corners; stays in the processor's cache */
 #define DIGIT_BITS 11
-#define GAP_BYTES                                                                                  \
-    ((uint64_t)32 << 10) /* reading on is cheaper than a second read up to about here */
+#define GAP_BYTES ((uint64_t)32 << 10) /* reading on is cheaper than a second read up to about here */
 
 static size_t batch_corner_bytes(const strl__batch_desc *desc)
 {
     return sizeof(strl__corner) + sizeof(strl__face) / 3 + 1 + (desc->indexed ? 8u : 0) +
-           (desc->indexed_normals ? 8u : 0) + (desc->indexed_texcoords ? 8u : 0) +
-           (desc->sorted ? 16u : 0);
+           (desc->indexed_normals ? 8u : 0) + (desc->indexed_texcoords ? 8u : 0) + (desc->sorted ? 16u : 0);
 }
 
 strl_status strl__batch_init(strl__batch *batch, const strl__batch_desc *desc, strl_error *err)
@@ -41,8 +39,7 @@ strl_status strl__batch_init(strl__batch *batch, const strl__batch_desc *desc, s
     for (unsigned i = 0; i < 2 && desc->sorted; i++)
         batch->keys[i] = strl__alloc(capacity, sizeof *batch->keys[i]);
     bool whole = batch->faces && batch->corners && (batch->vertex || !desc->indexed) &&
-                 (batch->normal || !desc->indexed_normals) &&
-                 (batch->texcoord || !desc->indexed_texcoords) &&
+                 (batch->normal || !desc->indexed_normals) && (batch->texcoord || !desc->indexed_texcoords) &&
                  ((batch->keys[0] && batch->keys[1]) || !desc->sorted);
     if (whole)
         return STRL_OK;
@@ -71,13 +68,11 @@ void strl__batch_reset(strl__batch *batch)
 }
 
 /* Looks up all corners from a window that holds every record they name. */
-static void decode_in_order(const strl__batch *batch, const strl__table *table,
-                            const uint64_t *indices)
+static void decode_in_order(const strl__batch *batch, const strl__table *table, const uint64_t *indices)
 {
     for (size_t i = 0; i < batch->corner_count; i++)
         if (indices[i] != STRL__NO_INDEX)
-            strl__layout_decode(&table->layout, strl__table_record(table, indices[i]),
-                                &batch->corners[i]);
+            strl__layout_decode(&table->layout, strl__table_record(table, indices[i]), &batch->corners[i]);
 }
 
 /* Sorts keys by their record numbers, all below 2^range_bits, digit by digit. Returns the sorted
@@ -101,8 +96,8 @@ static uint64_t *sort_keys(uint64_t *keys, uint64_t *scratch, size_t count, unsi
 }
 
 /* Reads the records that sorted keys name, run by run, and looks the corners up. */
-static strl_status sweep(const strl__batch *batch, strl__table *table, const uint64_t *keys,
-                         size_t count, uint64_t lowest, strl_error *err)
+static strl_status sweep(const strl__batch *batch, strl__table *table, const uint64_t *keys, size_t count,
+                         uint64_t lowest, strl_error *err)
 {
     const uint64_t slot_mask = ((uint64_t)1 << SLOT_BITS) - 1;
     const uint64_t fits = strl__table_window_records(table);
@@ -120,20 +115,18 @@ static strl_status sweep(const strl__batch *batch, strl__table *table, const uin
         if (status)
             return status;
         for (; begin < end; begin++)
-            strl__layout_decode(&table->layout,
-                                strl__table_record(table, lowest + (keys[begin] >> SLOT_BITS)),
+            strl__layout_decode(&table->layout, strl__table_record(table, lowest + (keys[begin] >> SLOT_BITS)),
                                 &batch->corners[keys[begin] & slot_mask]);
     }
     return STRL_OK;
 }
 
-static strl_status resolve_sorted(strl__batch *batch, strl__table *table, const uint64_t *indices,
-                                  uint64_t lowest, uint64_t highest, strl_error *err)
+static strl_status resolve_sorted(strl__batch *batch, strl__table *table, const uint64_t *indices, uint64_t lowest,
+                                  uint64_t highest, strl_error *err)
 {
     unsigned range_bits = highest > lowest ? 64 - (unsigned)__builtin_clzll(highest - lowest) : 0;
     if (!batch->keys[0] || range_bits > 64 - SLOT_BITS)
-        return strl__fail(err, STRL_ERR_LIMIT,
-                          "vertices %llu to %llu are too far apart to be resolved together",
+        return strl__fail(err, STRL_ERR_LIMIT, "vertices %llu to %llu are too far apart to be resolved together",
                           (unsigned long long)lowest, (unsigned long long)highest);
     size_t count = 0;
     for (size_t i = 0; i < batch->corner_count; i++)
@@ -143,8 +136,7 @@ static strl_status resolve_sorted(strl__batch *batch, strl__table *table, const 
     return sweep(batch, table, sorted, count, lowest, err);
 }
 
-static strl_status resolve(strl__batch *batch, strl__table *table, const uint64_t *indices,
-                           strl_error *err)
+static strl_status resolve(strl__batch *batch, strl__table *table, const uint64_t *indices, strl_error *err)
 {
     uint64_t lowest = UINT64_MAX, highest = 0;
     for (size_t i = 0; i < batch->corner_count; i++)
@@ -162,8 +154,7 @@ static strl_status resolve(strl__batch *batch, strl__table *table, const uint64_
     return status;
 }
 
-strl_status strl__batch_resolve(strl__batch *batch, strl__table *vertices, strl__table *normals,
-                                strl_error *err)
+strl_status strl__batch_resolve(strl__batch *batch, strl__table *vertices, strl__table *normals, strl_error *err)
 {
     if (!vertices->layout.has_normal || !vertices->layout.has_colour)
         for (size_t i = 0; i < batch->corner_count; i++) {
@@ -176,8 +167,7 @@ strl_status strl__batch_resolve(strl__batch *batch, strl__table *vertices, strl_
     return status;
 }
 
-strl_status strl__batch_resolve_texcoords(strl__batch *batch, strl__table *texcoords,
-                                          strl_error *err)
+strl_status strl__batch_resolve_texcoords(strl__batch *batch, strl__table *texcoords, strl_error *err)
 {
     return resolve(batch, texcoords, batch->texcoord, err);
 }
@@ -199,8 +189,8 @@ static bool is_texcoord(const float texcoord[2])
     return texcoord[0] > -1e6f && texcoord[0] < 1e6f && texcoord[1] > -1e6f && texcoord[1] < 1e6f;
 }
 
-static void make_triangle(const strl__batch *batch, const strl__face *face,
-                          const strl__corner *const corners[3], strl_triangle *triangle)
+static void make_triangle(const strl__batch *batch, const strl__face *face, const strl__corner *const corners[3],
+                          strl_triangle *triangle)
 {
     for (unsigned i = 0; i < 3; i++) {
         memcpy(triangle->position[i], corners[i]->position, sizeof triangle->position[i]);
@@ -216,8 +206,7 @@ static void make_triangle(const strl__batch *batch, const strl__face *face,
     }
     triangle->part = face->part;
     triangle->material = face->material;
-    triangle->flags =
-        batch->has_corner_colour || batch->has_face_colour ? STRL_TRIANGLE_HAS_COLOUR : 0;
+    triangle->flags = batch->has_corner_colour || batch->has_face_colour ? STRL_TRIANGLE_HAS_COLOUR : 0;
     if (has_texcoord)
         triangle->flags |= STRL_TRIANGLE_HAS_TEXCOORD;
     if (has_normal(corners[0]) && has_normal(corners[1]) && has_normal(corners[2]))
@@ -227,43 +216,38 @@ static void make_triangle(const strl__batch *batch, const strl__face *face,
 }
 
 /* Prepares the next face. Returns the number of its triangles, 0 where it is dropped. */
-static uint32_t begin_face(strl__batch *batch, const strl__face *face, strl_reader_drops *drops,
-                           bool *no_memory)
+static uint32_t begin_face(strl__batch *batch, const strl__face *face, strl_reader_drops *drops, bool *no_memory)
 {
     const strl__corner *corners = batch->corners + batch->next_corner;
     for (uint32_t i = 0; i < face->corner_count; i++)
         if (!is_finite_corner(&corners[i])) {
-            drops->nonfinite +=
-                face->corner_count - 2; /* what cannot be triangulated is lost as a whole */
+            drops->nonfinite += face->corner_count - 2; /* what cannot be triangulated is lost as a whole */
             return 0;
         }
-    if (face->corner_count > 3 && !strl__polygon_triangulate(&batch->polygon, corners->position,
-                                                             sizeof *corners, face->corner_count)) {
+    if (face->corner_count > 3 &&
+        !strl__polygon_triangulate(&batch->polygon, corners->position, sizeof *corners, face->corner_count)) {
         *no_memory = true;
         return 0;
     }
     return face->corner_count - 2;
 }
 
-strl_status strl__batch_emit(strl__batch *batch, strl_triangle *triangles, size_t capacity,
-                             size_t *count, strl_reader_drops *drops, strl_error *err)
+strl_status strl__batch_emit(strl__batch *batch, strl_triangle *triangles, size_t capacity, size_t *count,
+                             strl_reader_drops *drops, strl_error *err)
 {
     static const uint32_t single[3] = {0, 1, 2};
     *count = 0;
     while (batch->next_face < batch->face_count && *count < capacity) {
         const strl__face *face = &batch->faces[batch->next_face];
         bool no_memory = false;
-        uint32_t total = batch->next_triangle ? face->corner_count - 2
-                                              : begin_face(batch, face, drops, &no_memory);
+        uint32_t total = batch->next_triangle ? face->corner_count - 2 : begin_face(batch, face, drops, &no_memory);
         if (no_memory)
             return strl__fail(err, STRL_ERR_MEMORY, "no memory to triangulate a face of %u corners",
                               face->corner_count);
         const strl__corner *corners = batch->corners + batch->next_corner;
         while (batch->next_triangle < total && *count < capacity) {
-            const uint32_t *index =
-                total == 1 ? single : batch->polygon.triangles + 3 * (size_t)batch->next_triangle;
-            const strl__corner *const chosen[3] = {&corners[index[0]], &corners[index[1]],
-                                                   &corners[index[2]]};
+            const uint32_t *index = total == 1 ? single : batch->polygon.triangles + 3 * (size_t)batch->next_triangle;
+            const strl__corner *const chosen[3] = {&corners[index[0]], &corners[index[1]], &corners[index[2]]};
             make_triangle(batch, face, chosen, &triangles[(*count)++]);
             batch->next_triangle++;
         }

@@ -22,25 +22,25 @@ typedef struct strl__face {
 } strl__face;
 
 typedef struct strl__batch_desc {
-    bool indexed;         /* corners are indices into a table of vertices */
-    bool indexed_normals; /* and into a table of normals */
+    bool indexed;           /* corners are indices into a table of vertices */
+    bool indexed_normals;   /* and into a table of normals */
     bool indexed_texcoords; /* and into a table of texture coordinates */
-    bool sorted;          /* a table does not fit its window */
-    size_t bytes; /* budget; enough for one polygon of the largest size is taken in any case */
+    bool sorted;            /* a table does not fit its window */
+    size_t bytes;           /* budget; enough for one polygon of the largest size is taken in any case */
 } strl__batch_desc;
 
 typedef struct strl__batch {
     strl__face *faces; /* owned, as are the arrays below */
     strl__corner *corners;
-    uint64_t *vertex;  /* index of each corner; NULL unless indexed */
-    uint64_t *normal;  /* or STRL__NO_INDEX; NULL unless indexed_normals */
+    uint64_t *vertex;   /* index of each corner; NULL unless indexed */
+    uint64_t *normal;   /* or STRL__NO_INDEX; NULL unless indexed_normals */
     uint64_t *texcoord; /* or STRL__NO_INDEX; NULL unless indexed_texcoords */
-    uint64_t *keys[2]; /* scratch of the sort; NULL unless sorted */
+    uint64_t *keys[2];  /* scratch of the sort; NULL unless sorted */
     size_t face_count, face_capacity;
     size_t corner_count, corner_capacity;
     size_t corner_goal; /* a format stops filling here; a whole polygon still fits then */
     bool has_corner_colour, has_face_colour;
-    bool has_texcoord; /* of a corner without one, the first number is none */
+    bool has_texcoord;             /* of a corner without one, the first number is none */
     size_t next_face, next_corner; /* what emit takes next */
     uint32_t next_triangle;        /* of the polygon begun, if > 0 */
     strl__polygon polygon;
@@ -64,13 +64,11 @@ static inline void strl__batch_add(strl__batch *batch, const strl__face *face)
 }
 
 /* Indices must be below the counts of the tables. normals may be NULL. */
-strl_status strl__batch_resolve(strl__batch *batch, strl__table *vertices, strl__table *normals,
-                                strl_error *err);
+strl_status strl__batch_resolve(strl__batch *batch, strl__table *vertices, strl__table *normals, strl_error *err);
 /* The texture coordinates alone; before or after the others. */
-strl_status strl__batch_resolve_texcoords(strl__batch *batch, strl__table *texcoords,
-                                          strl_error *err);
+strl_status strl__batch_resolve_texcoords(strl__batch *batch, strl__table *texcoords, strl_error *err);
 /* Up to capacity triangles; *count 0 = the batch is empty. Counts what has to be dropped. */
-strl_status strl__batch_emit(strl__batch *batch, strl_triangle *triangles, size_t capacity,
-                             size_t *count, strl_reader_drops *drops, strl_error *err);
+strl_status strl__batch_emit(strl__batch *batch, strl_triangle *triangles, size_t capacity, size_t *count,
+                             strl_reader_drops *drops, strl_error *err);
 
 #endif

@@ -43,8 +43,7 @@ typedef struct chunk {
     uint32_t type;
 } chunk;
 
-static strl_status read_chunk(strl_reader *reader, uint64_t at, uint64_t end, chunk *found,
-                              strl_error *err)
+static strl_status read_chunk(strl_reader *reader, uint64_t at, uint64_t end, chunk *found, strl_error *err)
 {
     uint8_t header[CHUNK_HEADER_BYTES];
     if (end - at < sizeof header)
@@ -91,32 +90,28 @@ static strl_status read_container(strl__gltf *gltf, chunk *json, strl_error *err
     strl_reader *reader = gltf->reader;
     uint8_t header[HEADER_BYTES];
     if (reader->opened.bytes < sizeof header)
-        return strl__fail(err, STRL_ERR_FORMAT,
-                          "%s: expected the 12 bytes of a GLB header, found %" PRIu64, reader->path,
-                          reader->opened.bytes);
+        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected the 12 bytes of a GLB header, found %" PRIu64,
+                          reader->path, reader->opened.bytes);
     strl_status status = strl_file_read(reader->file, 0, header, sizeof header, err);
     if (status)
         return status;
     const uint64_t magic = strl__load_le(header, 4), version = strl__load_le(header + 4, 4);
     const uint64_t end = strl__load_le(header + 8, 4);
     if (magic != GLB_MAGIC)
-        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected a GLB's first bytes, 'glTF'",
-                          reader->path);
+        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected a GLB's first bytes, 'glTF'", reader->path);
     if (version != 2)
         return strl__fail(err, STRL_ERR_UNSUPPORTED,
                           "%s: expected a GLB of version 2, found %" PRIu64 ": convert it to glTF 2.0", reader->path,
                           version);
     if (end > reader->opened.bytes || end < sizeof header)
-        return strl__fail(err, STRL_ERR_FORMAT,
-                          "%s: announces %" PRIu64 " bytes, found a file of %" PRIu64, reader->path,
-                          end, reader->opened.bytes);
+        return strl__fail(err, STRL_ERR_FORMAT, "%s: announces %" PRIu64 " bytes, found a file of %" PRIu64,
+                          reader->path, end, reader->opened.bytes);
     status = read_chunk(reader, sizeof header, end, json, err);
     if (status)
         return status;
     if (json->type != CHUNK_JSON)
-        return strl__fail(err, STRL_ERR_FORMAT,
-                          "%s, byte 12: expected a chunk of JSON, found type 0x%08x", reader->path,
-                          json->type);
+        return strl__fail(err, STRL_ERR_FORMAT, "%s, byte 12: expected a chunk of JSON, found type 0x%08x",
+                          reader->path, json->type);
     return read_later_chunks(gltf, json->offset + json->bytes, end, err);
 }
 
@@ -217,13 +212,11 @@ static strl_status gltf_prepare(strl_reader *reader, strl_error *err)
     uint64_t most = 0;
     for (size_t i = 0; i < gltf->primitive_count; i++) {
         const strl__gltf_primitive *primitive = &gltf->primitives[i];
-        if (primitive->position < gltf->accessor_count &&
-            gltf->accessors[primitive->position].count > most)
+        if (primitive->position < gltf->accessor_count && gltf->accessors[primitive->position].count > most)
             most = gltf->accessors[primitive->position].count;
     }
     const strl__batch_desc desc = {.indexed = true,
-                                   .sorted =
-                                       most > strl__gltf_table_bytes(reader) / sizeof(strl__corner),
+                                   .sorted = most > strl__gltf_table_bytes(reader) / sizeof(strl__corner),
                                    .bytes = (size_t)(reader->memory_bytes / 8)};
     strl__gltf_empty_table(reader); /* corners that are known keep their normals and colours */
     return strl__batch_init(&reader->batch, &desc, err);
@@ -269,8 +262,7 @@ static const strl__gltf_primitive *find_in_mesh(strl__gltf *gltf, uint64_t insta
     strl__gltf_pass *pass = &gltf->pass;
     const strl__gltf_mesh *mesh = &gltf->meshes[pass->mesh];
     for (; pass->primitive < mesh->primitive_count; pass->primitive++) {
-        const strl__gltf_primitive *primitive =
-            &gltf->primitives[mesh->first_primitive + pass->primitive];
+        const strl__gltf_primitive *primitive = &gltf->primitives[mesh->first_primitive + pass->primitive];
         if (pass->instance == 0)
             count_drops(gltf, primitive, instances);
         if (pass->instance < instances && has_triangles(gltf, primitive))
@@ -316,8 +308,7 @@ static strl_status gltf_fill(strl_reader *reader, strl_error *err)
     }
     const strl__gltf_mesh *mesh = &gltf->meshes[pass->mesh];
     if (!status)
-        status = strl__gltf_add_triangles(
-            gltf, &gltf->primitives[mesh->first_primitive + pass->primitive], err);
+        status = strl__gltf_add_triangles(gltf, &gltf->primitives[mesh->first_primitive + pass->primitive], err);
     if (!status && pass->triangle == pass->triangle_count) {
         pass->has_placement = false;
         pass->instance++;
@@ -328,8 +319,8 @@ static strl_status gltf_fill(strl_reader *reader, strl_error *err)
 static uint64_t gltf_bytes_done(const strl_reader *reader)
 {
     const strl__gltf *gltf = strl__gltf_of(reader);
-    const uint64_t triangles = reader->piece ? gltf->meshes[gltf->pieces[reader->piece - 1]].triangles
-                                             : gltf->rest_triangles;
+    const uint64_t triangles =
+        reader->piece ? gltf->meshes[gltf->pieces[reader->piece - 1]].triangles : gltf->rest_triangles;
     if (reader->ended || triangles == 0)
         return reader->all_bytes;
     double share = (double)gltf->pass.done / (double)triangles;

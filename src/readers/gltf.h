@@ -96,12 +96,12 @@ typedef struct strl__gltf_draco_use {
 } strl__gltf_draco_use;
 
 typedef struct strl__gltf_primitive {
-    uint8_t mode;   /* as in the file: 0 points, 1..3 lines, 4 triangles, 5 strip, 6 fan */
-    bool has_range; /* lowest and highest are known */
-    uint32_t indices, material;        /* or STRL__NO_ITEM, as all below */
+    uint8_t mode;               /* as in the file: 0 points, 1..3 lines, 4 triangles, 5 strip, 6 fan */
+    bool has_range;             /* lowest and highest are known */
+    uint32_t indices, material; /* or STRL__NO_ITEM, as all below */
     uint32_t position, normal, colour, texcoord[STRL__GLTF_SETS]; /* accessors */
-    strl__gltf_draco_use *draco;       /* in the arena; NULL: not compressed */
-    uint32_t lowest, highest;          /* of its indices; beyond its vertices perhaps */
+    strl__gltf_draco_use *draco;                                  /* in the arena; NULL: not compressed */
+    uint32_t lowest, highest;                                     /* of its indices; beyond its vertices perhaps */
 } strl__gltf_primitive;
 
 typedef struct strl__gltf_mesh {
@@ -109,9 +109,9 @@ typedef struct strl__gltf_mesh {
     uint32_t first_primitive, primitive_count;
     bool is_checked;
     uint64_t triangles, vertices; /* once checked */
-    uint64_t uses;  /* by nodes that are drawn and their instances */
-    uint32_t piece; /* 0: it is read with all others, each copy for itself */
-    uint32_t part;  /* among the reader's, once it has one: of a piece */
+    uint64_t uses;                /* by nodes that are drawn and their instances */
+    uint32_t piece;               /* 0: it is read with all others, each copy for itself */
+    uint32_t part;                /* among the reader's, once it has one: of a piece */
 } strl__gltf_mesh;
 
 typedef struct strl__gltf_instances {
@@ -137,16 +137,16 @@ typedef struct strl__gltf_node {
 } strl__gltf_node;
 
 typedef struct strl__gltf_material {
-    char *name;      /* in the arena; may be NULL */
-    uint32_t rgba;   /* sRGB-encoded; what the reader tells of it */
-    double alpha;    /* factor, linear */
-    double cutoff;   /* of a mask, else negative */
-    bool is_opaque;  /* alpha counts for nothing */
-    uint32_t listed; /* among the reader's, once it is */
-    uint32_t map;    /* a texture of the file's, or STRL__NO_ITEM */
-    uint32_t set;    /* of texture coordinates */
+    char *name;          /* in the arena; may be NULL */
+    uint32_t rgba;       /* sRGB-encoded; what the reader tells of it */
+    double alpha;        /* factor, linear */
+    double cutoff;       /* of a mask, else negative */
+    bool is_opaque;      /* alpha counts for nothing */
+    uint32_t listed;     /* among the reader's, once it is */
+    uint32_t map;        /* a texture of the file's, or STRL__NO_ITEM */
+    uint32_t set;        /* of texture coordinates */
     double transform[6]; /* of them: rows of u and v */
-    uint32_t texture; /* among the reader's, or STRL__NO_TEXTURE */
+    uint32_t texture;    /* among the reader's, or STRL__NO_TEXTURE */
 } strl__gltf_material;
 
 typedef struct strl__gltf_map {
@@ -189,7 +189,7 @@ typedef struct strl__gltf_pass {
     uint64_t vertex_count;
     uint64_t first_loaded, loaded_count; /* vertices that are in the reader's table, where there are indices */
     bool is_scattered;                   /* none are: each corner is looked up by itself */
-    uint64_t done; /* triangles, of all placements so far */
+    uint64_t done;                       /* triangles, of all placements so far */
     uint32_t part, material;
     strl__gltf_matrix placement;
     double normal_matrix[9];
@@ -200,9 +200,9 @@ typedef struct strl__gltf_pass {
 typedef struct strl__gltf_paint {
     const strl__image *image; /* borrowed for the placement; NULL: none that can be used */
     uint32_t texture, draco_id;
-    uint32_t texcoord; /* an accessor, or STRL__NO_ITEM: there is no image */
-    uint32_t measured; /* the primitive to which what follows belongs, or STRL__NO_ITEM */
-    uint64_t first, count; /* vertices that were loaded when it was measured */
+    uint32_t texcoord;           /* an accessor, or STRL__NO_ITEM: there is no image */
+    uint32_t measured;           /* the primitive to which what follows belongs, or STRL__NO_ITEM */
+    uint64_t first, count;       /* vertices that were loaded when it was measured */
     strl__footprint *footprints; /* owned; of these; NULL: all have the same */
     double footprint;
 } strl__gltf_paint;
@@ -214,8 +214,7 @@ typedef struct strl__gltf_paint {
 typedef struct strl__gltf_window {
     const strl__gltf_instances *of; /* NULL: none */
     uint64_t first, count;
-    double translation[STRL__GLTF_INSTANCES][3], rotation[STRL__GLTF_INSTANCES][4],
-        scale[STRL__GLTF_INSTANCES][3];
+    double translation[STRL__GLTF_INSTANCES][3], rotation[STRL__GLTF_INSTANCES][4], scale[STRL__GLTF_INSTANCES][3];
 } strl__gltf_window;
 
 typedef struct strl__gltf {
@@ -262,10 +261,10 @@ typedef struct strl__gltf {
     uint32_t last_picture;        /* while they are counted */
     uint32_t *pieces;             /* owned; the mesh of piece i + 1 */
     strl__gltf_window instances;
-    strl__gltf_matrix *world;     /* owned; of node's ancestors and itself, by depth */
+    strl__gltf_matrix *world; /* owned; of node's ancestors and itself, by depth */
     strl__gltf_pass pass;
     strl__gltf_paint paint;
-    uint8_t *window;        /* owned */
+    uint8_t *window; /* owned */
     double values[STRL__GLTF_CHUNK * 4];
     double tints[STRL__GLTF_CHUNK * 4]; /* linear R, G, B, and A, of vertices under an image */
     strl__corner corners[STRL__GLTF_CHUNK];
@@ -291,8 +290,8 @@ static inline size_t strl__gltf_table_bytes(const strl_reader *reader)
 
 /* ---- gltf_tables.c: memory for what the JSON describes */
 /* Room for one more item in a table; counts against the tables' share. */
-strl_status strl__gltf_add(strl__gltf *gltf, void *items_pointer, size_t *count, size_t *capacity,
-                           size_t item_bytes, strl_error *err);
+strl_status strl__gltf_add(strl__gltf *gltf, void *items_pointer, size_t *count, size_t *capacity, size_t item_bytes,
+                           strl_error *err);
 void *strl__gltf_keep(strl__gltf *gltf, size_t bytes, strl_error *err); /* zeroed, in the arena */
 /* Once all is counted that did not fit: how much memory would do. */
 strl_status strl__gltf_refuse_tables(const strl__gltf *gltf, strl_error *err);
@@ -314,22 +313,21 @@ void strl__gltf_rewind(strl__gltf *gltf);
 const strl__gltf_matrix *strl__gltf_world(const strl__gltf *gltf); /* of pass.node */
 strl__gltf_matrix strl__gltf_multiply(const strl__gltf_matrix *a, const strl__gltf_matrix *b);
 /* From translation, rotation (a quaternion of any length, x y z w) and scale. */
-strl__gltf_matrix strl__gltf_compose(const double translation[3], const double rotation[4],
-                                     const double scale[3]);
+strl__gltf_matrix strl__gltf_compose(const double translation[3], const double rotation[4], const double scale[3]);
 /* Sets normal_matrix and flips from placement. */
 void strl__gltf_derive(strl__gltf_pass *pass);
 /* A name of its own for the part of a node. */
 strl_status strl__gltf_name_part(strl__gltf *gltf, uint32_t node, uint32_t *part, strl_error *err);
 strl_status strl__gltf_name_piece(strl__gltf *gltf, uint32_t mesh, uint32_t *part, strl_error *err);
-strl_status strl__gltf_list_material(strl__gltf *gltf, uint32_t material, uint32_t *listed,
-                                     strl_error *err);
+strl_status strl__gltf_list_material(strl__gltf *gltf, uint32_t material, uint32_t *listed, strl_error *err);
 
 /* ---- gltf_pieces.c: meshes that are used again and again */
 /* Chooses them; after checking. */
 strl_status strl__gltf_find_pieces(strl__gltf *gltf, strl_error *err);
 void strl__gltf_piece_get(const strl_reader *reader, uint32_t piece, strl_reader_piece *facts);
 strl_status strl__gltf_start_placements(strl_reader *reader, strl_error *err);
-strl_status strl__gltf_next_placement(strl_reader *reader, strl_reader_placement *placement, bool *found, strl_error *err);
+strl_status strl__gltf_next_placement(strl_reader *reader, strl_reader_placement *placement, bool *found,
+                                      strl_error *err);
 uint64_t strl__gltf_instance_count(const strl__gltf_node *node);
 /* Of pass.node, an instance of it where it has any. */
 strl_status strl__gltf_place_node(strl__gltf *gltf, strl__gltf_matrix *placement, strl_error *err);
@@ -346,24 +344,21 @@ strl_status strl__gltf_check_unchanged(const strl__gltf *gltf, strl_error *err);
 void strl__gltf_rest_buffers(strl__gltf *gltf); /* gives back memory, by scratch or by decoding again later */
 void strl__gltf_close_buffers(strl__gltf *gltf);
 /* Size bytes of a view; inside it, which the caller has checked. */
-strl_status strl__gltf_read_view(strl__gltf *gltf, uint32_t view, uint64_t offset, void *data,
-                                 size_t size, strl_error *err);
-strl_status strl__gltf_read_buffer(strl__gltf *gltf, uint32_t buffer, uint64_t offset, void *data,
-                                   size_t size, strl_error *err);
+strl_status strl__gltf_read_view(strl__gltf *gltf, uint32_t view, uint64_t offset, void *data, size_t size,
+                                 strl_error *err);
+strl_status strl__gltf_read_buffer(strl__gltf *gltf, uint32_t buffer, uint64_t offset, void *data, size_t size,
+                                   strl_error *err);
 
 /* Where an image's uri leads: its bytes become known by opening. */
-strl_status strl__gltf_open_loose(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32_t image,
-                                  strl_error *err);
+strl_status strl__gltf_open_loose(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32_t image, strl_error *err);
 void strl__gltf_close_buffer(strl__gltf *gltf, strl__gltf_buffer *buffer);
 
 /* ---- gltf_meshopt.c */
 strl_status strl__gltf_check_meshopt(strl__gltf *gltf, uint32_t view, strl_error *err);
 /* The decompressed bytes of a view; valid until the next call. */
-strl_status strl__gltf_decode_view(strl__gltf *gltf, uint32_t view, const uint8_t **bytes,
-                                   strl_error *err);
+strl_status strl__gltf_decode_view(strl__gltf *gltf, uint32_t view, const uint8_t **bytes, strl_error *err);
 /* Makes room for so many decompressed bytes, or fails. */
-strl_status strl__gltf_make_room(strl__gltf *gltf, uint64_t bytes, const char *what,
-                                 strl_error *err);
+strl_status strl__gltf_make_room(strl__gltf *gltf, uint64_t bytes, const char *what, strl_error *err);
 /* Gives up all decompressed views, and tells how many bytes a Draco mesh may take. */
 uint64_t strl__gltf_room(strl__gltf *gltf);
 /* Into scratch, which holds it until the reader is closed; false where that has no place. */
@@ -377,12 +372,12 @@ strl_status strl__gltf_check_view(strl__gltf *gltf, uint32_t view, strl_error *e
 strl_status strl__gltf_check_accessor(strl__gltf *gltf, uint32_t accessor, strl_error *err);
 /* An integer as the part of 0..1 or -1..1 that it stands for. */
 double strl__gltf_denormalize(strl__scalar type, double value);
-/* Elements of a checked accessor, components after components; first + count <= its count. normalized: its integers are parts
- * of 0..1 or -1..1; some uses have them so whatever the accessor says. */
-strl_status strl__gltf_read_numbers(strl__gltf *gltf, uint32_t accessor, bool normalized, uint64_t first,
-                                    size_t count, double *numbers, strl_error *err);
-strl_status strl__gltf_read_indices(strl__gltf *gltf, uint32_t accessor, uint64_t first,
-                                    size_t count, uint32_t *indices, strl_error *err);
+/* Elements of a checked accessor, components after components; first + count <= its count. normalized: its integers are
+ * parts of 0..1 or -1..1; some uses have them so whatever the accessor says. */
+strl_status strl__gltf_read_numbers(strl__gltf *gltf, uint32_t accessor, bool normalized, uint64_t first, size_t count,
+                                    double *numbers, strl_error *err);
+strl_status strl__gltf_read_indices(strl__gltf *gltf, uint32_t accessor, uint64_t first, size_t count,
+                                    uint32_t *indices, strl_error *err);
 
 /* ---- gltf_check.c: what the drawn meshes use; sets triangles and vertices */
 strl_status strl__gltf_check_scene(strl__gltf *gltf, strl_error *err);
@@ -394,22 +389,19 @@ uint64_t strl__gltf_triangle_count(unsigned mode, uint64_t elements);
 /* Which of its vertices the placement that begins has to load: those from its lowest to its highest
  * index, unless that is far more than it has corners. So the work is in proportion to triangles,
  * whatever the accessor counts: many exporters give all primitives the vertices of the model. */
-strl_status strl__gltf_find_range(strl__gltf *gltf, strl__gltf_primitive *primitive,
-                                  uint64_t elements, strl_error *err);
+strl_status strl__gltf_find_range(strl__gltf *gltf, strl__gltf_primitive *primitive, uint64_t elements,
+                                  strl_error *err);
 
 /* ---- gltf_primitive.c: triangles */
 /* Indices of the primitive's vertices, of a Draco mesh from `first`, a multiple of 3, as many. */
-strl_status strl__gltf_read_elements(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                     uint64_t first, size_t count, uint32_t *elements,
-                                     strl_error *err);
+strl_status strl__gltf_read_elements(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t first,
+                                     size_t count, uint32_t *elements, strl_error *err);
 /* The reader's table of vertices, with its layout but no vertex. */
 void strl__gltf_empty_table(strl_reader *reader);
 /* Begins the placement that pass stands at. */
-strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                       strl_error *err);
+strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primitive *primitive, strl_error *err);
 /* Adds its triangles to the batch until that is full or there are no more. */
-strl_status strl__gltf_add_triangles(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                     strl_error *err);
+strl_status strl__gltf_add_triangles(strl__gltf *gltf, const strl__gltf_primitive *primitive, strl_error *err);
 
 unsigned strl__gltf_mode_of(const strl__gltf_primitive *primitive); /* as its elements stand */
 /* Of a vertex attribute into gltf->values, count <= STRL__GLTF_CHUNK. */
@@ -429,9 +421,8 @@ void strl__gltf_parse_map_use(const char *path, strl__gltf_material *material, c
 /* The materials' textures into the reader's; after parsing. */
 strl_status strl__gltf_link_maps(strl__gltf *gltf, strl_error *err);
 /* For the reader's textures; context: the strl__gltf. */
-strl_status strl__gltf_open_picture(void *context, const strl__picture *picture,
-                                    const char *ending, strl__picture_place *found,
-                                    strl_error *err);
+strl_status strl__gltf_open_picture(void *context, const strl__picture *picture, const char *ending,
+                                    strl__picture_place *found, strl_error *err);
 /* The accessor of the coordinates at which a primitive shows its material's image; STRL__NO_ITEM:
  * none. */
 uint32_t strl__gltf_texcoord(const strl__gltf *gltf, const strl__gltf_primitive *primitive);
@@ -439,13 +430,11 @@ uint32_t strl__gltf_texcoord(const strl__gltf *gltf, const strl__gltf_primitive 
 /* ---- gltf_paint.c: vertices under an image */
 /* Sets paint for a placement that is about to be read: its image, and what each vertex stands for
  * of it. */
-strl_status strl__gltf_begin_paint(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                   strl_error *err);
+strl_status strl__gltf_begin_paint(strl__gltf *gltf, const strl__gltf_primitive *primitive, strl_error *err);
 void strl__gltf_end_paint(strl__gltf *gltf); /* gives back what it holds */
 /* Texture coordinates and, where there is an image, it times gltf->tints, for vertices first.. into
  * corners. */
-strl_status strl__gltf_paint_corners(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                     uint64_t first, size_t count, strl__corner *corners,
-                                     strl_error *err);
+strl_status strl__gltf_paint_corners(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t first,
+                                     size_t count, strl__corner *corners, strl_error *err);
 
 #endif

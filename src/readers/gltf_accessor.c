@@ -35,13 +35,11 @@ strl_status strl__gltf_check_view(strl__gltf *gltf, uint32_t index, strl_error *
         status = strl__gltf_check_meshopt(gltf, index, err);
     } else if (view->buffer >= gltf->buffer_count) {
         status = strl__gltf_fail_index(gltf, where, "buffers", gltf->buffer_count, view->buffer, err);
-    } else if (__builtin_add_overflow(view->offset, view->bytes, &end) ||
-               end > gltf->buffers[view->buffer].bytes) {
+    } else if (__builtin_add_overflow(view->offset, view->bytes, &end) || end > gltf->buffers[view->buffer].bytes) {
         status = strl__fail(err, STRL_ERR_FORMAT,
-                            "%s, bufferViews[%u]: its %" PRIu64 " bytes at %" PRIu64
-                            " end after the %" PRIu64 " of buffers[%u]",
-                            path, index, view->bytes, view->offset,
-                            gltf->buffers[view->buffer].bytes, view->buffer);
+                            "%s, bufferViews[%u]: its %" PRIu64 " bytes at %" PRIu64 " end after the %" PRIu64
+                            " of buffers[%u]",
+                            path, index, view->bytes, view->offset, gltf->buffers[view->buffer].bytes, view->buffer);
     } else {
         status = strl__gltf_open_buffer(gltf, view->buffer, err);
     }
@@ -49,8 +47,8 @@ strl_status strl__gltf_check_view(strl__gltf *gltf, uint32_t index, strl_error *
     return status;
 }
 
-static strl_status check_column(strl__gltf *gltf, uint32_t accessor, const char *what,
-                                const strl__gltf_column *column, uint64_t count, strl_error *err)
+static strl_status check_column(strl__gltf *gltf, uint32_t accessor, const char *what, const strl__gltf_column *column,
+                                uint64_t count, strl_error *err)
 {
     if (column->view == STRL__NO_ITEM || count == 0)
         return STRL_OK;
@@ -59,21 +57,18 @@ static strl_status check_column(strl__gltf *gltf, uint32_t accessor, const char 
         return status;
     const uint64_t stride = stride_of(gltf, column), bytes = gltf->views[column->view].bytes;
     uint64_t end; /* count is below 2^32 and stride small: only the offset can overflow */
-    if (!__builtin_add_overflow(column->offset, (count - 1) * stride + element_bytes(column),
-                                &end) &&
-        end <= bytes)
+    if (!__builtin_add_overflow(column->offset, (count - 1) * stride + element_bytes(column), &end) && end <= bytes)
         return STRL_OK;
     return strl__fail(err, STRL_ERR_FORMAT,
-                      "%s, accessors[%u]%s: %" PRIu64 " elements of %u bytes, %" PRIu64
-                      " apart from byte %" PRIu64 " on, end after the %" PRIu64
-                      " bytes of bufferViews[%u]",
-                      gltf->reader->path, accessor, what, count, element_bytes(column), stride,
-                      column->offset, bytes, column->view);
+                      "%s, accessors[%u]%s: %" PRIu64 " elements of %u bytes, %" PRIu64 " apart from byte %" PRIu64
+                      " on, end after the %" PRIu64 " bytes of bufferViews[%u]",
+                      gltf->reader->path, accessor, what, count, element_bytes(column), stride, column->offset, bytes,
+                      column->view);
 }
 
 /* Size bytes elements of a column as they are in the file, from `first` on; they must be there. */
-static strl_status load(strl__gltf *gltf, const strl__gltf_column *column, uint64_t first,
-                        size_t count, strl_error *err)
+static strl_status load(strl__gltf *gltf, const strl__gltf_column *column, uint64_t first, size_t count,
+                        strl_error *err)
 {
     const uint64_t stride = stride_of(gltf, column);
     return strl__gltf_read_view(gltf, column->view, column->offset + first * stride, gltf->window,
@@ -98,8 +93,8 @@ static uint32_t load_index(const strl__gltf_column *column, const uint8_t *bytes
     }
 }
 
-static strl_status read_indices(strl__gltf *gltf, const strl__gltf_column *column, uint64_t first,
-                                size_t count, uint32_t *indices, strl_error *err)
+static strl_status read_indices(strl__gltf *gltf, const strl__gltf_column *column, uint64_t first, size_t count,
+                                uint32_t *indices, strl_error *err)
 {
     if (column->view == STRL__NO_ITEM) {
         memset(indices, 0, count * sizeof *indices);
@@ -122,8 +117,7 @@ static strl_status check_sparse(strl__gltf *gltf, uint32_t index, strl_error *er
 {
     const strl__gltf_accessor *accessor = &gltf->accessors[index];
     const strl__gltf_sparse *sparse = accessor->sparse;
-    strl_status status =
-        check_column(gltf, index, ".sparse.indices", &sparse->indices, sparse->count, err);
+    strl_status status = check_column(gltf, index, ".sparse.indices", &sparse->indices, sparse->count, err);
     if (!status)
         status = check_column(gltf, index, ".sparse.values", &sparse->values, sparse->count, err);
     uint64_t least = 0;
@@ -134,11 +128,10 @@ static strl_status check_sparse(strl__gltf *gltf, uint32_t index, strl_error *er
         for (size_t i = 0; i < count && !status; i++) {
             uint32_t element = gltf->elements[i];
             if (element < least || element >= accessor->count)
-                status =
-                    strl__fail(err, STRL_ERR_FORMAT,
-                               "%s, accessors[%u].sparse: expected growing indices below %" PRIu64
-                               ", found %u at %" PRIu64,
-                               gltf->reader->path, index, accessor->count, element, first + i);
+                status = strl__fail(err, STRL_ERR_FORMAT,
+                                    "%s, accessors[%u].sparse: expected growing indices below %" PRIu64
+                                    ", found %u at %" PRIu64,
+                                    gltf->reader->path, index, accessor->count, element, first + i);
             least = (uint64_t)element + 1;
         }
     }
@@ -155,8 +148,7 @@ strl_status strl__gltf_check_accessor(strl__gltf *gltf, uint32_t index, strl_err
     strl_status status = check_column(gltf, index, "", &accessor->values, accessor->count, err);
     if (!status && accessor->sparse && accessor->sparse->count > accessor->count)
         status = strl__fail(err, STRL_ERR_FORMAT,
-                            "%s, accessors[%u].sparse: expected at most %" PRIu64
-                            " elements, found %" PRIu64,
+                            "%s, accessors[%u].sparse: expected at most %" PRIu64 " elements, found %" PRIu64,
                             gltf->reader->path, index, accessor->count, accessor->sparse->count);
     if (!status && accessor->sparse)
         status = check_sparse(gltf, index, err);
@@ -186,9 +178,8 @@ static void convert(const strl__gltf_column *column, bool normalized, const uint
 {
     const unsigned size = strl__scalar_bytes(column->type);
     for (unsigned i = 0; i < column->components; i++) {
-        double value = column->type == STRL__F32
-                           ? (double)strl__load_f32(bytes + 4 * i, false)
-                           : strl__scalar_load(column->type, bytes + size * i, false);
+        double value = column->type == STRL__F32 ? (double)strl__load_f32(bytes + 4 * i, false)
+                                                 : strl__scalar_load(column->type, bytes + size * i, false);
         numbers[i] = normalized ? strl__gltf_denormalize(column->type, value) : value;
     }
 }
@@ -213,8 +204,8 @@ static strl_status read_column(strl__gltf *gltf, const strl__gltf_column *column
 }
 
 /* The first entry at or after an element. */
-static strl_status find_sparse(strl__gltf *gltf, const strl__gltf_sparse *sparse, uint64_t element,
-                               uint64_t *entry, strl_error *err)
+static strl_status find_sparse(strl__gltf *gltf, const strl__gltf_sparse *sparse, uint64_t element, uint64_t *entry,
+                               strl_error *err)
 {
     uint64_t low = 0, high = sparse->count;
     while (low < high) {
@@ -251,8 +242,7 @@ static strl_status overlay(strl__gltf *gltf, const strl__gltf_sparse *sparse, bo
         for (size_t i = 0; i < some && !status; i++) {
             if (indices[i] < first || indices[i] - first >= count)
                 return STRL_OK; /* beyond; or the file changed under us */
-            memcpy(numbers + (indices[i] - first) * components, values + i * components,
-                   components * sizeof *numbers);
+            memcpy(numbers + (indices[i] - first) * components, values + i * components, components * sizeof *numbers);
         }
         entry += some;
     }
@@ -269,8 +259,8 @@ strl_status strl__gltf_read_numbers(strl__gltf *gltf, uint32_t index, bool norma
     return status;
 }
 
-strl_status strl__gltf_read_indices(strl__gltf *gltf, uint32_t index, uint64_t first, size_t count,
-                                    uint32_t *indices, strl_error *err)
+strl_status strl__gltf_read_indices(strl__gltf *gltf, uint32_t index, uint64_t first, size_t count, uint32_t *indices,
+                                    strl_error *err)
 {
     const strl__gltf_accessor *accessor = &gltf->accessors[index];
     if (!accessor->sparse)

@@ -41,8 +41,7 @@ static bool decode_percent(char *text)
 /* A scheme, or a path from the root: files beside the model have neither. */
 static bool is_relative(const char *uri)
 {
-    size_t letters =
-        strspn(uri, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789+-.");
+    size_t letters = strspn(uri, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789+-.");
     return uri[0] && uri[0] != '/' && uri[0] != '\\' && uri[letters] != ':';
 }
 
@@ -82,8 +81,7 @@ static strl_status fail_short(const strl__gltf *gltf, const strl__gltf_buffer *b
                       is_pointer ? ", which is a Git LFS pointer: " STRL__POINTER_ADVICE : "");
 }
 
-static strl_status open_file(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32_t index,
-                             strl_error *err)
+static strl_status open_file(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32_t index, strl_error *err)
 {
     const char *list = list_of(buffer);
     bool good, good_raw;
@@ -98,11 +96,10 @@ static strl_status open_file(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32
     if (!path || !raw)
         status = strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", gltf->reader->path);
     else if (!good)
-        status = strl__fail(err, STRL_ERR_FORMAT, "%s, %s[%u]: a zero ends the name '%.120s'",
-                            gltf->reader->path, list, index, buffer->uri);
+        status = strl__fail(err, STRL_ERR_FORMAT, "%s, %s[%u]: a zero ends the name '%.120s'", gltf->reader->path, list,
+                            index, buffer->uri);
     else
-        status = strl_file_open(!strl_path_exists(path) && strl_path_exists(raw) ? raw : path,
-                                &buffer->file, err);
+        status = strl_file_open(!strl_path_exists(path) && strl_path_exists(raw) ? raw : path, &buffer->file, err);
     if (status && path && raw && good)
         status = strl__fail_context(err, status, "%s, %s[%u]", gltf->reader->path, list, index);
     buffer->owns_file = buffer->is_beside = !status;
@@ -123,12 +120,11 @@ static strl_status open_binary(strl__gltf *gltf, uint32_t index, strl_error *err
 {
     strl__gltf_buffer *buffer = &gltf->buffers[index];
     if (!gltf->has_binary || index > 0)
-        return strl__fail(err, STRL_ERR_FORMAT, "%s, buffers[%u]: expected a uri%s, found none",
-                          gltf->reader->path, index, index ? "" : " or a binary chunk");
+        return strl__fail(err, STRL_ERR_FORMAT, "%s, buffers[%u]: expected a uri%s, found none", gltf->reader->path,
+                          index, index ? "" : " or a binary chunk");
     if (gltf->binary_bytes < buffer->bytes)
         return strl__fail(err, STRL_ERR_FORMAT,
-                          "%s, buffers[%u]: expected %" PRIu64
-                          " bytes, found a binary chunk of %" PRIu64,
+                          "%s, buffers[%u]: expected %" PRIu64 " bytes, found a binary chunk of %" PRIu64,
                           gltf->reader->path, index, buffer->bytes, gltf->binary_bytes);
     buffer->file = gltf->reader->file;
     buffer->file_offset = gltf->binary_offset;
@@ -146,17 +142,16 @@ typedef struct data_text {
     uint64_t at, end; /* in the file */
     uint64_t decoded; /* bytes so far */
     uint32_t bits, bit_count;
-    uint32_t escape, code; /* characters of JSON's escape that were read, and what it stands for so far */
-    bool has_ended;        /* at '=' */
+    uint32_t escape, code;   /* characters of JSON's escape that were read, and what it stands for so far */
+    bool has_ended;          /* at '=' */
     uint8_t out[TEXT_BYTES]; /* that wait to be written */
     size_t waiting;
 } data_text;
 
 static strl_status text_fail(const data_text *text, const char *expected, strl_error *err)
 {
-    return strl__fail(err, STRL_ERR_FORMAT, "%s, byte %" PRIu64 ", %s[%u]: expected %s",
-                      text->gltf->reader->path, text->at, list_of(text->buffer), text->index,
-                      expected);
+    return strl__fail(err, STRL_ERR_FORMAT, "%s, byte %" PRIu64 ", %s[%u]: expected %s", text->gltf->reader->path,
+                      text->at, list_of(text->buffer), text->index, expected);
 }
 
 static strl_status flush_decoded(data_text *text, strl_error *err)
@@ -188,8 +183,8 @@ static int base64_digit(unsigned char c)
 #define NOT_YET (-1)
 #define NO_LETTER 0
 
-/* The letter that the next character of JSON's text makes, NOT_YET within an escape. Of escapes those of a letter can be
- * base64: \/ and \uXXXX, as some programs write '+'. */
+/* The letter that the next character of JSON's text makes, NOT_YET within an escape. Of escapes those of a letter can
+ * be base64: \/ and \uXXXX, as some programs write '+'. */
 static int unescape(data_text *text, char c)
 {
     if (text->escape == 0 && c != '\\')
@@ -241,8 +236,7 @@ static strl_status decode_base64(data_text *text, const char *chars, size_t coun
 static strl_status pass_header(data_text *text, strl_error *err)
 {
     char header[HEADER_BYTES_MAX + 1];
-    size_t size =
-        text->end - text->at < HEADER_BYTES_MAX ? (size_t)(text->end - text->at) : HEADER_BYTES_MAX;
+    size_t size = text->end - text->at < HEADER_BYTES_MAX ? (size_t)(text->end - text->at) : HEADER_BYTES_MAX;
     strl_status status = strl_file_read(text->file, text->at, header, size, err);
     if (status)
         return status;
@@ -277,16 +271,14 @@ static strl_status decode_text(data_text *text, strl_error *err)
     if (!status && buffer->is_loose)
         buffer->bytes = text->decoded;
     if (!status && text->decoded < buffer->bytes)
-        status =
-            strl__fail(err, STRL_ERR_FORMAT,
-                       "%s, buffers[%u]: expected %" PRIu64 " bytes, found a data URI of %" PRIu64,
-                       text->gltf->reader->path, text->index, buffer->bytes, text->decoded);
+        status = strl__fail(err, STRL_ERR_FORMAT,
+                            "%s, buffers[%u]: expected %" PRIu64 " bytes, found a data URI of %" PRIu64,
+                            text->gltf->reader->path, text->index, buffer->bytes, text->decoded);
     return status;
 }
 
 /* To memory or to scratch. */
-static strl_status make_place(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32_t index,
-                              strl_error *err)
+static strl_status make_place(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32_t index, strl_error *err)
 {
     const uint64_t limit = gltf->reader->memory_bytes / 8;
     if (buffer->bytes <= limit - gltf->text_bytes) {
@@ -294,10 +286,8 @@ static strl_status make_place(strl__gltf *gltf, strl__gltf_buffer *buffer, uint3
         buffer->memory_bytes = buffer->memory ? buffer->bytes : 0;
         gltf->text_bytes += buffer->memory_bytes;
         return buffer->memory ? STRL_OK
-                              : strl__fail(err, STRL_ERR_MEMORY,
-                                           "%s, %s[%u]: no memory for %" PRIu64 " bytes",
-                                           gltf->reader->path, list_of(buffer), index,
-                                           buffer->bytes);
+                              : strl__fail(err, STRL_ERR_MEMORY, "%s, %s[%u]: no memory for %" PRIu64 " bytes",
+                                           gltf->reader->path, list_of(buffer), index, buffer->bytes);
     }
     if (!gltf->reader->scratch_dir)
         return strl__fail(err, STRL_ERR_ARGUMENT,
@@ -310,8 +300,7 @@ static strl_status make_place(strl__gltf *gltf, strl__gltf_buffer *buffer, uint3
 }
 
 /* uri is "data:@OFFSET+BYTES", as the JSON's splitter writes it. */
-static strl_status open_text(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32_t index,
-                             strl_error *err)
+static strl_status open_text(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32_t index, strl_error *err)
 {
     data_text text = {.gltf = gltf, .buffer = buffer, .index = index, .file = gltf->reader->input.file};
     uint64_t bytes;
@@ -325,8 +314,7 @@ static strl_status open_text(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32
         buffer->bytes = bytes / 4 * 3 + 3;
     if (!buffer->is_loose && buffer->bytes > bytes) /* before it sizes anything */
         return strl__fail(err, STRL_ERR_FORMAT,
-                          "%s, buffers[%u]: expected %" PRIu64
-                          " bytes, found a data URI of %" PRIu64 " letters",
+                          "%s, buffers[%u]: expected %" PRIu64 " bytes, found a data URI of %" PRIu64 " letters",
                           gltf->reader->path, index, buffer->bytes, bytes);
     strl_status status = make_place(gltf, buffer, index, err);
     return status ? status : decode_text(&text, err);
@@ -352,8 +340,7 @@ strl_status strl__gltf_open_buffer(strl__gltf *gltf, uint32_t index, strl_error 
     return status;
 }
 
-strl_status strl__gltf_open_loose(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32_t image,
-                                  strl_error *err)
+strl_status strl__gltf_open_loose(strl__gltf *gltf, strl__gltf_buffer *buffer, uint32_t image, strl_error *err)
 {
     buffer->is_loose = true;
     strl_status status = strncmp(buffer->uri, "data:", 5) == 0 ? open_text(gltf, buffer, image, err)
@@ -380,8 +367,7 @@ strl_status strl__gltf_check_unchanged(const strl__gltf *gltf, strl_error *err)
     strl_status status = STRL_OK;
     for (size_t i = 0; i < gltf->buffer_count && !status; i++)
         if (gltf->buffers[i].is_beside)
-            status =
-                strl__reader_check_unchanged(gltf->buffers[i].file, &gltf->buffers[i].opened, err);
+            status = strl__reader_check_unchanged(gltf->buffers[i].file, &gltf->buffers[i].opened, err);
     return status;
 }
 
@@ -408,8 +394,8 @@ void strl__gltf_close_buffers(strl__gltf *gltf)
         strl__gltf_close_buffer(gltf, &gltf->buffers[i]);
 }
 
-strl_status strl__gltf_read_buffer(strl__gltf *gltf, uint32_t index, uint64_t offset, void *data,
-                                   size_t size, strl_error *err)
+strl_status strl__gltf_read_buffer(strl__gltf *gltf, uint32_t index, uint64_t offset, void *data, size_t size,
+                                   strl_error *err)
 {
     const strl__gltf_buffer *buffer = &gltf->buffers[index];
     strl_status status = strl__gltf_open_buffer(gltf, index, err); /* it may have been given back */
@@ -421,8 +407,8 @@ strl_status strl__gltf_read_buffer(strl__gltf *gltf, uint32_t index, uint64_t of
     return STRL_OK;
 }
 
-strl_status strl__gltf_read_view(strl__gltf *gltf, uint32_t index, uint64_t offset, void *data,
-                                 size_t size, strl_error *err)
+strl_status strl__gltf_read_view(strl__gltf *gltf, uint32_t index, uint64_t offset, void *data, size_t size,
+                                 strl_error *err)
 {
     const strl__gltf_view *view = &gltf->views[index];
     const uint8_t *bytes;

@@ -97,11 +97,12 @@ uint64_t add_product(uint64_t sum, uint64_t a, uint64_t b)
     return sum;
 }
 
-/* libdraco makes an object of each descriptor, of five bytes, before anything of them can be counted. Real meshes have four or
- * five. */
+/* libdraco makes an object of each descriptor, of five bytes, before anything of them can be counted. Real meshes have
+ * four or five. */
 constexpr uint64_t most_attributes = 256;
 
-/* How many attributes the bytes announce behind the faces, up to more than are read (its specification, "ParseAttributeDecodersData"). */
+/* How many attributes the bytes announce behind the faces, up to more than are read (its specification,
+ * "ParseAttributeDecodersData"). */
 uint64_t count_attributes(start in, bool is_edgebreaker)
 {
     const uint64_t decoders = in.bytes(1);
@@ -248,29 +249,26 @@ unsigned strl__draco_components(const strl__draco *mesh, uint32_t id)
     return attribute ? static_cast<unsigned>(attribute->num_components()) : 0;
 }
 
-int strl__draco_numbers(const strl__draco *mesh, uint32_t id, uint64_t first, size_t count,
-                        unsigned components, double *numbers)
+int strl__draco_numbers(const strl__draco *mesh, uint32_t id, uint64_t first, size_t count, unsigned components,
+                        double *numbers)
 {
     const draco::PointAttribute *attribute = mesh->mesh->GetAttributeByUniqueId(id);
     if (!attribute || components > 4 || attribute->num_components() != static_cast<int>(components))
         return -1;
     for (size_t i = 0; i < count; i++) {
-        const auto value =
-            attribute->mapped_index(draco::PointIndex(static_cast<uint32_t>(first + i)));
+        const auto value = attribute->mapped_index(draco::PointIndex(static_cast<uint32_t>(first + i)));
         float reals[4];
         int32_t integers[4];
         bool good = value.value() < attribute->size();
         if (good && attribute->data_type() == draco::DT_FLOAT32)
             good = attribute->ConvertValue<float>(value, static_cast<int8_t>(components), reals);
         else if (good)
-            good =
-                attribute->ConvertValue<int32_t>(value, static_cast<int8_t>(components), integers);
+            good = attribute->ConvertValue<int32_t>(value, static_cast<int8_t>(components), integers);
         if (!good)
             return -1;
         for (unsigned k = 0; k < components; k++)
-            numbers[i * components + k] = attribute->data_type() == draco::DT_FLOAT32
-                                              ? static_cast<double>(reals[k])
-                                              : integers[k];
+            numbers[i * components + k] =
+                attribute->data_type() == draco::DT_FLOAT32 ? static_cast<double>(reals[k]) : integers[k];
     }
     return 0;
 }

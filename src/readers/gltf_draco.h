@@ -39,8 +39,8 @@ void strl__draco_faces(const strl__draco *mesh, uint64_t first, size_t count, ui
 /* Components of an attribute by its unique id; 0 where there is none such. */
 unsigned strl__draco_components(const strl__draco *mesh, uint32_t id);
 /* Of points first..; integers as they are. first + count <= point_count. Returns 0, or -1. */
-int strl__draco_numbers(const strl__draco *mesh, uint32_t id, uint64_t first, size_t count,
-                        unsigned components, double *numbers);
+int strl__draco_numbers(const strl__draco *mesh, uint32_t id, uint64_t first, size_t count, unsigned components,
+                        double *numbers);
 void strl__draco_close(strl__draco *mesh); /* NULL is legal */
 
 #ifdef __cplusplus

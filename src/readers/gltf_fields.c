@@ -13,14 +13,12 @@ void strl__fields_fail(strl__fields *fields, const char *key, const char *expect
         return;
     if (fields->index != STRL__JSON_WHOLE)
         snprintf(index, sizeof index, "[%" PRIu64 "]", fields->index);
-    fields->status =
-        strl__fail(fields->err, STRL_ERR_FORMAT, "%s, %s%s%s%s: expected %s", fields->path,
-                   fields->member, index, *key ? "." : "", key, expected);
+    fields->status = strl__fail(fields->err, STRL_ERR_FORMAT, "%s, %s%s%s%s: expected %s", fields->path, fields->member,
+                                index, *key ? "." : "", key, expected);
 }
 
 /* What was found in place of what was expected. */
-static void fail_kind(strl__fields *fields, const char *key, const char *expected,
-                      const json_t *found)
+static void fail_kind(strl__fields *fields, const char *key, const char *expected, const json_t *found)
 {
     char sentence[120];
     const char *kind = json_is_object(found)    ? "an object"
@@ -30,8 +28,7 @@ static void fail_kind(strl__fields *fields, const char *key, const char *expecte
                        : json_is_boolean(found) ? "true or false"
                                                 : "null";
     if (json_is_integer(found))
-        snprintf(sentence, sizeof sentence, "%s, found %" JSON_INTEGER_FORMAT, expected,
-                 json_integer_value(found));
+        snprintf(sentence, sizeof sentence, "%s, found %" JSON_INTEGER_FORMAT, expected, json_integer_value(found));
     else
         snprintf(sentence, sizeof sentence, "%s, found %s", expected, kind);
     strl__fields_fail(fields, key, sentence);
@@ -71,8 +68,7 @@ static bool is_count(const json_t *value, uint64_t *count)
     return true;
 }
 
-uint64_t strl__fields_count(strl__fields *fields, const json_t *object, const char *key,
-                            uint64_t absent)
+uint64_t strl__fields_count(strl__fields *fields, const json_t *object, const char *key, uint64_t absent)
 {
     const json_t *value = member_of(fields, object, key);
     uint64_t count;
@@ -99,14 +95,12 @@ uint32_t strl__fields_index(strl__fields *fields, const json_t *object, const ch
     return value ? to_index(fields, value, key) : STRL__NO_ITEM;
 }
 
-uint32_t strl__fields_list_index(strl__fields *fields, const json_t *list, size_t at,
-                                 const char *key)
+uint32_t strl__fields_list_index(strl__fields *fields, const json_t *list, size_t at, const char *key)
 {
     return to_index(fields, json_array_get(list, at), key);
 }
 
-double strl__fields_number(strl__fields *fields, const json_t *object, const char *key,
-                           double absent)
+double strl__fields_number(strl__fields *fields, const json_t *object, const char *key, double absent)
 {
     const json_t *value = member_of(fields, object, key);
     if (value && !json_is_number(value))
@@ -122,8 +116,7 @@ bool strl__fields_bool(strl__fields *fields, const json_t *object, const char *k
     return json_is_true(value);
 }
 
-bool strl__fields_numbers(strl__fields *fields, const json_t *object, const char *key,
-                          double *numbers, unsigned count)
+bool strl__fields_numbers(strl__fields *fields, const json_t *object, const char *key, double *numbers, unsigned count)
 {
     const json_t *list = strl__fields_list(fields, object, key);
     bool good = json_array_size(list) == count;

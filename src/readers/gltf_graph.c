@@ -43,16 +43,14 @@ static strl_status find_depth(strl__gltf *gltf, uint32_t start, uint32_t *deepes
     while (gltf->nodes[at].depth == DEPTH_UNKNOWN && gltf->nodes[at].parent != STRL__NO_ITEM) {
         at = gltf->nodes[at].parent;
         if (++steps > gltf->node_count)
-            return strl__fail(err, STRL_ERR_FORMAT,
-                              "%s: node %u is below itself: expected no cycle of nodes",
+            return strl__fail(err, STRL_ERR_FORMAT, "%s: node %u is below itself: expected no cycle of nodes",
                               gltf->reader->path, at);
     }
     if (gltf->nodes[at].depth == DEPTH_UNKNOWN)
         gltf->nodes[at].depth = 0;
     const uint64_t depth = gltf->nodes[at].depth + steps;
     if (depth >= STRL__GLTF_DEPTH_MAX)
-        return strl__fail(err, STRL_ERR_LIMIT,
-                          "%s: node %u has %" PRIu64 " nodes above it, expected fewer than %u",
+        return strl__fail(err, STRL_ERR_LIMIT, "%s: node %u has %" PRIu64 " nodes above it, expected fewer than %u",
                           gltf->reader->path, start, depth, STRL__GLTF_DEPTH_MAX);
     *deepest = depth > *deepest ? (uint32_t)depth : *deepest;
     at = start;
@@ -69,15 +67,13 @@ static strl_status list_roots(strl__gltf *gltf, strl_error *err)
     for (uint32_t i = 0; i < gltf->node_count && !status; i++) {
         if (gltf->nodes[i].parent != STRL__NO_ITEM)
             continue;
-        status = strl__gltf_add(gltf, &gltf->roots, &gltf->root_count, &gltf->root_capacity,
-                                sizeof *gltf->roots, err);
+        status = strl__gltf_add(gltf, &gltf->roots, &gltf->root_count, &gltf->root_capacity, sizeof *gltf->roots, err);
         if (!status)
             gltf->roots[gltf->root_count - 1] = i;
     }
     scene.root_count = (uint32_t)gltf->root_count - scene.first_root;
     if (!status)
-        status = strl__gltf_add(gltf, &gltf->scenes, &gltf->scene_count, &gltf->scene_capacity,
-                                sizeof scene, err);
+        status = strl__gltf_add(gltf, &gltf->scenes, &gltf->scene_count, &gltf->scene_capacity, sizeof scene, err);
     if (!status)
         gltf->scenes[gltf->scene_count - 1] = scene;
     return status;
@@ -102,8 +98,7 @@ static strl_status check_roots(strl__gltf *gltf, strl_error *err)
                               "%s, scenes[%u].nodes: expected roots, each once, found node %u, "
                               "which is %s",
                               gltf->reader->path, gltf->scene, root,
-                              gltf->nodes[root].is_drawn_root ? "there twice"
-                                                              : "the child of another");
+                              gltf->nodes[root].is_drawn_root ? "there twice" : "the child of another");
         gltf->nodes[root].is_drawn_root = true;
     }
     return STRL_OK;
@@ -131,9 +126,9 @@ strl_status strl__gltf_link(strl__gltf *gltf, strl_error *err)
     if (status)
         return status;
     gltf->world = strl__alloc(deepest + 1, sizeof *gltf->world);
-    return gltf->world ? STRL_OK
-                       : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for %u matrices",
-                                    gltf->reader->path, deepest + 1);
+    return gltf->world
+               ? STRL_OK
+               : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for %u matrices", gltf->reader->path, deepest + 1);
 }
 
 /* ---- walking */
@@ -203,8 +198,7 @@ strl__gltf_matrix strl__gltf_multiply(const strl__gltf_matrix *a, const strl__gl
     return product;
 }
 
-strl__gltf_matrix strl__gltf_compose(const double translation[3], const double rotation[4],
-                                     const double scale[3])
+strl__gltf_matrix strl__gltf_compose(const double translation[3], const double rotation[4], const double scale[3])
 {
     double length2 = 0;
     for (unsigned i = 0; i < 4; i++)
@@ -241,8 +235,7 @@ static const char *own_name(const strl__gltf *gltf, uint32_t index, char number[
     const strl__gltf_node *node = &gltf->nodes[index];
     if (node->name && *node->name)
         return node->name;
-    if (node->mesh != STRL__NO_ITEM && gltf->meshes[node->mesh].name &&
-        *gltf->meshes[node->mesh].name)
+    if (node->mesh != STRL__NO_ITEM && gltf->meshes[node->mesh].name && *gltf->meshes[node->mesh].name)
         return gltf->meshes[node->mesh].name;
     snprintf(number, 24, "node %u", index);
     return number;
@@ -285,19 +278,19 @@ static char *path_of(const strl__gltf *gltf, uint32_t node, char *text, size_t s
 }
 
 /* Adds a name; where it is taken, with a number that makes it one of its own. */
-static strl_status add_name(strl__gltf *gltf, strl__names *names, const char *name,
-                            const char *what, uint32_t number, uint32_t *index, strl_error *err)
+static strl_status add_name(strl__gltf *gltf, strl__names *names, const char *name, const char *what, uint32_t number,
+                            uint32_t *index, strl_error *err)
 {
     char text[STRL__NAME_BYTES_MAX + 1];
     const size_t own = cut_length(name, sizeof text - 1 - NUMBER_BYTES_MAX);
     size_t length = own;
     memcpy(text, name, own);
     for (size_t again = 1; again <= names->count && strl__names_find(names, text, length) != UINT32_MAX; again++)
-        length = own + (size_t)(again == 1 ? snprintf(text + own, NUMBER_BYTES_MAX, " (%s %u)", what, number)
-                                           : snprintf(text + own, NUMBER_BYTES_MAX, " (%s %u, %zu)", what, number, again));
+        length =
+            own + (size_t)(again == 1 ? snprintf(text + own, NUMBER_BYTES_MAX, " (%s %u)", what, number)
+                                      : snprintf(text + own, NUMBER_BYTES_MAX, " (%s %u, %zu)", what, number, again));
     strl_status status = strl__names_add(names, text, length, index, err);
-    return status ? strl__fail_context(err, status, "%s, %s %u", gltf->reader->path, what, number)
-                  : STRL_OK;
+    return status ? strl__fail_context(err, status, "%s, %s %u", gltf->reader->path, what, number) : STRL_OK;
 }
 
 strl_status strl__gltf_name_part(strl__gltf *gltf, uint32_t node, uint32_t *part, strl_error *err)
@@ -305,8 +298,8 @@ strl_status strl__gltf_name_part(strl__gltf *gltf, uint32_t node, uint32_t *part
     char text[STRL__NAME_BYTES_MAX - 64];
     strl_status status = STRL_OK;
     if (gltf->nodes[node].part == STRL__NO_ITEM)
-        status = add_name(gltf, &gltf->reader->parts, path_of(gltf, node, text, sizeof text),
-                          "node", node, &gltf->nodes[node].part, err);
+        status = add_name(gltf, &gltf->reader->parts, path_of(gltf, node, text, sizeof text), "node", node,
+                          &gltf->nodes[node].part, err);
     *part = gltf->nodes[node].part;
     return status;
 }
@@ -318,16 +311,14 @@ strl_status strl__gltf_name_piece(strl__gltf *gltf, uint32_t index, uint32_t *pa
     if (mesh->part == STRL__NO_ITEM) {
         char number[24];
         snprintf(number, sizeof number, "mesh %u", index);
-        status = add_name(gltf, &gltf->reader->parts,
-                          mesh->name && *mesh->name ? mesh->name : number, "mesh", index,
+        status = add_name(gltf, &gltf->reader->parts, mesh->name && *mesh->name ? mesh->name : number, "mesh", index,
                           &mesh->part, err);
     }
     *part = mesh->part;
     return status;
 }
 
-strl_status strl__gltf_list_material(strl__gltf *gltf, uint32_t index, uint32_t *listed,
-                                     strl_error *err)
+strl_status strl__gltf_list_material(strl__gltf *gltf, uint32_t index, uint32_t *listed, strl_error *err)
 {
     strl__names *names = &gltf->reader->materials;
     if (index == STRL__NO_ITEM) /* the default one, white */

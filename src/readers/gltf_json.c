@@ -43,9 +43,8 @@ static void fail_expected(splitter *s, const char *expected)
     else if (found >= 0)
         snprintf(shown, sizeof shown, "byte 0x%02x", (unsigned)found);
     if (!s->status)
-        s->status = strl__fail(s->err, STRL_ERR_FORMAT,
-                               "%s, byte %" PRIu64 ": expected %s of its JSON, found %s", s->path,
-                               strl__input_offset(s->input), expected, shown);
+        s->status = strl__fail(s->err, STRL_ERR_FORMAT, "%s, byte %" PRIu64 ": expected %s of its JSON, found %s",
+                               s->path, strl__input_offset(s->input), expected, shown);
 }
 
 static void keep(splitter *s, char byte)
@@ -55,8 +54,7 @@ static void keep(splitter *s, char byte)
     if (s->length >= s->sink->most_bytes)
         s->length++; /* so that a sentence can tell how long it is */
     else if (!strl__grow(&s->text, &s->capacity, s->length + 1, 1))
-        s->status = strl__fail(s->err, STRL_ERR_MEMORY, "%s: no memory for %zu bytes of JSON",
-                               s->path, s->length);
+        s->status = strl__fail(s->err, STRL_ERR_MEMORY, "%s: no memory for %zu bytes of JSON", s->path, s->length);
     else
         s->text[s->length++] = byte;
 }
@@ -122,8 +120,7 @@ static void take_string(splitter *s)
     s->muted = muted;
     if (is_data) {
         char place[48];
-        snprintf(place, sizeof place, "@%" PRIu64 "+%" PRIu64, begin,
-                 strl__input_offset(s->input) - begin);
+        snprintf(place, sizeof place, "@%" PRIu64 "+%" PRIu64, begin, strl__input_offset(s->input) - begin);
         keep_text(s, place);
     }
     take(s);
@@ -167,8 +164,7 @@ static void take_value(splitter *s)
             take(s);
             if (++depth > DEPTH_MAX)
                 s->status = strl__fail(s->err, STRL_ERR_LIMIT,
-                                       "%s, byte %" PRIu64
-                                       ": its JSON nests more than the %u levels that are read",
+                                       "%s, byte %" PRIu64 ": its JSON nests more than the %u levels that are read",
                                        s->path, strl__input_offset(s->input), DEPTH_MAX);
         } else if (c == '}' || c == ']') {
             take(s);
@@ -206,9 +202,8 @@ static void give(splitter *s, const char *member, uint64_t index)
     if (!value) {
         for (char *c = wrong.text; *c; c++)
             *c = *c < 0x20 || *c == 0x7f ? ' ' : *c;
-        s->status = strl__fail(s->err, STRL_ERR_FORMAT,
-                               "%s, byte %" PRIu64 ": expected JSON in its %s, found: %s", s->path,
-                               s->begun_at, member, wrong.text);
+        s->status = strl__fail(s->err, STRL_ERR_FORMAT, "%s, byte %" PRIu64 ": expected JSON in its %s, found: %s",
+                               s->path, s->begun_at, member, wrong.text);
         return;
     }
     s->status = s->sink->take(s->sink->context, member, index, value, s->err);
@@ -305,8 +300,7 @@ static void split_all(splitter *s)
         fail_expected(s, "the end");
 }
 
-strl_status strl__json_split(strl__input *input, const char *path, const strl__json_sink *sink,
-                             strl_error *err)
+strl_status strl__json_split(strl__input *input, const char *path, const strl__json_sink *sink, strl_error *err)
 {
     splitter s = {.input = input, .path = path, .sink = sink, .err = err};
     split_all(&s);

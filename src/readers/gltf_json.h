@@ -21,14 +21,12 @@ typedef struct strl__json_sink {
     /* Whether a top-level member is to be taken, else it is passed over. */
     bool (*wants)(void *context, const char *member);
     /* index: of the element, or STRL__JSON_WHOLE where the member is no list. value is borrowed. */
-    strl_status (*take)(void *context, const char *member, uint64_t index, const json_t *value,
-                        strl_error *err);
+    strl_status (*take)(void *context, const char *member, uint64_t index, const json_t *value, strl_error *err);
     /* Tells that the element at a byte of the file is longer than most_bytes. */
     strl_status (*refuse)(void *context, uint64_t at, size_t bytes, strl_error *err);
 } strl__json_sink;
 
 /* From where the input stands to its end. path is for sentences. */
-strl_status strl__json_split(strl__input *input, const char *path, const strl__json_sink *sink,
-                             strl_error *err);
+strl_status strl__json_split(strl__input *input, const char *path, const strl__json_sink *sink, strl_error *err);
 
 #endif

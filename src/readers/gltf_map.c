@@ -19,19 +19,18 @@ static strl__fields quiet_fields(const char *path, strl_error *ignored)
 
 strl_status strl__gltf_parse_map(strl__gltf *gltf, strl__fields *fields, const json_t *value)
 {
-    static const char *const others[] = {"KHR_texture_basisu", "EXT_texture_webp",
-                                         "EXT_texture_avif", "MSFT_texture_dds"};
+    static const char *const others[] = {"KHR_texture_basisu", "EXT_texture_webp", "EXT_texture_avif",
+                                         "MSFT_texture_dds"};
     strl_error ignored = {0};
     strl__fields quiet = quiet_fields(fields->path, &ignored);
     strl__gltf_map map = {.image = strl__fields_index(&quiet, value, "source"),
                           .sampler = strl__fields_index(&quiet, value, "sampler")};
     for (unsigned i = 0; i < sizeof others / sizeof *others && map.image == STRL__NO_ITEM; i++)
-        map.image = strl__fields_index(&quiet, strl__fields_extension(&quiet, value, others[i]),
-                                       "source");
+        map.image = strl__fields_index(&quiet, strl__fields_extension(&quiet, value, others[i]), "source");
     if (quiet.status)
         map = (strl__gltf_map){STRL__NO_ITEM, STRL__NO_ITEM};
-    strl_status status = strl__gltf_add(gltf, &gltf->maps, &gltf->map_count, &gltf->map_capacity,
-                                        sizeof map, fields->err);
+    strl_status status =
+        strl__gltf_add(gltf, &gltf->maps, &gltf->map_count, &gltf->map_capacity, sizeof map, fields->err);
     if (!status)
         gltf->maps[gltf->map_count - 1] = map;
     return status;
@@ -53,10 +52,9 @@ strl_status strl__gltf_parse_sampler(strl__gltf *gltf, strl__fields *fields, con
 {
     strl_error ignored = {0};
     strl__fields quiet = quiet_fields(fields->path, &ignored);
-    const strl__gltf_sampler sampler = {
-        {parse_wrap(&quiet, value, "wrapS"), parse_wrap(&quiet, value, "wrapT")}};
-    strl_status status = strl__gltf_add(gltf, &gltf->samplers, &gltf->sampler_count,
-                                        &gltf->sampler_capacity, sizeof sampler, fields->err);
+    const strl__gltf_sampler sampler = {{parse_wrap(&quiet, value, "wrapS"), parse_wrap(&quiet, value, "wrapT")}};
+    strl_status status = strl__gltf_add(gltf, &gltf->samplers, &gltf->sampler_count, &gltf->sampler_capacity,
+                                        sizeof sampler, fields->err);
     if (!status)
         gltf->samplers[gltf->sampler_count - 1] = sampler;
     return status;
@@ -73,8 +71,8 @@ strl_status strl__gltf_parse_image(strl__gltf *gltf, strl__fields *fields, const
         return strl__fail(fields->err, quiet.status, "%s", ignored.message);
     if (quiet.status)
         image = (strl__gltf_image){.view = STRL__NO_ITEM};
-    strl_status status = strl__gltf_add(gltf, &gltf->images, &gltf->image_count,
-                                        &gltf->image_capacity, sizeof image, fields->err);
+    strl_status status =
+        strl__gltf_add(gltf, &gltf->images, &gltf->image_count, &gltf->image_capacity, sizeof image, fields->err);
     if (!status)
         gltf->images[gltf->image_count - 1] = image;
     return status;
@@ -82,8 +80,7 @@ strl_status strl__gltf_parse_image(strl__gltf *gltf, strl__fields *fields, const
 
 /* KHR_texture_transform: scaled, turned, moved. Counter-clockwise as one sees the image, whose v
  * goes down. */
-static void parse_transform(strl__fields *fields, const json_t *info, double transform[6],
-                            uint32_t *set)
+static void parse_transform(strl__fields *fields, const json_t *info, double transform[6], uint32_t *set)
 {
     const json_t *value = strl__fields_extension(fields, info, "KHR_texture_transform");
     double offset[2] = {0, 0}, scale[2] = {1, 1};
@@ -117,8 +114,8 @@ static void name_image(const strl__gltf *gltf, uint32_t index, char name[NAME_BY
 {
     const strl__gltf_image *image = &gltf->images[index];
     const char *called = image->name && *image->name ? image->name : NULL;
-    snprintf(name, NAME_BYTES, "images[%u]%s%.200s%s", index, called ? " (" : "",
-             called ? called : "", called ? ")" : "");
+    snprintf(name, NAME_BYTES, "images[%u]%s%.200s%s", index, called ? " (" : "", called ? called : "",
+             called ? ")" : "");
 }
 
 /* The picture of a map: images that are files go by their names, so that one which several have is
@@ -144,16 +141,14 @@ strl_status strl__gltf_link_maps(strl__gltf *gltf, strl_error *err)
         strl__gltf_material *material = &gltf->materials[i];
         if (material->map == STRL__NO_ITEM)
             continue;
-        const uint32_t sampler =
-            material->map < gltf->map_count ? gltf->maps[material->map].sampler : STRL__NO_ITEM;
+        const uint32_t sampler = material->map < gltf->map_count ? gltf->maps[material->map].sampler : STRL__NO_ITEM;
         strl__texture texture = {.set = material->set};
         if (sampler < gltf->sampler_count)
             memcpy(texture.wrap, gltf->samplers[sampler].wrap, sizeof texture.wrap);
         memcpy(texture.transform, material->transform, sizeof texture.transform);
         status = add_picture(gltf, material->map, &texture.picture, err);
         if (!status)
-            status =
-                strl__textures_add(&gltf->reader->textures, &texture, &material->texture, err);
+            status = strl__textures_add(&gltf->reader->textures, &texture, &material->texture, err);
     }
     return status ? strl__fail_context(err, status, "%s", gltf->reader->path) : STRL_OK;
 }
@@ -163,9 +158,8 @@ uint32_t strl__gltf_texcoord(const strl__gltf *gltf, const strl__gltf_primitive 
     if (primitive->material == STRL__NO_ITEM)
         return STRL__NO_ITEM;
     const strl__gltf_material *material = &gltf->materials[primitive->material];
-    return material->texture != STRL__NO_TEXTURE && material->set < STRL__GLTF_SETS
-               ? primitive->texcoord[material->set]
-               : STRL__NO_ITEM;
+    return material->texture != STRL__NO_TEXTURE && material->set < STRL__GLTF_SETS ? primitive->texcoord[material->set]
+                                                                                    : STRL__NO_ITEM;
 }
 
 /* ---- bytes */
@@ -177,8 +171,7 @@ typedef struct place {
     uint32_t view;            /* else */
 } place;
 
-static strl_status read_place(void *context, uint64_t offset, void *data, size_t size,
-                              strl_error *err)
+static strl_status read_place(void *context, uint64_t offset, void *data, size_t size, strl_error *err)
 {
     place *self = context;
     if (self->view != STRL__NO_ITEM)
@@ -197,8 +190,7 @@ static void close_place(void *context)
     strl__free(self);
 }
 
-static strl_status find_bytes(place *self, uint32_t image, const char *ending, uint64_t *bytes,
-                              strl_error *err)
+static strl_status find_bytes(place *self, uint32_t image, const char *ending, uint64_t *bytes, strl_error *err)
 {
     strl__gltf *gltf = self->gltf;
     const strl__gltf_image *from = &gltf->images[image];
@@ -216,15 +208,14 @@ static strl_status find_bytes(place *self, uint32_t image, const char *ending, u
         return status;
     }
     if (from->view >= gltf->view_count)
-        return strl__fail(err, STRL_ERR_FORMAT, "expected a uri or one of %zu buffer views",
-                          gltf->view_count);
+        return strl__fail(err, STRL_ERR_FORMAT, "expected a uri or one of %zu buffer views", gltf->view_count);
     status = strl__gltf_check_view(gltf, from->view, err);
     *bytes = gltf->views[from->view].bytes;
     return status;
 }
 
-strl_status strl__gltf_open_picture(void *context, const strl__picture *picture,
-                                    const char *ending, strl__picture_place *found, strl_error *err)
+strl_status strl__gltf_open_picture(void *context, const strl__picture *picture, const char *ending,
+                                    strl__picture_place *found, strl_error *err)
 {
     strl__gltf *gltf = context;
     if (picture->item >= gltf->image_count)
@@ -235,8 +226,7 @@ strl_status strl__gltf_open_picture(void *context, const strl__picture *picture,
     const uint32_t image = (uint32_t)picture->item;
     self->gltf = gltf;
     self->view = gltf->images[image].view;
-    *found = (strl__picture_place){.source = {.context = self, .read = read_place},
-                                   .close = close_place};
+    *found = (strl__picture_place){.source = {.context = self, .read = read_place}, .close = close_place};
     strl_status status = find_bytes(self, image, ending, &found->source.bytes, err);
     return status ? strl__fail_context(err, status, "cannot be read") : STRL_OK;
 }

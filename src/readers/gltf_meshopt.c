@@ -27,8 +27,7 @@ static uint64_t held_with(const strl__gltf *gltf, uint64_t bytes)
 static uint64_t limit_of(const strl__gltf *gltf)
 {
     const uint64_t half = gltf->reader->memory_bytes / 2;
-    const uint64_t held =
-        gltf->table_bytes + gltf->arena.total_bytes + gltf->reader->textures.held_bytes;
+    const uint64_t held = gltf->table_bytes + gltf->arena.total_bytes + gltf->reader->textures.held_bytes;
     return held < half ? half - held : 0;
 }
 
@@ -79,8 +78,7 @@ static strl__gltf_decoded *find_oldest(strl__gltf *gltf)
     return oldest;
 }
 
-strl_status strl__gltf_make_room(strl__gltf *gltf, uint64_t bytes, const char *what,
-                                 strl_error *err)
+strl_status strl__gltf_make_room(strl__gltf *gltf, uint64_t bytes, const char *what, strl_error *err)
 {
     strl__gltf_decoded *oldest;
     const uint64_t limit = limit_for(gltf, bytes);
@@ -119,8 +117,7 @@ strl_status strl__gltf_check_meshopt(strl__gltf *gltf, uint32_t index, strl_erro
     const strl__gltf_meshopt *meshopt = view->meshopt;
     const char *path = gltf->reader->path;
     uint64_t end;
-    if (!is_sound(meshopt) || meshopt->count > UINT32_MAX ||
-        view->bytes > meshopt->count * meshopt->stride)
+    if (!is_sound(meshopt) || meshopt->count > UINT32_MAX || view->bytes > meshopt->count * meshopt->stride)
         return strl__fail(err, STRL_ERR_FORMAT,
                           "%s, bufferViews[%u]: a compressed count of %" PRIu64 " and stride of %u "
                           "do not fit its mode, filter and length",
@@ -128,18 +125,14 @@ strl_status strl__gltf_check_meshopt(strl__gltf *gltf, uint32_t index, strl_erro
     if (meshopt->buffer >= gltf->buffer_count)
         return strl__gltf_fail_index(gltf, ", a compressed bufferView", "buffers", gltf->buffer_count, meshopt->buffer,
                                      err);
-    if (__builtin_add_overflow(meshopt->offset, meshopt->bytes, &end) ||
-        end > gltf->buffers[meshopt->buffer].bytes)
+    if (__builtin_add_overflow(meshopt->offset, meshopt->bytes, &end) || end > gltf->buffers[meshopt->buffer].bytes)
         return strl__fail(err, STRL_ERR_FORMAT,
                           "%s, bufferViews[%u]: its %" PRIu64 " compressed bytes at %" PRIu64
                           " end after the buffer's %" PRIu64,
-                          path, index, meshopt->bytes, meshopt->offset,
-                          gltf->buffers[meshopt->buffer].bytes);
+                          path, index, meshopt->bytes, meshopt->offset, gltf->buffers[meshopt->buffer].bytes);
     strl_status status = strl__gltf_open_buffer(gltf, meshopt->buffer, err);
     uint64_t decoded = meshopt->count * meshopt->stride;
-    return status ? status
-                  : strl__gltf_make_room(gltf, decoded + meshopt->bytes, "a compressed buffer view",
-                                         err);
+    return status ? status : strl__gltf_make_room(gltf, decoded + meshopt->bytes, "a compressed buffer view", err);
 }
 
 static int decode(const strl__gltf_meshopt *meshopt, const uint8_t *packed, uint8_t *bytes)
@@ -171,13 +164,10 @@ static strl_status decompress(strl__gltf *gltf, uint32_t index, uint8_t *bytes, 
     const strl__gltf_meshopt *meshopt = gltf->views[index].meshopt;
     uint8_t *packed = strl__alloc((size_t)meshopt->bytes, 1);
     strl_status status =
-        packed ? strl__gltf_read_buffer(gltf, meshopt->buffer, meshopt->offset, packed,
-                                        (size_t)meshopt->bytes, err)
-               : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a compressed buffer view",
-                            gltf->reader->path);
+        packed ? strl__gltf_read_buffer(gltf, meshopt->buffer, meshopt->offset, packed, (size_t)meshopt->bytes, err)
+               : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a compressed buffer view", gltf->reader->path);
     if (!status && meshopt->count > 0 && decode(meshopt, packed, bytes) != 0)
-        status = strl__fail(err, STRL_ERR_FORMAT,
-                            "%s, bufferViews[%u]: its %" PRIu64 " compressed bytes are damaged",
+        status = strl__fail(err, STRL_ERR_FORMAT, "%s, bufferViews[%u]: its %" PRIu64 " compressed bytes are damaged",
                             gltf->reader->path, index, meshopt->bytes);
     strl__free(packed);
     return status;
@@ -213,8 +203,7 @@ void strl__gltf_rest_decoded(strl__gltf *gltf)
     gltf->draco_bytes = 0;
 }
 
-static strl_status add_decoded(strl__gltf *gltf, uint32_t index, strl__gltf_decoded **added,
-                               strl_error *err)
+static strl_status add_decoded(strl__gltf *gltf, uint32_t index, strl__gltf_decoded **added, strl_error *err)
 {
     const strl__gltf_meshopt *meshopt = gltf->views[index].meshopt;
     const uint64_t size = meshopt->count * meshopt->stride, limit = limit_for(gltf, size + meshopt->bytes);
@@ -231,10 +220,9 @@ static strl_status add_decoded(strl__gltf *gltf, uint32_t index, strl__gltf_deco
         store_away(gltf, place);
     }
     uint8_t *bytes = strl__alloc((size_t)size, 1);
-    status =
-        bytes ? decompress(gltf, index, bytes, err)
-              : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for %" PRIu64 " decompressed bytes",
-                           gltf->reader->path, size);
+    status = bytes ? decompress(gltf, index, bytes, err)
+                   : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for %" PRIu64 " decompressed bytes",
+                                gltf->reader->path, size);
     if (status) {
         strl__free(bytes);
         return status;
@@ -245,8 +233,7 @@ static strl_status add_decoded(strl__gltf *gltf, uint32_t index, strl__gltf_deco
     return STRL_OK;
 }
 
-strl_status strl__gltf_decode_view(strl__gltf *gltf, uint32_t index, const uint8_t **bytes,
-                                   strl_error *err)
+strl_status strl__gltf_decode_view(strl__gltf *gltf, uint32_t index, const uint8_t **bytes, strl_error *err)
 {
     strl__gltf_decoded *found = NULL;
     strl_status status = STRL_OK;

@@ -12,28 +12,25 @@
 typedef struct measure {
     strl__gltf *gltf;
     const strl__gltf_primitive *primitive;
-    double (*places)[2]; /* owned; of the vertices that are loaded, in texels; NULL: those are read one by one */
+    double (*places)[2];   /* owned; of the vertices that are loaded, in texels; NULL: those are read one by one */
     uint64_t first, count; /* these vertices */
-    double log_sum; /* where corners are no one's but their triangle's */
+    double log_sum;        /* where corners are no one's but their triangle's */
     uint64_t log_count;
 } measure;
 
 /* In the image, 1 = all of it. count <= STRL__GLTF_CHUNK */
-static strl_status read_places(strl__gltf *gltf, uint64_t first, size_t count, double (*places)[2],
-                               strl_error *err)
+static strl_status read_places(strl__gltf *gltf, uint64_t first, size_t count, double (*places)[2], strl_error *err)
 {
     const strl__gltf_paint *paint = &gltf->paint;
     const strl__texture *texture = &gltf->reader->textures.items[paint->texture];
-    strl_status status =
-        strl__gltf_read_attribute(gltf, paint->texcoord, gltf->accessors[paint->texcoord].values.normalized,
-                                  paint->draco_id, first, count, err);
+    strl_status status = strl__gltf_read_attribute(
+        gltf, paint->texcoord, gltf->accessors[paint->texcoord].values.normalized, paint->draco_id, first, count, err);
     for (size_t i = 0; i < count && !status; i++)
         strl__texture_place(texture, gltf->values + 2 * i, places[i]);
     return status;
 }
 
-static strl_status read_texels(measure *self, uint64_t first, size_t count, double (*texels)[2],
-                               strl_error *err)
+static strl_status read_texels(measure *self, uint64_t first, size_t count, double (*texels)[2], strl_error *err)
 {
     const strl__image *image = self->gltf->paint.image;
     strl_status status = read_places(self->gltf, first, count, texels, err);
@@ -133,8 +130,7 @@ static strl_status measure_vertices(measure *self, strl_error *err)
     if (is_shared)
         paint->footprints = strl__alloc_zero((size_t)self->count, sizeof *paint->footprints);
     if ((!is_scattered && !self->places) || (is_shared && !paint->footprints))
-        status = strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for texture coordinates",
-                            self->gltf->reader->path);
+        status = strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for texture coordinates", self->gltf->reader->path);
     if (!status && !is_scattered)
         status = read_all_places(self, err);
     if (!status)
@@ -146,8 +142,7 @@ static strl_status measure_vertices(measure *self, strl_error *err)
 }
 
 /* What the vertices of the primitive stand for, unless that is known from the placement before. */
-static strl_status measure_primitive(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                     strl_error *err)
+static strl_status measure_primitive(strl__gltf *gltf, const strl__gltf_primitive *primitive, strl_error *err)
 {
     strl__gltf_paint *paint = &gltf->paint;
     const strl__gltf_pass *pass = &gltf->pass;
@@ -173,8 +168,7 @@ static strl_status measure_primitive(strl__gltf *gltf, const strl__gltf_primitiv
     return status;
 }
 
-strl_status strl__gltf_begin_paint(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                   strl_error *err)
+strl_status strl__gltf_begin_paint(strl__gltf *gltf, const strl__gltf_primitive *primitive, strl_error *err)
 {
     strl__gltf_paint *paint = &gltf->paint;
     const uint32_t texcoord = strl__gltf_texcoord(gltf, primitive);
@@ -185,8 +179,7 @@ strl_status strl__gltf_begin_paint(strl__gltf *gltf, const strl__gltf_primitive 
     const strl__gltf_material *material = &gltf->materials[primitive->material];
     paint->texture = material->texture;
     paint->draco_id = primitive->draco ? primitive->draco->texcoord[material->set] : STRL__NO_ITEM;
-    strl_status status =
-        strl__textures_get(&gltf->reader->textures, material->texture, &paint->image, err);
+    strl_status status = strl__textures_get(&gltf->reader->textures, material->texture, &paint->image, err);
     if (status || !paint->image)
         return status;
     return measure_primitive(gltf, primitive, err);
@@ -198,9 +191,8 @@ void strl__gltf_end_paint(strl__gltf *gltf)
     gltf->paint.image = NULL;
 }
 
-strl_status strl__gltf_paint_corners(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                     uint64_t first, size_t count, strl__corner *corners,
-                                     strl_error *err)
+strl_status strl__gltf_paint_corners(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t first,
+                                     size_t count, strl__corner *corners, strl_error *err)
 {
     const strl__gltf_paint *paint = &gltf->paint;
     const strl__textures *textures = &gltf->reader->textures;
@@ -217,12 +209,11 @@ strl_status strl__gltf_paint_corners(strl__gltf *gltf, const strl__gltf_primitiv
         double texel[4];
         spot.u = places[i][0];
         spot.v = places[i][1];
-        spot.footprint = paint->footprints ? strl__footprint_side(paint->footprints[first - paint->first + i])
-                                           : paint->footprint;
+        spot.footprint =
+            paint->footprints ? strl__footprint_side(paint->footprints[first - paint->first + i]) : paint->footprint;
         strl__image_sample(paint->image, srgb, &spot, texel);
         corners[i].colour =
-            strl__pack_colour(strl__srgb_encode(srgb, texel[0] * tint[0]),
-                              strl__srgb_encode(srgb, texel[1] * tint[1]),
+            strl__pack_colour(strl__srgb_encode(srgb, texel[0] * tint[0]), strl__srgb_encode(srgb, texel[1] * tint[1]),
                               strl__srgb_encode(srgb, texel[2] * tint[2]),
                               strl__gltf_alpha(gltf, primitive->material, texel[3] * tint[3]));
     }

@@ -22,17 +22,15 @@ static void *keep(strl__gltf *gltf, strl__fields *fields, size_t bytes)
     return block;
 }
 
-char *strl__gltf_keep_text(strl__gltf *gltf, strl__fields *fields, const json_t *value,
-                           const char *key)
+char *strl__gltf_keep_text(strl__gltf *gltf, strl__fields *fields, const json_t *value, const char *key)
 {
     const char *text = strl__fields_text(fields, value, key);
     char *copy = text ? keep(gltf, fields, strlen(text) + 1) : NULL;
     return copy ? strcpy(copy, text) : NULL;
 }
 
-#define ADD(gltf, list, count, capacity, err)                                                      \
-    strl__gltf_add(gltf, &(gltf)->list, &(gltf)->count, &(gltf)->capacity, sizeof *(gltf)->list,   \
-                   err)
+#define ADD(gltf, list, count, capacity, err)                                                                          \
+    strl__gltf_add(gltf, &(gltf)->list, &(gltf)->count, &(gltf)->capacity, sizeof *(gltf)->list, err)
 
 /* ---- buffers, views, accessors */
 
@@ -49,8 +47,7 @@ static strl_status parse_buffer(strl__gltf *gltf, strl__fields *fields, const js
 }
 
 /* The index of a word in a list that ends with NULL. */
-static unsigned parse_word(strl__fields *fields, const json_t *value, const char *key,
-                           const char *const *words)
+static unsigned parse_word(strl__fields *fields, const json_t *value, const char *key, const char *const *words)
 {
     const char *text = strl__fields_text(fields, value, key);
     unsigned index = 0;
@@ -64,8 +61,7 @@ static unsigned parse_word(strl__fields *fields, const json_t *value, const char
     return 0;
 }
 
-static strl__gltf_meshopt *parse_meshopt(strl__gltf *gltf, strl__fields *fields,
-                                         const json_t *value)
+static strl__gltf_meshopt *parse_meshopt(strl__gltf *gltf, strl__fields *fields, const json_t *value)
 {
     static const char *const modes[] = {"ATTRIBUTES", "TRIANGLES", "INDICES", NULL};
     static const char *const filters[] = {"NONE", "OCTAHEDRAL", "QUATERNION", "EXPONENTIAL", NULL};
@@ -139,8 +135,7 @@ static uint8_t parse_components(strl__fields *fields, const json_t *value)
     static const struct {
         const char *type;
         uint8_t components;
-    } types[] = {{"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4},
-                 {"MAT2", 4},   {"MAT3", 9}, {"MAT4", 16}};
+    } types[] = {{"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}, {"MAT2", 4}, {"MAT3", 9}, {"MAT4", 16}};
     strl__fields_require(fields, value, "type");
     const char *text = strl__fields_text(fields, value, "type");
     for (size_t i = 0; text && i < sizeof types / sizeof *types; i++)
@@ -172,8 +167,7 @@ static strl__gltf_sparse *parse_sparse(strl__gltf *gltf, strl__fields *fields, c
     sparse->indices = parse_column(fields, indices);
     sparse->indices.components = 1;
     sparse->indices.type = parse_component_type(fields, indices);
-    if (sparse->indices.type != STRL__U8 && sparse->indices.type != STRL__U16 &&
-        sparse->indices.type != STRL__U32)
+    if (sparse->indices.type != STRL__U8 && sparse->indices.type != STRL__U16 && sparse->indices.type != STRL__U32)
         strl__fields_fail(fields, "sparse.indices.componentType", "an unsigned type");
     sparse->values = parse_column(fields, values);
     sparse->values.components = elements->components;
@@ -204,17 +198,14 @@ static strl_status parse_accessor(strl__gltf *gltf, strl__fields *fields, const 
 
 /* ---- meshes */
 
-static void parse_texcoords(strl__fields *fields, const json_t *attributes,
-                            uint32_t texcoord[STRL__GLTF_SETS])
+static void parse_texcoords(strl__fields *fields, const json_t *attributes, uint32_t texcoord[STRL__GLTF_SETS])
 {
-    static const char *const names[STRL__GLTF_SETS] = {"TEXCOORD_0", "TEXCOORD_1", "TEXCOORD_2",
-                                                       "TEXCOORD_3"};
+    static const char *const names[STRL__GLTF_SETS] = {"TEXCOORD_0", "TEXCOORD_1", "TEXCOORD_2", "TEXCOORD_3"};
     for (unsigned set = 0; set < STRL__GLTF_SETS; set++)
         texcoord[set] = strl__fields_index(fields, attributes, names[set]);
 }
 
-static strl__gltf_draco_use *parse_draco(strl__gltf *gltf, strl__fields *fields,
-                                         const json_t *value)
+static strl__gltf_draco_use *parse_draco(strl__gltf *gltf, strl__fields *fields, const json_t *value)
 {
     const json_t *attributes = strl__fields_object(fields, value, "attributes");
     strl__gltf_draco_use *draco = keep(gltf, fields, sizeof *draco);
@@ -260,7 +251,8 @@ static strl_status parse_primitive(strl__gltf *gltf, strl__fields *fields, const
 static strl_status parse_mesh(strl__gltf *gltf, strl__fields *fields, const json_t *value)
 {
     const json_t *list = strl__fields_list(fields, value, "primitives");
-    strl__gltf_mesh mesh = {.part = STRL__NO_ITEM, .name = strl__gltf_keep_text(gltf, fields, value, "name"),
+    strl__gltf_mesh mesh = {.part = STRL__NO_ITEM,
+                            .name = strl__gltf_keep_text(gltf, fields, value, "name"),
                             .first_primitive = (uint32_t)gltf->primitive_count,
                             .primitive_count = (uint32_t)json_array_size(list)};
     strl_status status = fields->status;
@@ -275,14 +267,13 @@ static strl_status parse_mesh(strl__gltf *gltf, strl__fields *fields, const json
 
 /* ---- nodes and scenes */
 
-static strl_status parse_indices(strl__gltf *gltf, strl__fields *fields, const json_t *list,
-                                 const char *key, uint32_t **items, size_t *count, size_t *capacity)
+static strl_status parse_indices(strl__gltf *gltf, strl__fields *fields, const json_t *list, const char *key,
+                                 uint32_t **items, size_t *count, size_t *capacity)
 {
     for (size_t i = 0; !fields->status && i < json_array_size(list); i++) {
         uint32_t index = strl__fields_list_index(fields, list, i, key);
         if (!fields->status)
-            fields->status =
-                strl__gltf_add(gltf, items, count, capacity, sizeof **items, fields->err);
+            fields->status = strl__gltf_add(gltf, items, count, capacity, sizeof **items, fields->err);
         if (!fields->status)
             (*items)[*count - 1] = index;
     }
@@ -305,8 +296,7 @@ static strl__gltf_matrix parse_transform(strl__fields *fields, const json_t *val
     return strl__gltf_compose(translation, rotation, scale);
 }
 
-static strl__gltf_instances *parse_instances(strl__gltf *gltf, strl__fields *fields,
-                                             const json_t *value)
+static strl__gltf_instances *parse_instances(strl__gltf *gltf, strl__fields *fields, const json_t *value)
 {
     const json_t *attributes = strl__fields_object(fields, value, "attributes");
     strl__gltf_instances *instances = keep(gltf, fields, sizeof *instances);
@@ -336,8 +326,8 @@ static strl_status parse_node(strl__gltf *gltf, strl__fields *fields, const json
                             .local = parse_transform(fields, value)};
     if (instances)
         node.instances = parse_instances(gltf, fields, instances);
-    strl_status status = parse_indices(gltf, fields, list, "children", &gltf->children,
-                                       &gltf->child_count, &gltf->child_capacity);
+    strl_status status =
+        parse_indices(gltf, fields, list, "children", &gltf->children, &gltf->child_count, &gltf->child_capacity);
     if (!status)
         status = ADD(gltf, nodes, node_count, node_capacity, fields->err);
     if (!status)
@@ -348,14 +338,12 @@ static strl_status parse_node(strl__gltf *gltf, strl__fields *fields, const json
 static strl_status parse_scene(strl__gltf *gltf, strl__fields *fields, const json_t *value)
 {
     const json_t *list = strl__fields_list(fields, value, "nodes");
-    strl__gltf_scene scene = {.first_root = (uint32_t)gltf->root_count,
-                              .root_count = (uint32_t)json_array_size(list)};
+    strl__gltf_scene scene = {.first_root = (uint32_t)gltf->root_count, .root_count = (uint32_t)json_array_size(list)};
     strl_status status = fields->status;
     if (!status && !json_is_object(value))
         strl__fields_fail(fields, "", "an object");
     if (!status)
-        status = parse_indices(gltf, fields, list, "nodes", &gltf->roots, &gltf->root_count,
-                               &gltf->root_capacity);
+        status = parse_indices(gltf, fields, list, "nodes", &gltf->roots, &gltf->root_count, &gltf->root_capacity);
     if (!status)
         status = ADD(gltf, scenes, scene_count, scene_capacity, fields->err);
     if (!status)
@@ -375,8 +363,7 @@ static strl_status parse_asset(strl__gltf *gltf, strl__fields *fields, const jso
     if (version && strncmp(version, "2.", 2) == 0 && (!least || strcmp(least, "2.0") == 0))
         return STRL_OK;
     gltf->reader->is_foreign = !gltf->has_binary && version && strncmp(version, "1.", 2) == 0;
-    return strl__fail(fields->err, STRL_ERR_UNSUPPORTED,
-                      "%s: expected glTF 2.0, found version %.20s", fields->path,
+    return strl__fail(fields->err, STRL_ERR_UNSUPPORTED, "%s: expected glTF 2.0, found version %.20s", fields->path,
                       least     ? least
                       : version ? version
                                 : "unknown");
@@ -387,12 +374,11 @@ static strl_status parse_asset(strl__gltf *gltf, strl__fields *fields, const jso
 static bool is_known_extension(const char *name)
 {
     static const char *const known[] = {
-        "KHR_draco_mesh_compression", "EXT_meshopt_compression", "EXT_mesh_gpu_instancing",
-        "KHR_mesh_quantization",      "KHR_texture_transform",   "KHR_texture_basisu",
-        "EXT_texture_webp",           "EXT_texture_avif",        "MSFT_texture_dds",
-        "KHR_lights_punctual",        "KHR_xmp_json_ld",         "KHR_animation_pointer",
-        "EXT_mesh_features",          "EXT_instance_features",   "EXT_structural_metadata",
-        "KHR_techniques_webgl",       "KHR_technique_webgl",
+        "KHR_draco_mesh_compression", "EXT_meshopt_compression", "EXT_mesh_gpu_instancing", "KHR_mesh_quantization",
+        "KHR_texture_transform",      "KHR_texture_basisu",      "EXT_texture_webp",        "EXT_texture_avif",
+        "MSFT_texture_dds",           "KHR_lights_punctual",     "KHR_xmp_json_ld",         "KHR_animation_pointer",
+        "EXT_mesh_features",          "EXT_instance_features",   "EXT_structural_metadata", "KHR_techniques_webgl",
+        "KHR_technique_webgl",
     };
     static const char materials[] = "KHR_materials_";
     if (strncmp(name, materials, sizeof materials - 1) == 0)
@@ -419,8 +405,7 @@ static strl_status parse_required(strl__gltf *gltf, strl__fields *fields, const 
 
 static strl_status parse_default_scene(strl__gltf *gltf, strl__fields *fields, const json_t *value)
 {
-    if (!json_is_integer(value) || json_integer_value(value) < 0 ||
-        json_integer_value(value) >= STRL__NO_ITEM)
+    if (!json_is_integer(value) || json_integer_value(value) < 0 || json_integer_value(value) >= STRL__NO_ITEM)
         strl__fields_fail(fields, "", "an index");
     else
         gltf->scene = (uint32_t)json_integer_value(value);
@@ -482,26 +467,23 @@ static bool wants(void *context, const char *member)
     return member_index(member) < sizeof members / sizeof *members;
 }
 
-static strl_status take(void *context, const char *member, uint64_t index, const json_t *value,
-                        strl_error *err)
+static strl_status take(void *context, const char *member, uint64_t index, const json_t *value, strl_error *err)
 {
     strl__gltf *gltf = context;
     const char *path = gltf->reader->path;
     const size_t which = member_index(member);
     strl__fields fields = {.path = path, .member = member, .index = index, .err = err};
-    if (members[which].is_list && index == STRL__JSON_WHOLE && json_is_object(value) &&
-        !gltf->has_asset && !gltf->has_binary)
+    if (members[which].is_list && index == STRL__JSON_WHOLE && json_is_object(value) && !gltf->has_asset &&
+        !gltf->has_binary)
         gltf->reader->is_foreign = true; /* as glTF 1 has it */
     const bool is_wrong = members[which].is_list != (index != STRL__JSON_WHOLE);
     if (is_wrong && members[which].is_optional)
         return STRL_OK;
     if (is_wrong)
         return members[which].is_list
-                   ? strl__fail(err, STRL_ERR_UNSUPPORTED,
-                                "%s: expected glTF 2.0, whose %s are a list, found %s", path,
+                   ? strl__fail(err, STRL_ERR_UNSUPPORTED, "%s: expected glTF 2.0, whose %s are a list, found %s", path,
                                 member, json_is_object(value) ? "an object, as in glTF 1" : "none")
-                   : strl__fail(err, STRL_ERR_FORMAT, "%s: expected its %s not to be a list", path,
-                                member);
+                   : strl__fail(err, STRL_ERR_FORMAT, "%s: expected its %s not to be a list", path, member);
     if (index == 0 || index == STRL__JSON_WHOLE) {
         if (gltf->seen >> which & 1)
             return strl__fail(err, STRL_ERR_FORMAT, "%s: its %s stand in it twice", path, member);
@@ -538,8 +520,7 @@ strl_status strl__gltf_parse(strl__gltf *gltf, strl_error *err)
     if (!status && gltf->is_counting)
         return strl__gltf_refuse_tables(gltf, err);
     if (!status && !gltf->has_asset)
-        status = strl__fail(err, STRL_ERR_FORMAT,
-                            "%s: expected an asset of version 2.0 in its JSON, found none",
+        status = strl__fail(err, STRL_ERR_FORMAT, "%s: expected an asset of version 2.0 in its JSON, found none",
                             reader->path);
     return status;
 }

@@ -6,8 +6,8 @@
 #include "base/fail.h"
 #include "readers/gltf.h"
 
-/* A tree of its own costs a page and a draw for each placement: small meshes, and those that are few triangles even with all
- * their copies, stay with the rest. */
+/* A tree of its own costs a page and a draw for each placement: small meshes, and those that are few triangles even
+ * with all their copies, stay with the rest. */
 #define LEAST_TRIANGLES 256u
 #define LEAST_COPIED_TRIANGLES 4096u
 
@@ -104,8 +104,8 @@ static bool is_placed(const strl__gltf *gltf, const strl__gltf_node *node)
     return node->mesh != STRL__NO_ITEM && gltf->meshes[node->mesh].piece;
 }
 
-/* Known at once, because trees of the pieces before need the tables of names to be whole. Of a placement it is the node's, as if it
- * were a copy. */
+/* Known at once, because trees of the pieces before need the tables of names to be whole. Of a placement it is the
+ * node's, as if it were a copy. */
 static strl_status list_names(strl__gltf *gltf, strl_error *err)
 {
     strl_status status = STRL_OK;

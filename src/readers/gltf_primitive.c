@@ -15,8 +15,7 @@ static strl_status check_announced(strl__gltf *gltf, const strl__gltf_primitive 
     /* Of a strip the accessor counts the corners of the strip. */
     const uint64_t faces_most = strl__gltf_triangle_count(primitive->mode, gltf->accessors[primitive->indices].count);
     if (strl__draco_announced(packed, size, facts))
-        return strl__fail(err, STRL_ERR_FORMAT,
-                          "%s, bufferViews[%u]: expected a Draco mesh of version 2.2",
+        return strl__fail(err, STRL_ERR_FORMAT, "%s, bufferViews[%u]: expected a Draco mesh of version 2.2",
                           gltf->reader->path, primitive->draco->view);
     if (facts->faces > faces_most || facts->points > gltf->accessors[primitive->position].count)
         return strl__fail(err, STRL_ERR_FORMAT,
@@ -28,23 +27,20 @@ static strl_status check_announced(strl__gltf *gltf, const strl__gltf_primitive 
     return strl__gltf_make_room(gltf, facts->connectivity_bytes, "a Draco mesh's faces alone", err);
 }
 
-static strl_status check_decoded(const strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                 strl_error *err)
+static strl_status check_decoded(const strl__gltf *gltf, const strl__gltf_primitive *primitive, strl_error *err)
 {
     const strl__gltf_draco_use *use = primitive->draco;
     const uint32_t texcoord = strl__gltf_texcoord(gltf, primitive);
     const uint32_t ids[4] = {use->position, use->normal, use->colour,
-                             texcoord == STRL__NO_ITEM
-                                 ? STRL__NO_ITEM
-                                 : use->texcoord[gltf->materials[primitive->material].set]};
-    const uint32_t accessors[4] = {primitive->position, primitive->normal, primitive->colour,
-                                   texcoord};
+                             texcoord == STRL__NO_ITEM ? STRL__NO_ITEM
+                                                       : use->texcoord[gltf->materials[primitive->material].set]};
+    const uint32_t accessors[4] = {primitive->position, primitive->normal, primitive->colour, texcoord};
     const uint64_t points = strl__draco_point_count(gltf->draco);
     for (unsigned i = 0; i < 4; i++)
         if (accessors[i] != STRL__NO_ITEM &&
             (points > gltf->accessors[accessors[i]].count ||
-             (ids[i] != STRL__NO_ITEM && strl__draco_components(gltf->draco, ids[i]) !=
-                                             gltf->accessors[accessors[i]].values.components)))
+             (ids[i] != STRL__NO_ITEM &&
+              strl__draco_components(gltf->draco, ids[i]) != gltf->accessors[accessors[i]].values.components)))
             return strl__fail(err, STRL_ERR_FORMAT,
                               "%s, bufferViews[%u]: its %" PRIu64 " Draco points do not fit "
                               "accessors[%u]",
@@ -79,20 +75,16 @@ static strl_status decode_announced(strl__gltf *gltf, const strl__gltf_primitive
     return STRL_OK;
 }
 
-static strl_status decode_draco(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                strl_error *err)
+static strl_status decode_draco(strl__gltf *gltf, const strl__gltf_primitive *primitive, strl_error *err)
 {
     const strl__gltf_view *view = &gltf->views[primitive->draco->view];
     strl__draco_facts facts;
-    strl_status status =
-        strl__gltf_make_room(gltf, view->bytes, "a Draco mesh's compressed form", err);
+    strl_status status = strl__gltf_make_room(gltf, view->bytes, "a Draco mesh's compressed form", err);
     uint8_t *packed = status ? NULL : strl__alloc((size_t)view->bytes, 1);
     if (!status && !packed)
-        status =
-            strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a Draco mesh", gltf->reader->path);
+        status = strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a Draco mesh", gltf->reader->path);
     if (!status)
-        status =
-            strl__gltf_read_view(gltf, primitive->draco->view, 0, packed, (size_t)view->bytes, err);
+        status = strl__gltf_read_view(gltf, primitive->draco->view, 0, packed, (size_t)view->bytes, err);
     if (!status)
         status = check_announced(gltf, primitive, packed, (size_t)view->bytes, &facts, err);
     if (!status)
@@ -104,8 +96,7 @@ static strl_status decode_draco(strl__gltf *gltf, const strl__gltf_primitive *pr
 }
 
 /* Has the mesh of a compressed primitive at hand, and none else. */
-static strl_status open_draco(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                              strl_error *err)
+static strl_status open_draco(strl__gltf *gltf, const strl__gltf_primitive *primitive, strl_error *err)
 {
     const uint32_t index = (uint32_t)(primitive - gltf->primitives);
     if (gltf->draco && gltf->draco_primitive == index && primitive->draco)
@@ -133,8 +124,7 @@ strl_status strl__gltf_read_attribute(strl__gltf *gltf, uint32_t index, bool nor
     if (!gltf->draco || draco_id == STRL__NO_ITEM)
         return strl__gltf_read_numbers(gltf, index, normalized, first, count, gltf->values, err);
     if (strl__draco_numbers(gltf->draco, draco_id, first, count, column->components, gltf->values))
-        return strl__fail(err, STRL_ERR_FORMAT,
-                          "%s: the Draco attribute %u has no numbers for accessors[%u]",
+        return strl__fail(err, STRL_ERR_FORMAT, "%s: the Draco attribute %u has no numbers for accessors[%u]",
                           gltf->reader->path, draco_id, index);
     for (size_t i = 0; normalized && i < count * column->components; i++)
         gltf->values[i] = strl__gltf_denormalize(column->type, gltf->values[i]);
@@ -170,43 +160,38 @@ static void place_normals(strl__gltf *gltf, strl__corner *corners, size_t count)
     }
 }
 
-static void place_colours(strl__gltf *gltf, uint32_t material, unsigned components,
-                          strl__corner *corners, size_t count)
+static void place_colours(strl__gltf *gltf, uint32_t material, unsigned components, strl__corner *corners, size_t count)
 {
     const strl__srgb *srgb = &gltf->reader->textures.srgb;
     for (size_t i = 0; i < count; i++) {
         const double *c = gltf->values + components * i;
-        corners[i].colour =
-            strl__pack_colour(strl__srgb_encode(srgb, c[0]), strl__srgb_encode(srgb, c[1]),
-                              strl__srgb_encode(srgb, c[2]),
-                              strl__gltf_alpha(gltf, material, components == 4 ? c[3] : 1));
+        corners[i].colour = strl__pack_colour(strl__srgb_encode(srgb, c[0]), strl__srgb_encode(srgb, c[1]),
+                                              strl__srgb_encode(srgb, c[2]),
+                                              strl__gltf_alpha(gltf, material, components == 4 ? c[3] : 1));
     }
 }
 
 /* Of vertices under an image: their own colours, white where there are none. */
-static strl_status read_tints(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                              uint32_t draco_id, uint64_t first, size_t count, strl_error *err)
+static strl_status read_tints(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint32_t draco_id,
+                              uint64_t first, size_t count, strl_error *err)
 {
     for (size_t i = 0; i < 4 * count; i++)
         gltf->tints[i] = 1;
     if (primitive->colour == STRL__NO_ITEM)
         return STRL_OK;
     const unsigned components = gltf->accessors[primitive->colour].values.components;
-    strl_status status =
-        strl__gltf_read_attribute(gltf, primitive->colour, true, draco_id, first, count, err);
+    strl_status status = strl__gltf_read_attribute(gltf, primitive->colour, true, draco_id, first, count, err);
     for (size_t i = 0; i < count * components && !status; i++)
         gltf->tints[4 * (i / components) + i % components] = gltf->values[i];
     return status;
 }
 
 /* count <= STRL__GLTF_CHUNK */
-static strl_status read_corners(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                uint64_t first, size_t count, strl__corner *corners,
-                                strl_error *err)
+static strl_status read_corners(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t first, size_t count,
+                                strl__corner *corners, strl_error *err)
 {
     static const strl__gltf_draco_use none = {
-        0, STRL__NO_ITEM, STRL__NO_ITEM, STRL__NO_ITEM,
-        {STRL__NO_ITEM, STRL__NO_ITEM, STRL__NO_ITEM, STRL__NO_ITEM}};
+        0, STRL__NO_ITEM, STRL__NO_ITEM, STRL__NO_ITEM, {STRL__NO_ITEM, STRL__NO_ITEM, STRL__NO_ITEM, STRL__NO_ITEM}};
     const strl__gltf_draco_use *draco = primitive->draco ? primitive->draco : &none;
     strl_status status =
         strl__gltf_read_attribute(gltf, primitive->position, gltf->accessors[primitive->position].values.normalized,
@@ -220,8 +205,7 @@ static strl_status read_corners(strl__gltf *gltf, const strl__gltf_primitive *pr
     }
     place_positions(gltf, corners, count);
     if (primitive->normal != STRL__NO_ITEM) {
-        status =
-            strl__gltf_read_attribute(gltf, primitive->normal, true, draco->normal, first, count, err);
+        status = strl__gltf_read_attribute(gltf, primitive->normal, true, draco->normal, first, count, err);
         if (!status)
             place_normals(gltf, corners, count);
     }
@@ -232,11 +216,10 @@ static strl_status read_corners(strl__gltf *gltf, const strl__gltf_primitive *pr
     if (status || gltf->paint.image)
         return status;
     if (!status && primitive->colour != STRL__NO_ITEM) {
-        status =
-            strl__gltf_read_attribute(gltf, primitive->colour, true, draco->colour, first, count, err);
+        status = strl__gltf_read_attribute(gltf, primitive->colour, true, draco->colour, first, count, err);
         if (!status)
-            place_colours(gltf, primitive->material,
-                          gltf->accessors[primitive->colour].values.components, corners, count);
+            place_colours(gltf, primitive->material, gltf->accessors[primitive->colour].values.components, corners,
+                          count);
     }
     return status;
 }
@@ -255,13 +238,10 @@ static strl__layout corner_layout(void)
         layout.colour[i] = (strl__field){(uint32_t)offsetof(strl__corner, colour) + byte, STRL__U8};
     }
     for (uint32_t i = 0; i < 3; i++) {
-        layout.position[i] =
-            (strl__field){(uint32_t)offsetof(strl__corner, position) + 8 * i, STRL__F64};
+        layout.position[i] = (strl__field){(uint32_t)offsetof(strl__corner, position) + 8 * i, STRL__F64};
         if (i < 2)
-            layout.texcoord[i] =
-                (strl__field){(uint32_t)offsetof(strl__corner, texcoord) + 4 * i, STRL__F32};
-        layout.normal[i] =
-            (strl__field){(uint32_t)offsetof(strl__corner, normal) + 4 * i, STRL__F32};
+            layout.texcoord[i] = (strl__field){(uint32_t)offsetof(strl__corner, texcoord) + 4 * i, STRL__F32};
+        layout.normal[i] = (strl__field){(uint32_t)offsetof(strl__corner, normal) + 4 * i, STRL__F32};
     }
     return layout;
 }
@@ -270,21 +250,18 @@ void strl__gltf_empty_table(strl_reader *reader)
 {
     const strl__layout layout = corner_layout();
     strl__table_deinit(&reader->vertices);
-    strl__table_build(&reader->vertices, &layout, reader->scratch_dir,
-                      strl__gltf_table_bytes(reader));
+    strl__table_build(&reader->vertices, &layout, reader->scratch_dir, strl__gltf_table_bytes(reader));
 }
 
 /* Those that its indices use, into the reader's table. */
-static strl_status load_vertices(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                 strl_error *err)
+static strl_status load_vertices(strl__gltf *gltf, const strl__gltf_primitive *primitive, strl_error *err)
 {
     strl_reader *reader = gltf->reader;
     const uint64_t total = gltf->pass.loaded_count, begin = gltf->pass.first_loaded;
     strl_status status = STRL_OK;
     strl__gltf_empty_table(reader);
     for (uint64_t first = 0; first < total && !status; first += STRL__GLTF_CHUNK) {
-        size_t count =
-            total - first < STRL__GLTF_CHUNK ? (size_t)(total - first) : STRL__GLTF_CHUNK;
+        size_t count = total - first < STRL__GLTF_CHUNK ? (size_t)(total - first) : STRL__GLTF_CHUNK;
         status = read_corners(gltf, primitive, begin + first, count, gltf->corners, err);
         for (size_t i = 0; i < count && !status; i++)
             status = strl__table_append(&reader->vertices, &gltf->corners[i], err);
@@ -308,9 +285,8 @@ static strl_status name_part(strl__gltf *gltf, strl_error *err)
                           : strl__gltf_name_part(gltf, pass->node, &pass->part, err);
 }
 
-strl_status strl__gltf_read_elements(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                     uint64_t first, size_t count, uint32_t *elements,
-                                     strl_error *err)
+strl_status strl__gltf_read_elements(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t first,
+                                     size_t count, uint32_t *elements, strl_error *err)
 {
     if (!gltf->draco)
         return strl__gltf_read_indices(gltf, primitive->indices, first, count, elements, err);
@@ -326,8 +302,7 @@ static strl_status index_fail(const strl__gltf *gltf, const strl__gltf_primitive
                       gltf->reader->path, primitive->indices, gltf->pass.vertex_count, found, triangle);
 }
 
-static strl_status read_first(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                              strl_error *err)
+static strl_status read_first(strl__gltf *gltf, const strl__gltf_primitive *primitive, strl_error *err)
 {
     uint64_t vertex = 0;
     strl_status status = STRL_OK;
@@ -348,8 +323,7 @@ unsigned strl__gltf_mode_of(const strl__gltf_primitive *primitive)
     return primitive->draco ? 4 : primitive->mode;
 }
 
-strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                       strl_error *err)
+strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primitive *primitive, strl_error *err)
 {
     strl__gltf_pass *pass = &gltf->pass;
     gltf->paint.image = NULL; /* of the placement before: from now on it may be given up */
@@ -359,10 +333,10 @@ strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primit
     if (status)
         return status;
     strl__gltf_derive(pass);
-    uint64_t elements = gltf->draco ? 3 * strl__draco_face_count(gltf->draco)
-                                    : strl__gltf_element_count(gltf, primitive);
-    pass->vertex_count = gltf->draco ? strl__draco_point_count(gltf->draco)
-                                     : gltf->accessors[primitive->position].count;
+    uint64_t elements =
+        gltf->draco ? 3 * strl__draco_face_count(gltf->draco) : strl__gltf_element_count(gltf, primitive);
+    pass->vertex_count =
+        gltf->draco ? strl__draco_point_count(gltf->draco) : gltf->accessors[primitive->position].count;
     pass->triangle = 0;
     pass->is_scattered = false;
     pass->first_loaded = 0;
@@ -376,8 +350,7 @@ strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primit
         status = strl__gltf_begin_paint(gltf, primitive, err);
     if (status)
         return status;
-    gltf->reader->batch.has_corner_colour =
-        primitive->colour != STRL__NO_ITEM || gltf->paint.image != NULL;
+    gltf->reader->batch.has_corner_colour = primitive->colour != STRL__NO_ITEM || gltf->paint.image != NULL;
     gltf->reader->batch.has_texcoord = gltf->paint.texcoord != STRL__NO_ITEM;
     if (primitive->indices != STRL__NO_ITEM)
         status = load_vertices(gltf, primitive, err);
@@ -385,8 +358,7 @@ strl_status strl__gltf_begin_placement(strl__gltf *gltf, const strl__gltf_primit
         status = read_first(gltf, primitive, err);
     if (!status)
         status = name_part(gltf, err);
-    return status ? status
-                  : strl__gltf_list_material(gltf, primitive->material, &pass->material, err);
+    return status ? status : strl__gltf_list_material(gltf, primitive->material, &pass->material, err);
 }
 
 /* ---- triangles */
@@ -409,8 +381,8 @@ void strl__gltf_corners_of(unsigned mode, uint64_t triangle, size_t in_chunk, ui
     }
 }
 
-static strl_status add_indexed(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                               const uint32_t slots[3], uint64_t triangle, strl_error *err)
+static strl_status add_indexed(strl__gltf *gltf, const strl__gltf_primitive *primitive, const uint32_t slots[3],
+                               uint64_t triangle, strl_error *err)
 {
     const strl__gltf_pass *pass = &gltf->pass;
     strl__batch *batch = &gltf->reader->batch;
@@ -451,8 +423,8 @@ static strl_status look_up(strl__gltf *gltf, const strl__gltf_primitive *primiti
 }
 
 /* The elements of triangles first .. first + count - 1 into elements or corners. */
-static strl_status read_run(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t first,
-                            size_t count, strl_error *err)
+static strl_status read_run(strl__gltf *gltf, const strl__gltf_primitive *primitive, uint64_t first, size_t count,
+                            strl_error *err)
 {
     const unsigned mode = strl__gltf_mode_of(primitive);
     const uint64_t begin = mode == 4 ? 3 * first : mode == 5 ? first : first + 1;
@@ -482,8 +454,7 @@ static void turn(uint32_t slots[3])
     slots[2] = slot;
 }
 
-strl_status strl__gltf_add_triangles(strl__gltf *gltf, const strl__gltf_primitive *primitive,
-                                     strl_error *err)
+strl_status strl__gltf_add_triangles(strl__gltf *gltf, const strl__gltf_primitive *primitive, strl_error *err)
 {
     strl__gltf_pass *pass = &gltf->pass;
     strl__batch *batch = &gltf->reader->batch;

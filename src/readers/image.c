@@ -56,15 +56,15 @@ static uint64_t plan_levels(strl__image *image, unsigned halvings)
     }
 }
 
-strl_status strl__image_begin(strl__image_making *making, uint64_t width, uint64_t height,
-                              uint64_t working_bytes, strl_error *err)
+strl_status strl__image_begin(strl__image_making *making, uint64_t width, uint64_t height, uint64_t working_bytes,
+                              strl_error *err)
 {
     strl__image *image = making->image;
     const uint64_t limit = making->room->limit_bytes, share = making->room->image_bytes;
     uint64_t texels, sums_bytes = 0;
     unsigned halvings = 0;
-    if (width == 0 || height == 0 || width > STRL__IMAGE_SIDE_MAX ||
-        height > STRL__IMAGE_SIDE_MAX || width * height > STRL__IMAGE_TEXELS_MAX)
+    if (width == 0 || height == 0 || width > STRL__IMAGE_SIDE_MAX || height > STRL__IMAGE_SIDE_MAX ||
+        width * height > STRL__IMAGE_TEXELS_MAX)
         return strl__fail(err, STRL_ERR_LIMIT,
                           "has %" PRIu64 " x %" PRIu64 " texels, expected 1 to %u a side and at "
                           "most %" PRIu64 " in all",
@@ -91,8 +91,7 @@ strl_status strl__image_begin(strl__image_making *making, uint64_t width, uint64
     if (halvings)
         making->sums = strl__alloc_zero(image->level[0].width, 4 * sizeof *making->sums);
     if (!image->texels || (halvings && !making->sums))
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory for an image of %" PRIu64 " texels",
-                          texels);
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for an image of %" PRIu64 " texels", texels);
     return STRL_OK;
 }
 
@@ -119,8 +118,8 @@ void strl__image_row(strl__image_making *making, const uint8_t *row)
     if (making->row != (y << halvings) + rows)
         return;
     for (uint32_t x = 0; x < finest->width; x++)
-        end_texel(making->sums + 4 * (size_t)x, making->srgb,
-                  rows * cell_side(x, image->width, halvings), out + 4 * (size_t)x);
+        end_texel(making->sums + 4 * (size_t)x, making->srgb, rows * cell_side(x, image->width, halvings),
+                  out + 4 * (size_t)x);
     memset(making->sums, 0, 4 * sizeof *making->sums * finest->width);
 }
 
@@ -132,13 +131,9 @@ static void make_level(strl__image *image, const strl__srgb *srgb, unsigned numb
             double sums[4] = {0};
             uint32_t count = 0;
             for (uint32_t row = 2 * y; row < 2 * y + 2 && row < from->height; row++)
-                for (uint32_t column = 2 * x; column < 2 * x + 2 && column < from->width;
-                     column++, count++)
-                    add_texel(sums, srgb,
-                              image->texels +
-                                  4 * (from->first + (size_t)row * from->width + column));
-            end_texel(sums, srgb, count,
-                      image->texels + 4 * (to->first + (size_t)y * to->width + x));
+                for (uint32_t column = 2 * x; column < 2 * x + 2 && column < from->width; column++, count++)
+                    add_texel(sums, srgb, image->texels + 4 * (from->first + (size_t)row * from->width + column));
+            end_texel(sums, srgb, count, image->texels + 4 * (to->first + (size_t)y * to->width + x));
         }
 }
 
@@ -150,25 +145,27 @@ static strl_status refuse_kind(const uint8_t *first, size_t size, strl_error *er
         const char *bytes;
         unsigned length, at;
         const char *kind;
-    } kinds[] = {{"\xabKTX 20\xbb", 8, 0, "a KTX2 image"}, {"\xabKTX 11\xbb", 8, 0, "a KTX image"},
-                 {"WEBP", 4, 8, "a WebP image"},           {"BM", 2, 0, "a BMP image"},
-                 {"GIF8", 4, 0, "a GIF image"},            {"DDS ", 4, 0, "a DDS image"},
-                 {"II*\0", 4, 0, "a TIFF image"},          {"MM\0*", 4, 0, "a TIFF image"},
-                 {"ftypavif", 8, 4, "an AVIF image"},      {"\x0a", 1, 0, "perhaps a PCX image"}};
+    } kinds[] = {{"\xabKTX 20\xbb", 8, 0, "a KTX2 image"},
+                 {"\xabKTX 11\xbb", 8, 0, "a KTX image"},
+                 {"WEBP", 4, 8, "a WebP image"},
+                 {"BM", 2, 0, "a BMP image"},
+                 {"GIF8", 4, 0, "a GIF image"},
+                 {"DDS ", 4, 0, "a DDS image"},
+                 {"II*\0", 4, 0, "a TIFF image"},
+                 {"MM\0*", 4, 0, "a TIFF image"},
+                 {"ftypavif", 8, 4, "an AVIF image"},
+                 {"\x0a", 1, 0, "perhaps a PCX image"}};
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++)
-        if (size >= kinds[i].at + kinds[i].length &&
-            memcmp(first + kinds[i].at, kinds[i].bytes, kinds[i].length) == 0)
+        if (size >= kinds[i].at + kinds[i].length && memcmp(first + kinds[i].at, kinds[i].bytes, kinds[i].length) == 0)
             return strl__fail(err, STRL_ERR_UNSUPPORTED, "is %s, which is not read", kinds[i].kind);
     return strl__fail(err, STRL_ERR_UNSUPPORTED, "is neither a PNG nor a JPEG image");
 }
 
-strl_status strl__image_read(const strl__image_making *making, uint64_t at, void *data, size_t size,
-                             strl_error *err)
+strl_status strl__image_read(const strl__image_making *making, uint64_t at, void *data, size_t size, strl_error *err)
 {
     const strl__image_source *source = making->source;
     if (size == 0 || at > source->bytes || size > source->bytes - at)
-        return strl__fail(err, STRL_ERR_FORMAT, "is cut off after %" PRIu64 " bytes",
-                          source->bytes);
+        return strl__fail(err, STRL_ERR_FORMAT, "is cut off after %" PRIu64 " bytes", source->bytes);
     strl_status status = source->read(source->context, at, data, size, err);
     return status ? strl__fail_context(err, status, "cannot be read") : STRL_OK;
 }
@@ -191,15 +188,14 @@ static strl_status decode(strl__image_making *making, strl_error *err)
     return refuse_kind(first, size, err);
 }
 
-strl_status strl__image_decode(const strl__image_source *source, const strl__image_room *room,
-                               const strl__srgb *srgb, strl__image *image, strl_error *err)
+strl_status strl__image_decode(const strl__image_source *source, const strl__image_room *room, const strl__srgb *srgb,
+                               strl__image *image, strl_error *err)
 {
     strl__image_making making = {.source = source, .room = room, .srgb = srgb, .image = image};
     *image = (strl__image){0};
     strl_status status = decode(&making, err);
     if (!status && making.row != image->height)
-        status = strl__fail(err, STRL_ERR_FORMAT, "ends after %u of its %u rows", making.row,
-                            image->height);
+        status = strl__fail(err, STRL_ERR_FORMAT, "ends after %u of its %u rows", making.row, image->height);
     for (unsigned i = 1; i < image->level_count && !status; i++)
         make_level(image, srgb, i);
     strl__free(making.sums);
@@ -251,12 +247,11 @@ static void sample_level(const strl__image *image, unsigned number, const strl__
     double weights = 0, sums[4] = {0};
     for (unsigned corner = 0; corner < 4; corner++) {
         const unsigned right = corner & 1, below = corner >> 1;
-        const double share = (right ? x - (double)left : 1 - (x - (double)left)) *
-                             (below ? y - (double)top : 1 - (y - (double)top));
+        const double share =
+            (right ? x - (double)left : 1 - (x - (double)left)) * (below ? y - (double)top : 1 - (y - (double)top));
         const uint32_t column = wrap(left + right, level->width, spot->wrap[0]);
         const uint32_t row = wrap(top + below, level->height, spot->wrap[1]);
-        const uint8_t *texel =
-            image->texels + 4 * (level->first + (size_t)row * level->width + column);
+        const uint8_t *texel = image->texels + 4 * (level->first + (size_t)row * level->width + column);
         const double weight = share * weight_of(texel[3]);
         for (unsigned i = 0; i < 3; i++)
             sums[i] += srgb->linear[texel[i]] * weight;
@@ -270,8 +265,7 @@ static void sample_level(const strl__image *image, unsigned number, const strl__
 
 /* A level's texels are squares of 2^level of the file's, and looking up between four of them covers
  * about two. */
-void strl__image_sample(const strl__image *image, const strl__srgb *srgb,
-                        const strl__image_spot *spot, double rgba[4])
+void strl__image_sample(const strl__image *image, const strl__srgb *srgb, const strl__image_spot *spot, double rgba[4])
 {
     double coarse[4], side = (double)((uint64_t)1 << image->halvings);
     unsigned number = 0;

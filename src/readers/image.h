@@ -40,7 +40,7 @@ typedef struct strl__image {
 typedef struct strl__image_room {
     uint64_t limit_bytes;
     uint64_t image_bytes; /* of them for the image alone, which is halved until it fits; 0 = all */
-    const char *advice; /* static: how to get more; NULL: none */
+    const char *advice;   /* static: how to get more; NULL: none */
     void *context;
     /* Called once, before they are taken; bytes <= limit. May be NULL. */
     void (*make)(void *context, uint64_t bytes);
@@ -48,8 +48,8 @@ typedef struct strl__image_room {
 
 /* STRL_ERR_MEMORY where the heap ends; any other failure is the file's, and `err` says why in words
  * that follow its name: "is cut off". */
-strl_status strl__image_decode(const strl__image_source *source, const strl__image_room *room,
-                               const strl__srgb *srgb, strl__image *image, strl_error *err);
+strl_status strl__image_decode(const strl__image_source *source, const strl__image_room *room, const strl__srgb *srgb,
+                               strl__image *image, strl_error *err);
 void strl__image_deinit(strl__image *image);
 
 typedef enum strl__wrap { STRL__WRAP_REPEAT, STRL__WRAP_CLAMP, STRL__WRAP_MIRROR } strl__wrap;
@@ -62,7 +62,6 @@ typedef struct strl__image_spot {
 } strl__image_spot;
 
 /* Linear light R, G, B, and A, each 0..1: between the two levels next to the footprint. */
-void strl__image_sample(const strl__image *image, const strl__srgb *srgb,
-                        const strl__image_spot *spot, double rgba[4]);
+void strl__image_sample(const strl__image *image, const strl__srgb *srgb, const strl__image_spot *spot, double rgba[4]);
 
 #endif

@@ -66,8 +66,7 @@ static void on_progress(j_common_ptr jpeg)
     jpeg_job *job = job_of(jpeg);
     if (job->jpeg.input_scan_number <= SCANS_MAX)
         return;
-    strl__fail(&job->failure, STRL_ERR_LIMIT, "has more than the %d scans that are read",
-               SCANS_MAX);
+    strl__fail(&job->failure, STRL_ERR_LIMIT, "has more than the %d scans that are read", SCANS_MAX);
     fail(job);
 }
 
@@ -174,8 +173,7 @@ static int read_all(jpeg_job *job)
         strl__image_row(job->making, job->row);
     }
     if (job->is_cut && (job->errors.num_warnings || jpeg_has_multiple_scans(&job->jpeg))) {
-        strl__fail(&job->failure, STRL_ERR_FORMAT, "is cut off after %" PRIu64 " bytes",
-                   job->making->source->bytes);
+        strl__fail(&job->failure, STRL_ERR_FORMAT, "is cut off after %" PRIu64 " bytes", job->making->source->bytes);
         return -1;
     }
     return 0;
@@ -202,9 +200,8 @@ strl_status strl__image_read_jpeg(strl__image_making *making, strl_error *err)
     jpeg_destroy_decompress(&job->jpeg);
     strl_status status = STRL_OK;
     if (failed)
-        status = job->failure.status
-                     ? strl__fail(err, job->failure.status, "%s", job->failure.message)
-                     : strl__fail(err, STRL_ERR_FORMAT, "is damaged");
+        status = job->failure.status ? strl__fail(err, job->failure.status, "%s", job->failure.message)
+                                     : strl__fail(err, STRL_ERR_FORMAT, "is damaged");
     strl__free(job->line);
     strl__free(job->row);
     strl__free(job);

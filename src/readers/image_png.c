@@ -79,14 +79,12 @@ static void begin(png_job *job)
     const uint64_t stored = png_get_rowbytes(png, job->info) * height;
     job->interlaced = png_get_interlace_type(png, job->info) != PNG_INTERLACE_NONE;
     if (stored / LEAST_RATIO > job->making->source->bytes)
-        strl__fail(&job->failure, STRL_ERR_FORMAT,
-                   "announces %" PRIu64 " x %" PRIu64 " texels in %" PRIu64 " bytes", width, height,
-                   job->making->source->bytes);
+        strl__fail(&job->failure, STRL_ERR_FORMAT, "announces %" PRIu64 " x %" PRIu64 " texels in %" PRIu64 " bytes",
+                   width, height, job->making->source->bytes);
     set_transforms(job);
     if (!job->failure.status)
         strl__image_begin(job->making, width, height,
-                          4 * width * (job->interlaced ? height : 1) + WORKING_BYTES * width,
-                          &job->failure);
+                          4 * width * (job->interlaced ? height : 1) + WORKING_BYTES * width, &job->failure);
     if (!job->failure.status) {
         job->rows = strl__alloc((size_t)(4 * width), job->interlaced ? (size_t)height : 1);
         if (!job->rows)
@@ -125,8 +123,7 @@ static int read_all(png_job *job)
 strl_status strl__image_read_png(strl__image_making *making, strl_error *err)
 {
     png_job job = {.making = making};
-    job.png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, &job, on_error, on_warning, &job,
-                                       on_alloc, on_free);
+    job.png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, &job, on_error, on_warning, &job, on_alloc, on_free);
     job.info = job.png ? png_create_info_struct(job.png) : NULL;
     int failed = job.info ? read_all(&job) : -1;
     if (!job.info)

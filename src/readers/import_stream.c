@@ -28,11 +28,10 @@ static strl_status expected(strl_reader *reader, const char *what, strl_error *e
     strl_status failed = strl__input_status(&state->input, err);
     if (failed)
         return failed;
-    return strl__fail(
-        err, STRL_ERR_FORMAT,
-        "%s: the stream of triangles that was imported from it is broken: expected %s "
-        "at byte %" PRIu64,
-        reader->path, what, state->record_at);
+    return strl__fail(err, STRL_ERR_FORMAT,
+                      "%s: the stream of triangles that was imported from it is broken: expected %s "
+                      "at byte %" PRIu64,
+                      reader->path, what, state->record_at);
 }
 
 /* The importer's own words; control characters and bytes beyond ASCII would make them unreadable. */
@@ -97,16 +96,14 @@ static strl_status next_record(strl_reader *reader, import_record *record, strl_
 bool strl__import_facts_parse(const uint8_t *start, strl__import_facts *facts)
 {
     strl_cursor cursor = strl_cursor_make(start, STRL__IMPORT_START_BYTES);
-    if (memcmp(strl_cursor_take(&cursor, STRL_IMPORT_MAGIC_BYTES), STRL_IMPORT_MAGIC,
-               STRL_IMPORT_MAGIC_BYTES) != 0)
+    if (memcmp(strl_cursor_take(&cursor, STRL_IMPORT_MAGIC_BYTES), STRL_IMPORT_MAGIC, STRL_IMPORT_MAGIC_BYTES) != 0)
         return false;
     uint32_t kind = strl_cursor_u32(&cursor), bytes = strl_cursor_u32(&cursor);
     uint32_t up = strl_cursor_u32(&cursor);
     facts->unit_metres = strl_cursor_f64(&cursor);
     facts->triangles = strl_cursor_u64(&cursor);
     facts->stream_most = strl_cursor_u64(&cursor);
-    memcpy(facts->format, strl_cursor_take(&cursor, STRL_IMPORT_FORMAT_BYTES),
-           STRL_IMPORT_FORMAT_BYTES);
+    memcpy(facts->format, strl_cursor_take(&cursor, STRL_IMPORT_FORMAT_BYTES), STRL_IMPORT_FORMAT_BYTES);
     facts->format[STRL_IMPORT_FORMAT_BYTES] = 0;
     facts->up = (strl_axis)up;
     return kind == STRL_IMPORT_FACTS && bytes == STRL_IMPORT_FACTS_BYTES && up <= STRL_AXIS_Z &&
@@ -161,8 +158,8 @@ strl_status strl__import_scan(strl_reader *reader, strl_error *err)
 
 /* ---- records ---- */
 
-static strl_status add_name(strl_reader *reader, strl__names *names, const char *text,
-                            size_t length, uint32_t *index, strl_error *err)
+static strl_status add_name(strl_reader *reader, strl__names *names, const char *text, size_t length, uint32_t *index,
+                            strl_error *err)
 {
     strl_status status = strl__names_add(names, text, length, index, err);
     return status ? strl__fail_context(err, status, "%s", reader->path) : STRL_OK;
@@ -183,8 +180,8 @@ static strl_status take_part(strl_reader *reader, strl_cursor payload, strl_erro
 /* Materials of one name may differ in colour; a name stands for one colour here, so a later one
  * takes its number into its name. Every pass names them alike, because the first one's colour is
  * there already. */
-static strl_status name_material(strl_reader *reader, const char *text, size_t length,
-                                 uint32_t rgba, uint32_t *index, strl_error *err)
+static strl_status name_material(strl_reader *reader, const char *text, size_t length, uint32_t rgba, uint32_t *index,
+                                 strl_error *err)
 {
     strl__import *state = reader->state;
     strl__names *names = &reader->materials;
@@ -194,8 +191,8 @@ static strl_status name_material(strl_reader *reader, const char *text, size_t l
     if (status)
         return status;
     if (*index < known && names->items[*index].rgba != rgba) {
-        int used = snprintf(name, sizeof name, "%.*s #%zu", (int)(length < 1000 ? length : 1000),
-                            text, state->material_count + 1);
+        int used = snprintf(name, sizeof name, "%.*s #%zu", (int)(length < 1000 ? length : 1000), text,
+                            state->material_count + 1);
         known = names->count;
         status = add_name(reader, names, name, (size_t)used, index, err);
     }
@@ -212,14 +209,12 @@ static strl_status take_material(strl_reader *reader, strl_cursor payload, strl_
     if (payload.failed || length > STRL_IMPORT_NAME_MOST)
         return expected(reader, "a material with a name of at most 1023 bytes", err);
     if (state->material_count == MATERIALS_MOST)
-        return strl__fail(err, STRL_ERR_LIMIT, "%s: expected at most %zu materials", reader->path,
-                          MATERIALS_MOST);
+        return strl__fail(err, STRL_ERR_LIMIT, "%s: expected at most %zu materials", reader->path, MATERIALS_MOST);
     const char *text = (const char *)strl_cursor_take(&payload, length);
     strl_status status = name_material(reader, text, length, rgba, &index, err);
     if (status)
         return status;
-    if (!strl__grow(&state->materials, &state->material_capacity, state->material_count + 1,
-                    sizeof *state->materials))
+    if (!strl__grow(&state->materials, &state->material_capacity, state->material_count + 1, sizeof *state->materials))
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for %zu materials", reader->path,
                           state->material_count + 1);
     state->materials[state->material_count++] = index;
@@ -227,8 +222,7 @@ static strl_status take_material(strl_reader *reader, strl_cursor payload, strl_
 }
 
 /* The material of a block; the first block without one makes the plain one. */
-static strl_status find_material(strl_reader *reader, uint32_t number, uint32_t *index,
-                                 strl_error *err)
+static strl_status find_material(strl_reader *reader, uint32_t number, uint32_t *index, strl_error *err)
 {
     strl__import *state = reader->state;
     if (number < state->material_count) {
@@ -237,9 +231,7 @@ static strl_status find_material(strl_reader *reader, uint32_t number, uint32_t 
     }
     if (number != STRL_IMPORT_NO_MATERIAL)
         return expected(reader, "a block of a material that came before it", err);
-    strl_status status = state->plain_known
-                             ? STRL_OK
-                             : name_material(reader, "", 0, 0xffffffffu, &state->plain, err);
+    strl_status status = state->plain_known ? STRL_OK : name_material(reader, "", 0, 0xffffffffu, &state->plain, err);
     state->plain_known = !status;
     *index = state->plain;
     return status;
@@ -284,23 +276,18 @@ static bool parse_block(strl_cursor *payload, import_block *block)
     block->vertex_count = strl_cursor_u32(payload);
     block->face_count = strl_cursor_u32(payload);
     block->corner_count = strl_cursor_u32(payload);
-    if (payload->failed || (block->flags & ~(uint32_t)STRL_IMPORT_ALL_FLAGS) != 0 ||
-        block->vertex_count == 0 || block->vertex_count > STRL_IMPORT_CORNERS_MOST ||
-        block->face_count == 0 || block->corner_count > STRL_IMPORT_CORNERS_MOST ||
-        block->face_count > block->corner_count / 3)
+    if (payload->failed || (block->flags & ~(uint32_t)STRL_IMPORT_ALL_FLAGS) != 0 || block->vertex_count == 0 ||
+        block->vertex_count > STRL_IMPORT_CORNERS_MOST || block->face_count == 0 ||
+        block->corner_count > STRL_IMPORT_CORNERS_MOST || block->face_count > block->corner_count / 3)
         return false;
     if (!(block->flags & STRL_IMPORT_POLYGONS) && block->corner_count != 3 * block->face_count)
         return false;
     size_t vertices = block->vertex_count;
-    block->positions =
-        strl_cursor_take(payload, vertices * (block->flags & STRL_IMPORT_DOUBLES ? 24 : 12));
-    block->normals =
-        block->flags & STRL_IMPORT_NORMALS ? strl_cursor_take(payload, vertices * 12) : NULL;
-    block->colours =
-        block->flags & STRL_IMPORT_COLOURS ? strl_cursor_take(payload, vertices * 4) : NULL;
-    block->face_corners = block->flags & STRL_IMPORT_POLYGONS
-                              ? strl_cursor_take(payload, (size_t)block->face_count * 2)
-                              : NULL;
+    block->positions = strl_cursor_take(payload, vertices * (block->flags & STRL_IMPORT_DOUBLES ? 24 : 12));
+    block->normals = block->flags & STRL_IMPORT_NORMALS ? strl_cursor_take(payload, vertices * 12) : NULL;
+    block->colours = block->flags & STRL_IMPORT_COLOURS ? strl_cursor_take(payload, vertices * 4) : NULL;
+    block->face_corners =
+        block->flags & STRL_IMPORT_POLYGONS ? strl_cursor_take(payload, (size_t)block->face_count * 2) : NULL;
     block->corners = strl_cursor_take(payload, (size_t)block->corner_count * 2);
     return !payload->failed && strl_cursor_left(payload) == 0;
 }
@@ -310,19 +297,16 @@ static void load_corner(const import_block *block, uint32_t vertex, strl__corner
     bool doubles = block->flags & STRL_IMPORT_DOUBLES;
     const uint8_t *position = block->positions + (size_t)vertex * (doubles ? 24 : 12);
     for (unsigned k = 0; k < 3; k++)
-        corner->position[k] = doubles ? strl__load_f64(position + 8 * k, false)
-                                      : (double)strl__load_f32(position + 4 * k, false);
+        corner->position[k] =
+            doubles ? strl__load_f64(position + 8 * k, false) : (double)strl__load_f32(position + 4 * k, false);
     bool finite = block->normals != NULL;
     for (unsigned k = 0; k < 3; k++) {
-        corner->normal[k] =
-            block->normals ? strl__load_f32(block->normals + 12 * (size_t)vertex + 4 * k, false)
-                           : 0;
+        corner->normal[k] = block->normals ? strl__load_f32(block->normals + 12 * (size_t)vertex + 4 * k, false) : 0;
         finite = finite && __builtin_isfinite(corner->normal[k]);
     }
     if (!finite)
         memset(corner->normal, 0, sizeof corner->normal);
-    corner->colour =
-        block->colours ? strl__load_32(block->colours + 4 * (size_t)vertex, false) : 0xffffffffu;
+    corner->colour = block->colours ? strl__load_32(block->colours + 4 * (size_t)vertex, false) : 0xffffffffu;
 }
 
 /* False where an index is too large. */
@@ -357,8 +341,7 @@ static void add_faces(strl_reader *reader, const import_block *block, uint32_t m
     strl__import *state = reader->state;
     reader->batch.has_corner_colour = block->colours != NULL;
     for (uint32_t f = 0; f < block->face_count; f++) {
-        uint32_t count =
-            block->face_corners ? strl__load_16(block->face_corners + 2 * (size_t)f, false) : 3;
+        uint32_t count = block->face_corners ? strl__load_16(block->face_corners + 2 * (size_t)f, false) : 3;
         const strl__face face = {count, state->part, material, 0xffffffffu};
         strl__batch_add(&reader->batch, &face);
         state->triangles += count - 2;

@@ -9,8 +9,7 @@
 #include "readers/internal.h"
 
 /* The beginning of a stream: magic, and the record of facts. */
-#define STRL__IMPORT_START_BYTES                                                                   \
-    (STRL_IMPORT_MAGIC_BYTES + STRL_IMPORT_RECORD_HEAD + STRL_IMPORT_FACTS_BYTES)
+#define STRL__IMPORT_START_BYTES (STRL_IMPORT_MAGIC_BYTES + STRL_IMPORT_RECORD_HEAD + STRL_IMPORT_FACTS_BYTES)
 
 typedef struct strl__import_facts {
     strl_axis up;
@@ -28,14 +27,13 @@ typedef struct strl__import {
     strl__import_facts facts;
     uint32_t *materials; /* from the stream's numbers to the reader's; owned */
     size_t material_count, material_capacity;
-    uint32_t part,
-        plain; /* indices of the current part, and of the material of blocks without one */
+    uint32_t part, plain; /* indices of the current part, and of the material of blocks without one */
     bool part_known, plain_known;
-    bool error_told;    /* the stream ends in the importer's own words */
+    bool error_told;                      /* the stream ends in the importer's own words */
     char told[STRL_IMPORT_TEXT_MOST + 1]; /* which are these */
-    uint64_t record_at; /* where the record being read begins */
-    uint64_t triangles; /* of this pass so far */
-    uint64_t checksum;  /* of this pass so far */
+    uint64_t record_at;                   /* where the record being read begins */
+    uint64_t triangles;                   /* of this pass so far */
+    uint64_t checksum;                    /* of this pass so far */
 } strl__import;
 
 /* From the first STRL__IMPORT_START_BYTES bytes of a stream; false where they are not facts. */

@@ -70,8 +70,8 @@ void strl__input_refill(strl__input *input, size_t bytes)
     input->end = input->buffer + kept;
     while (kept < bytes && input->end_offset < input->file_bytes) {
         size_t got = 0;
-        if (strl_file_read_some(input->file, input->end_offset, input->buffer + kept,
-                                input->capacity - kept, &got, &input->failure)) {
+        if (strl_file_read_some(input->file, input->end_offset, input->buffer + kept, input->capacity - kept, &got,
+                                &input->failure)) {
             got = 0; /* part of it may have come; where reading stopped must not depend on that */
             stop_here(input);
         } else if (got == 0) {
@@ -83,8 +83,7 @@ void strl__input_refill(strl__input *input, size_t bytes)
         kept += got;
         input->end += got;
         input->end_offset += got;
-        if (input->end_offset > input->file_bytes &&
-            !input->failed) { /* the file grew: the rest is not ours */
+        if (input->end_offset > input->file_bytes && !input->failed) { /* the file grew: the rest is not ours */
             size_t excess = (size_t)(input->end_offset - input->file_bytes);
             input->end -= excess;
             input->end_offset -= excess;

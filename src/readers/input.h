@@ -17,7 +17,7 @@
 typedef struct strl__input {
     strl_file *file;  /* borrowed */
     const char *name; /* for sentences: the file's path, or the one of the file that it was made from; borrowed */
-    char *buffer;    /* owned; capacity + 1 bytes */
+    char *buffer;     /* owned; capacity + 1 bytes */
     size_t capacity;
     const char *at;      /* next byte */
     const char *end;     /* end of what is in the buffer; *end is 0 and readable */
@@ -59,8 +59,7 @@ static inline uint64_t strl__input_left(const strl__input *input)
 /* False where fewer than `bytes` are left in the file. */
 static inline bool strl__input_want(strl__input *input, size_t bytes)
 {
-    if (__builtin_expect(
-            (size_t)(input->end - input->at) < bytes && input->end_offset < input->file_bytes, 0))
+    if (__builtin_expect((size_t)(input->end - input->at) < bytes && input->end_offset < input->file_bytes, 0))
         strl__input_refill(input, bytes);
     return (size_t)(input->end - input->at) >= bytes;
 }

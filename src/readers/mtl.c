@@ -28,8 +28,7 @@ static uint32_t with_colour(uint32_t rgba, const double values[3], unsigned coun
 {
     uint8_t channel[3];
     for (unsigned i = 0; i < 3; i++)
-        channel[i] =
-            strl__colour_channel(STRL__F64, values[i < count ? i : 0]); /* "Kd r" means grey */
+        channel[i] = strl__colour_channel(STRL__F64, values[i < count ? i : 0]); /* "Kd r" means grey */
     return strl__pack_colour(channel[0], channel[1], channel[2], (uint8_t)(rgba >> 24));
 }
 
@@ -42,14 +41,13 @@ static uint32_t with_opacity(uint32_t rgba, double opacity)
 
 /* Passes over the option at `at` and what it takes; false where there is none. Numbers stay as they
  * are where the option has fewer. */
-static bool take_option(strl__input *input, strl__texture *texture, double scale[3],
-                        double offset[3])
+static bool take_option(strl__input *input, strl__texture *texture, double scale[3], double offset[3])
 {
     static const struct {
         const char *word;
         unsigned words;
-    } others[] = {{"-blendu", 1}, {"-blendv", 1}, {"-cc", 1},      {"-mm", 2},  {"-texres", 1},
-                  {"-imfchan", 1}, {"-type", 1},  {"-boost", 1}, {"-bm", 1}};
+    } others[] = {{"-blendu", 1},  {"-blendv", 1}, {"-cc", 1},    {"-mm", 2}, {"-texres", 1},
+                  {"-imfchan", 1}, {"-type", 1},   {"-boost", 1}, {"-bm", 1}};
     double turbulence[3];
     double *const values[] = {scale, offset, turbulence};
     static const char *const takes_numbers[] = {"-s", "-o", "-t"};
@@ -100,8 +98,7 @@ static char *image_path(const char *library, const char *name, size_t length)
 }
 
 /* map_Kd [options] NAME, whose v is up. */
-static strl_status read_map(strl__input *input, strl__name *material, strl__textures *textures,
-                            strl_error *err)
+static strl_status read_map(strl__input *input, strl__name *material, strl__textures *textures, strl_error *err)
 {
     strl__texture texture = {.wrap = {STRL__WRAP_REPEAT, STRL__WRAP_REPEAT}};
     double scale[3] = {1, 1, 1}, offset[3] = {0, 0, 0};
@@ -125,8 +122,7 @@ static strl_status read_map(strl__input *input, strl__name *material, strl__text
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
     const double transform[6] = {scale[0], 0, offset[0], 0, -scale[1], 1 - offset[1]};
     memcpy(texture.transform, transform, sizeof transform);
-    strl_status status =
-        strl__textures_add_picture(textures, path, name, 0, &texture.picture, err);
+    strl_status status = strl__textures_add_picture(textures, path, name, 0, &texture.picture, err);
     if (!status)
         status = strl__textures_add(textures, &texture, &material->texture, err);
     strl__free(path);
@@ -155,8 +151,7 @@ static void read_statement(strl__input *input, strl__name *material)
     }
 }
 
-static strl_status read_materials(strl__input *input, strl__names *materials,
-                                  strl__textures *textures, strl_error *err)
+static strl_status read_materials(strl__input *input, strl__names *materials, strl__textures *textures, strl_error *err)
 {
     uint32_t current = UINT32_MAX;
     strl__text_skip_byte_order_mark(input);
@@ -168,14 +163,13 @@ static strl_status read_materials(strl__input *input, strl__names *materials,
         if (strl__text_token_is(input, "newmtl")) {
             input->at += 6;
             strl__text_skip_blanks(input);
-            status = strl__names_add(materials, input->at, strl__text_rest_of_line(input), &current,
-                                     err);
+            status = strl__names_add(materials, input->at, strl__text_rest_of_line(input), &current, err);
             if (!status) {
                 materials->items[current].rgba = 0xffffffffu;
                 materials->items[current].texture = STRL__NO_TEXTURE;
             }
-        } else if (current != UINT32_MAX && (strl__text_token_is(input, "map_Kd") ||
-                                             strl__text_token_is(input, "map_kd"))) {
+        } else if (current != UINT32_MAX &&
+                   (strl__text_token_is(input, "map_Kd") || strl__text_token_is(input, "map_kd"))) {
             input->at += 6;
             status = read_map(input, &materials->items[current], textures, err);
         } else if (current != UINT32_MAX) {
@@ -186,14 +180,13 @@ static strl_status read_materials(strl__input *input, strl__names *materials,
     }
 }
 
-strl_status strl__mtl_read(const char *path, strl__names *materials, strl__textures *textures,
-                           strl_error *why, strl_error *err)
+strl_status strl__mtl_read(const char *path, strl__names *materials, strl__textures *textures, strl_error *why,
+                           strl_error *err)
 {
     strl_file *file = NULL;
     *why = (strl_error){0};
     if (strl_file_open(path, &file, why))
-        return why->status == STRL_ERR_MEMORY ? strl__fail(err, why->status, "%s", why->message)
-                                              : STRL_OK;
+        return why->status == STRL_ERR_MEMORY ? strl__fail(err, why->status, "%s", why->message) : STRL_OK;
     strl__input input;
     strl_status status = strl__input_init(&input, file, BUFFER_BYTES, err);
     if (!status)

@@ -10,7 +10,7 @@
  * because models often travel without it: `why` then says what is wrong, and has the status STRL_OK
  * otherwise. A statement that makes no sense is passed over. Fails only without memory or where the
  * names pass their limit. */
-strl_status strl__mtl_read(const char *path, strl__names *materials, strl__textures *textures,
-                           strl_error *why, strl_error *err);
+strl_status strl__mtl_read(const char *path, strl__names *materials, strl__textures *textures, strl_error *why,
+                           strl_error *err);
 
 #endif

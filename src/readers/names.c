@@ -110,8 +110,7 @@ static bool grow_slots(strl__names *names)
     return true;
 }
 
-strl_status strl__names_add(strl__names *names, const char *text, size_t length, uint32_t *index,
-                            strl_error *err)
+strl_status strl__names_add(strl__names *names, const char *text, size_t length, uint32_t *index, strl_error *err)
 {
     char cleaned[STRL__NAME_BYTES_MAX + 1];
     size_t used = clean(text, length, cleaned);
@@ -121,11 +120,9 @@ strl_status strl__names_add(strl__names *names, const char *text, size_t length,
     size_t held = names->text_bytes + used + 2 * names->capacity * sizeof *names->items +
                   3 * names->slot_count * sizeof *names->slots;
     if (held > names->limit_bytes || names->count >= UINT32_MAX - 1)
-        return strl__fail(err, STRL_ERR_LIMIT,
-                          "expected at most %zu bytes of names, found more than %zu names: %s", names->limit_bytes,
-                          names->count, names->advice);
-    if (!strl__grow(&names->items, &names->capacity, names->count + 1, sizeof *names->items) ||
-        !grow_slots(names))
+        return strl__fail(err, STRL_ERR_LIMIT, "expected at most %zu bytes of names, found more than %zu names: %s",
+                          names->limit_bytes, names->count, names->advice);
+    if (!strl__grow(&names->items, &names->capacity, names->count + 1, sizeof *names->items) || !grow_slots(names))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu names", names->count + 1);
     char *copy = strl__strdup(cleaned);
     if (!copy)

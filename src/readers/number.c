@@ -37,8 +37,7 @@ static double round_wide(unsigned __int128 wide, bool sticky, int exponent)
     uint64_t high = (uint64_t)(wide >> 64);
     int bits = high ? 128 - __builtin_clzll(high) : 64 - __builtin_clzll((uint64_t)wide);
     if (bits <= 53)
-        return (double)(uint64_t)wide *
-               power_of_two(exponent); /* callers keep sticky out of this case */
+        return (double)(uint64_t)wide * power_of_two(exponent); /* callers keep sticky out of this case */
     int shift = bits - 53;
     uint64_t mantissa = (uint64_t)(wide >> shift);
     unsigned __int128 rest = wide & (((unsigned __int128)1 << shift) - 1);
@@ -146,8 +145,7 @@ static const char *parse_word(const char *at, bool negative, double *value)
 static const char *parse_microsoft_word(const char *at, bool negative, double *value)
 {
     bool infinite = starts_with(at + 1, "inf");
-    if (!infinite && !starts_with(at + 1, "qnan") && !starts_with(at + 1, "snan") &&
-        !starts_with(at + 1, "ind"))
+    if (!infinite && !starts_with(at + 1, "qnan") && !starts_with(at + 1, "snan") && !starts_with(at + 1, "ind"))
         return NULL;
     *value = !infinite ? __builtin_nan("") : negative ? -__builtin_inf() : __builtin_inf();
     at++;
@@ -218,11 +216,9 @@ const char *strl__number_parse(const char *at, double *value)
             return NULL;
     }
     const char *unsigned_token = token + (*token == '-' || *token == '+');
-    bool dropped =
-        (digit_count > DIGITS_MAX && digit_count - leading_zeros(unsigned_token) > DIGITS_MAX) ||
-        fraction_count > EXPONENT_CAP;
-    double magnitude =
-        scale(unsigned_token, digits, dropped ? 0 : exponent - (int)fraction_count, dropped);
+    bool dropped = (digit_count > DIGITS_MAX && digit_count - leading_zeros(unsigned_token) > DIGITS_MAX) ||
+                   fraction_count > EXPONENT_CAP;
+    double magnitude = scale(unsigned_token, digits, dropped ? 0 : exponent - (int)fraction_count, dropped);
     *value = negative ? -magnitude : magnitude;
     return at;
 }

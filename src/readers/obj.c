@@ -26,14 +26,13 @@ typedef enum obj_keyword {
     OBJ_OTHER
 } obj_keyword;
 
-#define VERTEX_BYTES 28u /* three doubles and a colour */
-#define NORMAL_BYTES 12u /* three floats */
+#define VERTEX_BYTES 28u  /* three doubles and a colour */
+#define NORMAL_BYTES 12u  /* three floats */
 #define TEXCOORD_BYTES 8u /* two floats */
 
 static bool matches(const char *at, const char *word, size_t length)
 {
-    return memcmp(at, word, length) == 0 &&
-           (strl__is_blank(at[length]) || strl__is_line_end(at[length]));
+    return memcmp(at, word, length) == 0 && (strl__is_blank(at[length]) || strl__is_line_end(at[length]));
 }
 
 /* The keyword at the start of a statement; its bytes are passed. A whole token can be looked at. */
@@ -44,10 +43,17 @@ static obj_keyword take_keyword(strl__input *input)
         uint8_t length;
         obj_keyword keyword;
     } words[] = {
-        {"v", 1, OBJ_VERTEX},       {"f", 1, OBJ_FACE},           {"vn", 2, OBJ_NORMAL},
-        {"vt", 2, OBJ_TEXCOORD},    {"l", 1, OBJ_LINE},           {"p", 1, OBJ_POINT},
-        {"o", 1, OBJ_OBJECT},       {"g", 1, OBJ_GROUP},          {"fo", 2, OBJ_FACE},
-        {"mtllib", 6, OBJ_LIBRARY}, {"usemtl", 6, OBJ_USE_MATERIAL},
+        {"v", 1, OBJ_VERTEX},
+        {"f", 1, OBJ_FACE},
+        {"vn", 2, OBJ_NORMAL},
+        {"vt", 2, OBJ_TEXCOORD},
+        {"l", 1, OBJ_LINE},
+        {"p", 1, OBJ_POINT},
+        {"o", 1, OBJ_OBJECT},
+        {"g", 1, OBJ_GROUP},
+        {"fo", 2, OBJ_FACE},
+        {"mtllib", 6, OBJ_LIBRARY},
+        {"usemtl", 6, OBJ_USE_MATERIAL},
     };
     const char *at = input->at;
     for (size_t i = 0; i < sizeof words / sizeof *words; i++)
@@ -62,8 +68,7 @@ static obj_keyword take_keyword(strl__input *input)
 /* The first statement that is no comment must be one that OBJ files begin with. */
 static bool obj_recognises(const strl__input *input, uint64_t file_bytes)
 {
-    static const char *const words[] = {"v", "vn",     "vt",     "f", "o", "g",
-                                        "s", "mtllib", "usemtl", "l", "p"};
+    static const char *const words[] = {"v", "vn", "vt", "f", "o", "g", "s", "mtllib", "usemtl", "l", "p"};
     (void)file_bytes;
     const char *at = input->at;
     if (input->end - at >= 3 && memcmp(at, "\xef\xbb\xbf", 3) == 0)
@@ -78,8 +83,7 @@ static bool obj_recognises(const strl__input *input, uint64_t file_bytes)
     }
     for (size_t i = 0; i < sizeof words / sizeof *words; i++) {
         size_t length = strlen(words[i]);
-        if (input->end - at > (ptrdiff_t)length && memcmp(at, words[i], length) == 0 &&
-            strl__is_blank(at[length]))
+        if (input->end - at > (ptrdiff_t)length && memcmp(at, words[i], length) == 0 && strl__is_blank(at[length]))
             return true;
     }
     return false;
@@ -95,8 +99,8 @@ static strl_status obj_open(strl_reader *reader, strl_error *err)
     return STRL_OK;
 }
 
-static strl_status read_coordinates(strl__input *input, double *values, unsigned least,
-                                    unsigned most, unsigned *count, strl_error *err)
+static strl_status read_coordinates(strl__input *input, double *values, unsigned least, unsigned most, unsigned *count,
+                                    strl_error *err)
 {
     for (*count = 0; *count < most; (*count)++) {
         strl__text_skip_blanks(input);
@@ -161,14 +165,12 @@ static char *library_path(const strl_reader *reader, const char *name, size_t le
 }
 
 /* Of one library; `why` as for strl__mtl_read. */
-static strl_status read_library(strl_reader *reader, const char *name, size_t length,
-                                strl_error *why, strl_error *err)
+static strl_status read_library(strl_reader *reader, const char *name, size_t length, strl_error *why, strl_error *err)
 {
     strl__obj *obj = reader->state;
     char *path = library_path(reader, name, length);
-    strl_status status =
-        path ? strl__mtl_read(path, &obj->library, &reader->textures, why, err)
-             : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", reader->path);
+    strl_status status = path ? strl__mtl_read(path, &obj->library, &reader->textures, why, err)
+                              : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a path", reader->path);
     if (!status && !why->status)
         status = strl__reader_note_beside(reader, path, NULL, err);
     strl__free(path);
@@ -179,10 +181,9 @@ static strl_status read_library(strl_reader *reader, const char *name, size_t le
 static strl_status note_missing(strl_reader *reader, const strl_error *why, strl_error *err)
 {
     uint32_t index;
-    strl_status status =
-        strl__names_add(&reader->missing, why->message, strlen(why->message), &index, err);
-    return status ? strl__fail_context(err, status, "%s, line %" PRIu64 ", missing libraries",
-                                       reader->path, reader->input.line)
+    strl_status status = strl__names_add(&reader->missing, why->message, strlen(why->message), &index, err);
+    return status ? strl__fail_context(err, status, "%s, line %" PRIu64 ", missing libraries", reader->path,
+                                       reader->input.line)
                   : STRL_OK;
 }
 
@@ -199,13 +200,11 @@ static size_t before_comment(const char *name, size_t length)
 }
 
 /* Each word of the line as a name, but one of whole_length bytes, which was tried. */
-static strl_status read_words(strl_reader *reader, size_t whole_length, bool note, bool *found,
-                              strl_error *err)
+static strl_status read_words(strl_reader *reader, size_t whole_length, bool note, bool *found, strl_error *err)
 {
     strl__input *input = &reader->input;
     strl_status status = STRL_OK;
-    for (; !status && !strl__text_at_line_end(input) && *input->at != '#';
-         strl__text_skip_blanks(input)) {
+    for (; !status && !strl__text_at_line_end(input) && *input->at != '#'; strl__text_skip_blanks(input)) {
         size_t length = strl__text_token(input);
         strl_error why = {0};
         if (length != whole_length) {
@@ -312,11 +311,8 @@ static bool has_images(const strl__obj *obj)
 static void build_tables(strl_reader *reader)
 {
     const bool big_endian = __BYTE_ORDER__ == __ORDER_BIG_ENDIAN__;
-    strl__layout vertex = {.stride = VERTEX_BYTES,
-                           .big_endian = big_endian,
-                           .has_position = true,
-                           .has_colour = true,
-                           .has_alpha = true};
+    strl__layout vertex = {
+        .stride = VERTEX_BYTES, .big_endian = big_endian, .has_position = true, .has_colour = true, .has_alpha = true};
     strl__layout normal = {.stride = NORMAL_BYTES, .big_endian = big_endian, .has_normal = true};
     for (uint32_t i = 0; i < 4; i++)
         vertex.colour[i] = (strl__field){24 + i, STRL__U8};
@@ -331,8 +327,7 @@ static void build_tables(strl_reader *reader)
     size_t window = (size_t)(reader->memory_bytes / 2);
     strl__table_build(&reader->vertices, &vertex, reader->scratch_dir, window / 3 * 2);
     strl__table_build(&reader->normals, &normal, reader->scratch_dir, window / 3);
-    strl__table_build(&reader->texcoords, &texcoord, reader->scratch_dir,
-                      (size_t)(reader->memory_bytes / 16));
+    strl__table_build(&reader->texcoords, &texcoord, reader->scratch_dir, (size_t)(reader->memory_bytes / 16));
 }
 
 static strl_status obj_prepare(strl_reader *reader, strl_error *err)
@@ -427,35 +422,29 @@ static strl_status name_face(strl_reader *reader, strl_error *err)
     if (!status && !obj->material_known) {
         const strl__obj_name *material = &obj->material;
         uint32_t defined = strl__names_find(&obj->library, material->text, material->length);
-        status = strl__names_add(&reader->materials, material->text, material->length,
-                                 &obj->material_index, err);
+        status = strl__names_add(&reader->materials, material->text, material->length, &obj->material_index, err);
         if (!status && defined != UINT32_MAX)
             status = define_material(reader, defined, err);
         obj->material_known = !status;
     }
-    return status ? strl__fail_context(err, status, "%s, line %" PRIu64, reader->path,
-                                       reader->input.line)
-                  : STRL_OK;
+    return status ? strl__fail_context(err, status, "%s, line %" PRIu64, reader->path, reader->input.line) : STRL_OK;
 }
 
-static strl_status index_fail(strl_reader *reader, const char *what, int64_t found, uint64_t count,
-                              strl_error *err)
+static strl_status index_fail(strl_reader *reader, const char *what, int64_t found, uint64_t count, strl_error *err)
 {
     strl_status failed = strl__input_status(&reader->input, err);
     if (failed)
         return failed;
     return strl__fail(err, STRL_ERR_FORMAT,
-                      "%s, line %" PRIu64 ": expected the index of one of %" PRIu64
-                      " %s, found %" PRId64,
-                      reader->path, reader->input.line, count, what, found);
+                      "%s, line %" PRIu64 ": expected the index of one of %" PRIu64 " %s, found %" PRId64, reader->path,
+                      reader->input.line, count, what, found);
 }
 
 /* From the file's count (1 = first, -1 = last so far) to ours. False where there is no such thing.
  */
 static bool to_index(int64_t written, uint64_t seen, uint64_t count, uint64_t *index)
 {
-    *index = written > 0 ? (uint64_t)written - 1
-                         : seen + (uint64_t)written; /* wraps where it is before the first */
+    *index = written > 0 ? (uint64_t)written - 1 : seen + (uint64_t)written; /* wraps where it is before the first */
     return written != 0 && *index < count && (written > 0 || (uint64_t)-written <= seen);
 }
 
@@ -507,8 +496,7 @@ static strl_status too_many_corners(strl_reader *reader, strl_error *err)
     strl_status failed = strl__input_status(input, err);
     return failed ? failed
                   : strl__fail(err, STRL_ERR_LIMIT,
-                               "%s, line %" PRIu64
-                               ": expected at most %u corners in a face, found %" PRIu64,
+                               "%s, line %" PRIu64 ": expected at most %u corners in a face, found %" PRIu64,
                                reader->path, line, STRL__POLYGON_CORNERS_MAX, count);
 }
 

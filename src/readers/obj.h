@@ -16,7 +16,7 @@ typedef struct strl__obj {
     bool has_images;        /* of materials of the library; and there are coordinates for them */
     uint64_t vertices_seen; /* of this pass, so far: what negative indices count from */
     uint64_t normals_seen, texcoords_seen;
-    uint64_t others;        /* lines that no statement read here begins */
+    uint64_t others; /* lines that no statement read here begins */
     strl__obj_name object, group, material;
     uint32_t part_index, material_index;
     bool part_known, material_known; /* the indices fit the names */

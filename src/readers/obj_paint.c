@@ -10,8 +10,7 @@
 
 /* ---- bytes */
 
-static strl_status read_file(void *context, uint64_t offset, void *data, size_t size,
-                             strl_error *err)
+static strl_status read_file(void *context, uint64_t offset, void *data, size_t size, strl_error *err)
 {
     return strl_file_read(context, offset, data, size, err);
 }
@@ -47,8 +46,7 @@ strl_status strl__obj_open_picture(void *context, const strl__picture *picture, 
     if (!path || !other)
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
     else
-        status = strl_file_open(
-            !strl_path_exists(path) && strl_path_exists(other) ? other : path, &file, err);
+        status = strl_file_open(!strl_path_exists(path) && strl_path_exists(other) ? other : path, &file, err);
     if (!status)
         status = strl_file_stat(file, &info, err);
     if (!status)
@@ -58,9 +56,8 @@ strl_status strl__obj_open_picture(void *context, const strl__picture *picture, 
     if (status)
         close_file(file);
     else
-        *found = (strl__picture_place){
-            .source = {.context = file, .read = read_file, .bytes = strl_file_bytes(file)},
-            .close = close_file};
+        *found = (strl__picture_place){.source = {.context = file, .read = read_file, .bytes = strl_file_bytes(file)},
+                                       .close = close_file};
     strl__free(path);
     strl__free(other);
     return status;
@@ -97,8 +94,8 @@ static void place_corner(const brush *self, const strl__corner *corner, double p
 
 #define MEASURE_SHARE 16u
 
-static void measure_face(const strl__obj *obj, const strl__batch *batch, const strl__face *face,
-                         size_t first, const brush *with, double (*places)[2])
+static void measure_face(const strl__obj *obj, const strl__batch *batch, const strl__face *face, size_t first,
+                         const brush *with, double (*places)[2])
 {
     for (uint32_t i = 0; i < face->corner_count; i++) {
         if (batch->texcoord[first + i] == STRL__NO_INDEX)
@@ -139,8 +136,7 @@ strl_status strl__obj_measure(strl_reader *reader, strl_error *err)
     obj->footprints = strl__alloc_zero((size_t)count, sizeof *obj->footprints);
     strl_status status = places && obj->footprints
                              ? strl__obj_start(reader, err)
-                             : strl__fail(err, STRL_ERR_MEMORY,
-                                          "%s: no memory for texture coordinates", reader->path);
+                             : strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for texture coordinates", reader->path);
     for (reader->ended = false; !status && !reader->ended;) {
         strl__batch_reset(&reader->batch);
         status = strl__obj_fill(reader, err);
@@ -158,8 +154,7 @@ strl_status strl__obj_measure(strl_reader *reader, strl_error *err)
 
 /* ---- colours */
 
-static void paint_corner(const strl_reader *reader, const brush *with, double footprint,
-                         strl__corner *corner)
+static void paint_corner(const strl_reader *reader, const brush *with, double footprint, strl__corner *corner)
 {
     const strl__srgb *srgb = &reader->textures.srgb;
     strl__image_spot spot = {.footprint = footprint};
@@ -176,11 +171,10 @@ static void paint_corner(const strl_reader *reader, const brush *with, double fo
     strl__image_sample(with->image, srgb, &spot, texel);
     for (unsigned i = 0; i < 4; i++)
         code[i] = (uint8_t)(corner->colour >> 8 * i);
-    corner->colour =
-        strl__pack_colour(strl__srgb_encode(srgb, texel[0] * srgb->linear[code[0]]),
-                          strl__srgb_encode(srgb, texel[1] * srgb->linear[code[1]]),
-                          strl__srgb_encode(srgb, texel[2] * srgb->linear[code[2]]),
-                          strl__colour_channel(STRL__F64, texel[3] * code[3] / 255));
+    corner->colour = strl__pack_colour(strl__srgb_encode(srgb, texel[0] * srgb->linear[code[0]]),
+                                       strl__srgb_encode(srgb, texel[1] * srgb->linear[code[1]]),
+                                       strl__srgb_encode(srgb, texel[2] * srgb->linear[code[2]]),
+                                       strl__colour_channel(STRL__F64, texel[3] * code[3] / 255));
 }
 
 static double footprint_of(const strl_reader *reader, const brush *with, uint64_t texcoord)
@@ -206,8 +200,7 @@ strl_status strl__obj_paint(strl_reader *reader, strl_error *err)
             if (texcoord == STRL__NO_INDEX || !with.texture)
                 batch->corners[corner].texcoord[0] = NAN;
             else
-                paint_corner(reader, &with, footprint_of(reader, &with, texcoord),
-                             &batch->corners[corner]);
+                paint_corner(reader, &with, footprint_of(reader, &with, texcoord), &batch->corners[corner]);
         }
         corner = end;
     }

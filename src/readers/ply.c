@@ -29,26 +29,20 @@ static strl_status check_elements(strl_reader *reader, strl_error *err)
             ply->vertex_element = i;
             ply->vertex_count = element->count;
             if (element->count && !strl__ply_has(element, STRL__PLY_X, 3))
-                return strl__fail(err, STRL_ERR_FORMAT,
-                                  "%s: expected properties x, y and z in element 'vertex'",
+                return strl__fail(err, STRL_ERR_FORMAT, "%s: expected properties x, y and z in element 'vertex'",
                                   reader->path);
         }
-        if (is_face_like(element) && element->count &&
-            !strl__ply_has(element, STRL__PLY_INDICES, 1))
-            return strl__fail(err, STRL_ERR_FORMAT,
-                              "%s: expected a list property vertex_indices in element '%s'",
+        if (is_face_like(element) && element->count && !strl__ply_has(element, STRL__PLY_INDICES, 1))
+            return strl__fail(err, STRL_ERR_FORMAT, "%s: expected a list property vertex_indices in element '%s'",
                               reader->path, element->name);
         if (element->kind == STRL__PLY_FACE)
             reader->triangles_hint += element->count;
         else if (element->kind == STRL__PLY_TRISTRIPS)
-            reader->triangles_hint +=
-                reader->opened.bytes / 10; /* half the bytes, a little over an item each */
+            reader->triangles_hint += reader->opened.bytes / 10; /* half the bytes, a little over an item each */
     }
-    for (uint32_t i = 0;
-         i < ply->header.element_count && ply->vertex_element == STRL__PLY_NO_ELEMENT; i++)
+    for (uint32_t i = 0; i < ply->header.element_count && ply->vertex_element == STRL__PLY_NO_ELEMENT; i++)
         if (is_face_like(&ply->header.elements[i]) && ply->header.elements[i].count)
-            return strl__fail(err, STRL_ERR_FORMAT,
-                              "%s: expected an element 'vertex' beside element '%s', found none",
+            return strl__fail(err, STRL_ERR_FORMAT, "%s: expected an element 'vertex' beside element '%s', found none",
                               reader->path, ply->header.elements[i].name);
     return STRL_OK;
 }
@@ -90,8 +84,7 @@ static strl_status ply_start(strl_reader *reader, strl_error *err)
     return STRL_OK;
 }
 
-static strl_status read_index(strl_reader *reader, strl__scalar type, double *value,
-                              strl_error *err)
+static strl_status read_index(strl_reader *reader, strl__scalar type, double *value, strl_error *err)
 {
     return strl__ply_next_scalar(reader->state, &reader->input, type, value)
                ? STRL_OK
@@ -104,8 +97,8 @@ static bool is_index(const strl__ply_state *ply, double value)
 }
 
 /* The corners of a face, to the end of the batch. */
-static strl_status read_corners(strl_reader *reader, const strl__ply_property *property,
-                                uint32_t *corner_count, strl_error *err)
+static strl_status read_corners(strl_reader *reader, const strl__ply_property *property, uint32_t *corner_count,
+                                strl_error *err)
 {
     strl__ply_state *ply = reader->state;
     uint64_t count;
@@ -113,8 +106,7 @@ static strl_status read_corners(strl_reader *reader, const strl__ply_property *p
     if (status)
         return status;
     if (count > STRL__POLYGON_CORNERS_MAX)
-        return strl__ply_value_fail(reader, "a number of corners", STRL__POLYGON_CORNERS_MAX + 1,
-                                    (double)count, err);
+        return strl__ply_value_fail(reader, "a number of corners", STRL__POLYGON_CORNERS_MAX + 1, (double)count, err);
     uint64_t *indices = reader->batch.vertex + reader->batch.corner_count;
     for (uint64_t i = 0; i < count; i++) {
         double value;
@@ -194,8 +186,7 @@ static void read_plain_faces(strl_reader *reader, const strl__ply_element *eleme
     }
 }
 
-static strl_status fill_faces(strl_reader *reader, const strl__ply_element *element,
-                              strl_error *err)
+static strl_status fill_faces(strl_reader *reader, const strl__ply_element *element, strl_error *err)
 {
     strl__ply_state *ply = reader->state;
     const bool plain = is_plain(ply, element);
@@ -240,8 +231,7 @@ static strl_status add_strip_item(strl_reader *reader, double value, strl_error 
     return STRL_OK;
 }
 
-static strl_status fill_strip(strl_reader *reader, const strl__ply_property *property,
-                              strl_error *err)
+static strl_status fill_strip(strl_reader *reader, const strl__ply_property *property, strl_error *err)
 {
     strl__ply_state *ply = reader->state;
     strl_status status = STRL_OK;
@@ -251,8 +241,7 @@ static strl_status fill_strip(strl_reader *reader, const strl__ply_property *pro
         ply->strip_length = 0;
         ply->strip_odd = false;
     }
-    for (; !status && ply->strip_left > 0 && !strl__batch_is_full(&reader->batch);
-         ply->strip_left--) {
+    for (; !status && ply->strip_left > 0 && !strl__batch_is_full(&reader->batch); ply->strip_left--) {
         double value;
         strl__ply_begin_record(reader); /* of the line */
         status = read_index(reader, property->type, &value, err);
@@ -263,8 +252,7 @@ static strl_status fill_strip(strl_reader *reader, const strl__ply_property *pro
     return status;
 }
 
-static strl_status fill_strips(strl_reader *reader, const strl__ply_element *element,
-                               strl_error *err)
+static strl_status fill_strips(strl_reader *reader, const strl__ply_element *element, strl_error *err)
 {
     strl__ply_state *ply = reader->state;
     strl_status status = STRL_OK;
@@ -288,8 +276,7 @@ static strl_status fill_strips(strl_reader *reader, const strl__ply_element *ele
 }
 
 /* Passes an element that makes no faces. */
-static strl_status pass_element(strl_reader *reader, const strl__ply_element *element,
-                                strl_error *err)
+static strl_status pass_element(strl_reader *reader, const strl__ply_element *element, strl_error *err)
 {
     strl__ply_state *ply = reader->state;
     if (element->kind == STRL__PLY_VERTEX && element->count > 0) {
@@ -302,8 +289,8 @@ static strl_status pass_element(strl_reader *reader, const strl__ply_element *el
     return status;
 }
 
-/* Padding may follow the last record. What else follows is not read, as other programs do it, but told: a count of the header
- * may be too small. */
+/* Padding may follow the last record. What else follows is not read, as other programs do it, but told: a count of the
+ * header may be too small. */
 static strl_status pass_rest(strl_reader *reader, strl_error *err)
 {
     strl__input *input = &reader->input;
@@ -325,8 +312,7 @@ static strl_status ply_fill(strl_reader *reader, strl_error *err)
         if (!makes_faces) {
             status = pass_element(reader, element, err);
         } else if (element->kind == STRL__PLY_FACE) {
-            reader->batch.has_face_colour =
-                !ply->has_colour && strl__ply_has(element, STRL__PLY_RED, 3);
+            reader->batch.has_face_colour = !ply->has_colour && strl__ply_has(element, STRL__PLY_RED, 3);
             status = fill_faces(reader, element, err);
         } else {
             status = fill_strips(reader, element, err);

@@ -55,9 +55,8 @@ typedef struct strl__ply_element {
     const strl__ply_property *properties; /* in the header */
     uint32_t property_count;
     bool has_list;
-    uint32_t
-        stride; /* bytes of a binary record; of its scalars and list counts where it has lists */
-    uint32_t roles; /* bit 1 << role of the properties it has */
+    uint32_t stride; /* bytes of a binary record; of its scalars and list counts where it has lists */
+    uint32_t roles;  /* bit 1 << role of the properties it has */
 } strl__ply_element;
 
 typedef struct strl__ply_header {
@@ -74,8 +73,7 @@ typedef struct strl__ply_header {
  */
 strl_status strl__ply_header_read(strl__ply_header *header, strl__input *input, strl_error *err);
 
-static inline bool strl__ply_has(const strl__ply_element *element, strl__ply_role first,
-                                 unsigned count)
+static inline bool strl__ply_has(const strl__ply_element *element, strl__ply_role first, unsigned count)
 {
     uint32_t wanted = ((1u << count) - 1) << first;
     return (element->roles & wanted) == wanted;
@@ -101,8 +99,8 @@ typedef struct strl__ply_state {
 } strl__ply_state;
 
 /* The value that comes next. False where there is none; binary values are never wrong. */
-static inline bool strl__ply_next_scalar(const strl__ply_state *ply, strl__input *input,
-                                         strl__scalar type, double *value)
+static inline bool strl__ply_next_scalar(const strl__ply_state *ply, strl__input *input, strl__scalar type,
+                                         double *value)
 {
     if (ply->header.ascii) {
         strl__text_skip_blanks(input);
@@ -123,10 +121,9 @@ static inline bool strl__ply_next_scalar(const strl__ply_state *ply, strl__input
 void strl__ply_begin_record(strl_reader *reader);
 void strl__ply_end_record(strl_reader *reader);
 /* The length of a list, checked against what is left of the file. */
-strl_status strl__ply_read_count(strl_reader *reader, const strl__ply_property *property,
-                                 uint64_t *count, strl_error *err);
-strl_status strl__ply_skip_property(strl_reader *reader, const strl__ply_property *property,
-                                    strl_error *err);
+strl_status strl__ply_read_count(strl_reader *reader, const strl__ply_property *property, uint64_t *count,
+                                 strl_error *err);
+strl_status strl__ply_skip_property(strl_reader *reader, const strl__ply_property *property, strl_error *err);
 /* All records of the element at which the pass stands, from its first. */
 strl_status strl__ply_skip_element(strl_reader *reader, strl_error *err);
 
@@ -134,8 +131,7 @@ strl_status strl__ply_skip_element(strl_reader *reader, strl_error *err);
  * failed read. */
 strl_status strl__ply_record_fail(strl_reader *reader, const char *what, strl_error *err);
 /* "PATH, line (byte) N: expected WHAT below LIMIT, found FOUND", or the failed read. */
-strl_status strl__ply_value_fail(strl_reader *reader, const char *what, uint64_t limit,
-                                 double found, strl_error *err);
+strl_status strl__ply_value_fail(strl_reader *reader, const char *what, uint64_t limit, double found, strl_error *err);
 
 /* Fills the reader's table of vertices from the element at which the pass stands, and passes it. */
 strl_status strl__ply_take_vertices(strl_reader *reader, strl_error *err);

@@ -53,8 +53,7 @@ static const named_value role_names[] = {
 #define COUNT_OF(array) (sizeof(array) / sizeof *(array))
 
 /* The value of the token at the input under its name, `otherwise` where no name fits. */
-static int value_of_token(const strl__input *input, const named_value *names, size_t count,
-                          int otherwise)
+static int value_of_token(const strl__input *input, const named_value *names, size_t count, int otherwise)
 {
     for (size_t i = 0; i < count; i++)
         if (strl__text_token_is(input, names[i].name))
@@ -76,11 +75,9 @@ static strl_status read_format(strl__ply_header *header, strl__input *input, str
     else if (strl__text_token_is(input, "binary_big_endian"))
         header->big_endian = true;
     else if (!strl__text_token_is(input, "binary_little_endian"))
-        return strl__text_expected(input, "'ascii', 'binary_little_endian' or 'binary_big_endian'",
-                                   err);
+        return strl__text_expected(input, "'ascii', 'binary_little_endian' or 'binary_big_endian'", err);
     pass_token(input);
-    return strl__text_token_is(input, "1.0") ? STRL_OK
-                                             : strl__text_expected(input, "version '1.0'", err);
+    return strl__text_token_is(input, "1.0") ? STRL_OK : strl__text_expected(input, "version '1.0'", err);
 }
 
 static strl_status read_element(strl__ply_header *header, strl__input *input, strl_error *err)
@@ -94,8 +91,7 @@ static strl_status read_element(strl__ply_header *header, strl__input *input, st
         return strl__text_expected(input, "the name of an element", err);
     for (size_t i = 0; i < length && i + 1 < sizeof element->name; i++)
         element->name[i] = input->at[i] >= 0x20 && input->at[i] < 0x7f ? input->at[i] : '?';
-    element->kind = (strl__ply_kind)value_of_token(input, element_names, COUNT_OF(element_names),
-                                                   STRL__PLY_UNKNOWN);
+    element->kind = (strl__ply_kind)value_of_token(input, element_names, COUNT_OF(element_names), STRL__PLY_UNKNOWN);
     for (uint32_t i = 0; i < header->element_count; i++)
         if (element->kind == STRL__PLY_VERTEX && header->elements[i].kind == STRL__PLY_VERTEX)
             return strl__text_expected(input, "one element 'vertex' only", err);
@@ -142,15 +138,13 @@ static strl_status read_property(strl__ply_header *header, strl__input *input, s
         return status;
     if (strl__text_token(input) == 0)
         return strl__text_expected(input, "the name of a property", err);
-    strl__ply_role role =
-        (strl__ply_role)value_of_token(input, role_names, COUNT_OF(role_names), STRL__PLY_OTHER);
+    strl__ply_role role = (strl__ply_role)value_of_token(input, role_names, COUNT_OF(role_names), STRL__PLY_OTHER);
     if (property->is_list != (role == STRL__PLY_INDICES) || (element->roles & 1u << role))
         role = STRL__PLY_OTHER; /* the first of two names for one thing counts */
     property->role = role;
     element->roles |= 1u << role;
     element->has_list = element->has_list || property->is_list;
-    element->stride +=
-        strl__scalar_bytes(property->is_list ? property->count_type : property->type);
+    element->stride += strl__scalar_bytes(property->is_list ? property->count_type : property->type);
     element->property_count++;
     header->property_count++;
     return STRL_OK;
@@ -158,11 +152,9 @@ static strl_status read_property(strl__ply_header *header, strl__input *input, s
 
 /* The least bytes that the announced records can take must be there: a count that lies is found
  * before any work. */
-static strl_status check_counts(const strl__ply_header *header, const strl__input *input,
-                                strl_error *err)
+static strl_status check_counts(const strl__ply_header *header, const strl__input *input, strl_error *err)
 {
-    uint64_t left =
-        strl__input_left(input) + 1; /* the last number in a text needs no blank after it */
+    uint64_t left = strl__input_left(input) + 1; /* the last number in a text needs no blank after it */
     for (uint32_t i = 0; i < header->element_count; i++) {
         const strl__ply_element *element = &header->elements[i];
         uint64_t record = header->ascii ? 2 * (uint64_t)element->property_count : element->stride;
@@ -189,11 +181,9 @@ static void end_header(strl__input *input, char first_line_end)
         strl__text_end_line(input);
 }
 
-static strl_status read_statement(strl__ply_header *header, strl__input *input, bool *has_format,
-                                  strl_error *err)
+static strl_status read_statement(strl__ply_header *header, strl__input *input, bool *has_format, strl_error *err)
 {
-    if (strl__text_token(input) == 0 || strl__text_token_is(input, "comment") ||
-        strl__text_token_is(input, "obj_info"))
+    if (strl__text_token(input) == 0 || strl__text_token_is(input, "comment") || strl__text_token_is(input, "obj_info"))
         return STRL_OK;
     if (strl__text_token_is(input, "format")) {
         *has_format = true;

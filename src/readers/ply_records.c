@@ -17,21 +17,19 @@ strl_status strl__ply_record_fail(strl_reader *reader, const char *what, strl_er
                   : strl__fail(err, STRL_ERR_FORMAT,
                                "%s, byte %" PRIu64 ": expected %s, found the end of the file in "
                                "record %" PRIu64 " of %" PRIu64 " of element '%s'",
-                               reader->path, strl__input_offset(&reader->input), what,
-                               ply->record + 1, element->count, element->name);
+                               reader->path, strl__input_offset(&reader->input), what, ply->record + 1, element->count,
+                               element->name);
 }
 
-strl_status strl__ply_value_fail(strl_reader *reader, const char *what, uint64_t limit,
-                                 double found, strl_error *err)
+strl_status strl__ply_value_fail(strl_reader *reader, const char *what, uint64_t limit, double found, strl_error *err)
 {
     strl__ply_state *ply = reader->state;
     uint64_t place = ply->header.ascii ? reader->input.line : strl__input_offset(&reader->input);
     strl_status failed = strl__input_status(&reader->input, err);
     if (failed)
         return failed;
-    return strl__fail(
-        err, STRL_ERR_FORMAT, "%s, %s %" PRIu64 ": expected %s below %" PRIu64 ", found %.17g",
-        reader->path, ply->header.ascii ? "line" : "before byte", place, what, limit, found);
+    return strl__fail(err, STRL_ERR_FORMAT, "%s, %s %" PRIu64 ": expected %s below %" PRIu64 ", found %.17g",
+                      reader->path, ply->header.ascii ? "line" : "before byte", place, what, limit, found);
 }
 
 void strl__ply_begin_record(strl_reader *reader)
@@ -54,8 +52,8 @@ void strl__ply_end_record(strl_reader *reader)
         strl__text_skip_line(&reader->input);
 }
 
-strl_status strl__ply_read_count(strl_reader *reader, const strl__ply_property *property,
-                                 uint64_t *count, strl_error *err)
+strl_status strl__ply_read_count(strl_reader *reader, const strl__ply_property *property, uint64_t *count,
+                                 strl_error *err)
 {
     strl__ply_state *ply = reader->state;
     double value;
@@ -69,8 +67,7 @@ strl_status strl__ply_read_count(strl_reader *reader, const strl__ply_property *
     return STRL_OK;
 }
 
-static strl_status skip_items(strl_reader *reader, strl__scalar type, uint64_t count,
-                              strl_error *err)
+static strl_status skip_items(strl_reader *reader, strl__scalar type, uint64_t count, strl_error *err)
 {
     strl__ply_state *ply = reader->state;
     if (!ply->header.ascii)
@@ -84,12 +81,10 @@ static strl_status skip_items(strl_reader *reader, strl__scalar type, uint64_t c
     return STRL_OK;
 }
 
-strl_status strl__ply_skip_property(strl_reader *reader, const strl__ply_property *property,
-                                    strl_error *err)
+strl_status strl__ply_skip_property(strl_reader *reader, const strl__ply_property *property, strl_error *err)
 {
     uint64_t count = 1;
-    strl_status status =
-        property->is_list ? strl__ply_read_count(reader, property, &count, err) : STRL_OK;
+    strl_status status = property->is_list ? strl__ply_read_count(reader, property, &count, err) : STRL_OK;
     return status ? status : skip_items(reader, property->type, count, err);
 }
 

@@ -5,8 +5,7 @@
 #include <string.h>
 
 /* Where the file's own vertex records have their attributes. */
-static void layout_in_place(const strl__ply_state *ply, const strl__ply_element *element,
-                            strl__layout *layout)
+static void layout_in_place(const strl__ply_state *ply, const strl__ply_element *element, strl__layout *layout)
 {
     *layout = (strl__layout){.stride = element->stride, .big_endian = ply->header.big_endian};
     strl__field fields[STRL__PLY_ATTRIBUTES] = {0};
@@ -45,13 +44,11 @@ static void pack_record(const strl__layout *layout, const double values[STRL__PL
     }
     for (unsigned i = 0; layout->has_colour && i < 4; i++)
         record[layout->colour[i].offset] =
-            i < 3 || layout->has_alpha
-                ? strl__colour_channel(types[STRL__PLY_RED + i], values[STRL__PLY_RED + i])
-                : 255;
+            i < 3 || layout->has_alpha ? strl__colour_channel(types[STRL__PLY_RED + i], values[STRL__PLY_RED + i])
+                                       : 255;
 }
 
-static strl_status spill_vertex(strl_reader *reader, const strl__ply_element *element,
-                                strl_error *err)
+static strl_status spill_vertex(strl_reader *reader, const strl__ply_element *element, strl_error *err)
 {
     strl__ply_state *ply = reader->state;
     double values[STRL__PLY_ATTRIBUTES] = {0};
@@ -73,8 +70,7 @@ static strl_status spill_vertex(strl_reader *reader, const strl__ply_element *el
     return strl__table_append(&reader->vertices, record, err);
 }
 
-static strl_status spill_vertices(strl_reader *reader, const strl__ply_element *element,
-                                  strl_error *err)
+static strl_status spill_vertices(strl_reader *reader, const strl__ply_element *element, strl_error *err)
 {
     strl__ply_state *ply = reader->state;
     strl_status status = STRL_OK;
@@ -106,7 +102,7 @@ strl_status strl__ply_take_vertices(strl_reader *reader, strl_error *err)
         strl__table_build(&reader->vertices, &layout, reader->scratch_dir, window);
         return spill_vertices(reader, element, err);
     }
-    strl__table_place(&reader->vertices, &layout, reader->file, strl__input_offset(&reader->input),
-                      element->count, window);
+    strl__table_place(&reader->vertices, &layout, reader->file, strl__input_offset(&reader->input), element->count,
+                      window);
     return strl__ply_skip_element(reader, err);
 }

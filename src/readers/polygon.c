@@ -66,8 +66,7 @@ double strl__orientation(const double a[2], const double b[2], const double c[2]
     double left = (a[0] - c[0]) * (b[1] - c[1]);
     double right = (a[1] - c[1]) * (b[0] - c[0]);
     double area = left - right;
-    double bound =
-        3.3306690738754716e-16 * ((left < 0 ? -left : left) + (right < 0 ? -right : right));
+    double bound = 3.3306690738754716e-16 * ((left < 0 ? -left : left) + (right < 0 ? -right : right));
     return area > bound || -area > bound ? area : exact_orientation(a, b, c);
 }
 
@@ -94,8 +93,8 @@ static bool reserve(strl__polygon *polygon, uint32_t corner_count)
     polygon->next = strl__alloc(capacity, sizeof *polygon->next);
     polygon->reflex = strl__alloc(capacity, sizeof *polygon->reflex);
     polygon->is_reflex = strl__alloc(capacity, 1);
-    if (!polygon->triangles || !polygon->plane || !polygon->previous || !polygon->next ||
-        !polygon->reflex || !polygon->is_reflex) {
+    if (!polygon->triangles || !polygon->plane || !polygon->previous || !polygon->next || !polygon->reflex ||
+        !polygon->is_reflex) {
         strl__polygon_deinit(polygon);
         return false;
     }
@@ -109,8 +108,7 @@ static const double *position_at(const double *positions, size_t stride_bytes, u
 }
 
 /* Newell's normal, relative to the first corner to keep its digits. */
-static void newell_normal(const double *positions, size_t stride_bytes, uint32_t count,
-                          double normal[3])
+static void newell_normal(const double *positions, size_t stride_bytes, uint32_t count, double normal[3])
 {
     const double *origin = positions;
     memset(normal, 0, 3 * sizeof *normal);
@@ -119,16 +117,14 @@ static void newell_normal(const double *positions, size_t stride_bytes, uint32_t
         const double *q = position_at(positions, stride_bytes, i + 1 < count ? i + 1 : 0);
         for (unsigned axis = 0; axis < 3; axis++) {
             unsigned u = (axis + 1) % 3, v = (axis + 2) % 3;
-            normal[axis] +=
-                (p[u] - origin[u]) * (q[v] - origin[v]) - (p[v] - origin[v]) * (q[u] - origin[u]);
+            normal[axis] += (p[u] - origin[u]) * (q[v] - origin[v]) - (p[v] - origin[v]) * (q[u] - origin[u]);
         }
     }
 }
 
 /* Drops the axis along which the polygon's plane is steepest, so that coordinates stay exact;
  * counterclockwise after. */
-static void project(strl__polygon *polygon, const double *positions, size_t stride_bytes,
-                    uint32_t count)
+static void project(strl__polygon *polygon, const double *positions, size_t stride_bytes, uint32_t count)
 {
     double normal[3];
     newell_normal(positions, stride_bytes, count, normal);
@@ -199,9 +195,8 @@ static bool is_ear(ear_clipper *clipper, uint32_t corner)
         if (!polygon->is_reflex[p] || p == a || p == c)
             continue;
         clipper->tests_left--;
-        if (turn(polygon, a, corner, p) >= 0 && turn(polygon, corner, c, p) >= 0 &&
-            turn(polygon, c, a, p) >= 0 && !same_point(polygon, p, a) &&
-            !same_point(polygon, p, corner) && !same_point(polygon, p, c))
+        if (turn(polygon, a, corner, p) >= 0 && turn(polygon, corner, c, p) >= 0 && turn(polygon, c, a, p) >= 0 &&
+            !same_point(polygon, p, a) && !same_point(polygon, p, corner) && !same_point(polygon, p, c))
             return false;
     }
     return true;
@@ -220,8 +215,7 @@ static void compact_reflex(ear_clipper *clipper)
 static void update_reflex(strl__polygon *polygon, uint32_t corner)
 {
     if (polygon->is_reflex[corner])
-        polygon->is_reflex[corner] =
-            !(turn(polygon, polygon->previous[corner], corner, polygon->next[corner]) > 0);
+        polygon->is_reflex[corner] = !(turn(polygon, polygon->previous[corner], corner, polygon->next[corner]) > 0);
 }
 
 static void start_clipper(ear_clipper *clipper, uint32_t count)

@@ -20,9 +20,8 @@
 #define INPUT_BYTES_MAX ((uint64_t)1 << 20)
 
 /* The most certain signature first. */
-static const strl__format *const formats[] = {&strl__format_glb, &strl__format_ply,
-                                              &strl__format_gltf, &strl__format_stl,
-                                              &strl__format_obj};
+static const strl__format *const formats[] = {&strl__format_glb, &strl__format_ply, &strl__format_gltf,
+                                              &strl__format_stl, &strl__format_obj};
 
 bool strl__has_extension(const char *path, const char *extension)
 {
@@ -48,19 +47,17 @@ static void show_start(const strl__input *input, char *text, size_t size)
 static strl_status recognise(strl_reader *reader, strl_error *err)
 {
     if (reader->opened.bytes == 0)
-        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected a mesh, found an empty file",
-                          reader->path);
+        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected a mesh, found an empty file", reader->path);
     strl__input_want(&reader->input, STRL__TOKEN_BYTES);
     strl_status status = strl__input_status(&reader->input, err);
     if (status)
         return status;
     if (strl__stranger_is_pointer(reader->input.at, (size_t)(reader->input.end - reader->input.at)))
-        return strl__fail(err, STRL_ERR_UNSUPPORTED, "%s: expected a mesh, found a Git LFS pointer: " STRL__POINTER_ADVICE,
-                          reader->path);
+        return strl__fail(err, STRL_ERR_UNSUPPORTED,
+                          "%s: expected a mesh, found a Git LFS pointer: " STRL__POINTER_ADVICE, reader->path);
     const bool foreign = strl__assimp_extension(reader->path) != NULL;
     for (size_t i = 0; i < sizeof formats / sizeof *formats && !reader->format; i++)
-        if (!(foreign && formats[i]->weak) &&
-            formats[i]->recognises(&reader->input, reader->opened.bytes))
+        if (!(foreign && formats[i]->weak) && formats[i]->recognises(&reader->input, reader->opened.bytes))
             reader->format = formats[i];
     reader->is_certain = reader->format != NULL;
     for (size_t i = 0; i < sizeof formats / sizeof *formats && !reader->format; i++)
@@ -72,8 +69,7 @@ static strl_status recognise(strl_reader *reader, strl_error *err)
         return STRL_OK;
     const char *stranger = strl__stranger_describe(&reader->input, reader->path);
     if (stranger)
-        return strl__fail(err, STRL_ERR_UNSUPPORTED, "%s: expected a mesh, found %s", reader->path,
-                          stranger);
+        return strl__fail(err, STRL_ERR_UNSUPPORTED, "%s: expected a mesh, found %s", reader->path, stranger);
     char found[32];
     show_start(&reader->input, found, sizeof found);
     return strl__fail(err, STRL_ERR_UNSUPPORTED,
@@ -93,9 +89,8 @@ static strl_status open_file(strl_reader *reader, const strl_reader_desc *desc, 
         status = strl_file_stat(reader->file, &reader->opened, err);
     uint64_t input_bytes = reader->memory_bytes / 32;
     if (!status)
-        status = strl__input_init(
-            &reader->input, reader->file,
-            (size_t)(input_bytes < INPUT_BYTES_MAX ? input_bytes : INPUT_BYTES_MAX), err);
+        status = strl__input_init(&reader->input, reader->file,
+                                  (size_t)(input_bytes < INPUT_BYTES_MAX ? input_bytes : INPUT_BYTES_MAX), err);
     if (!status)
         status = strl__utf16_decode(reader, &reader->decoded, err);
     return status;
@@ -132,15 +127,15 @@ static strl_status give_to_importer(strl_reader *reader, strl_error *err)
     return open_format(reader, err);
 }
 
-strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__format *format,
-                                 strl_reader **out, strl_error *err)
+strl_status strl__reader_open_as(const strl_reader_desc *desc, const strl__format *format, strl_reader **out,
+                                 strl_error *err)
 {
     *out = NULL;
     uint64_t memory_bytes = desc->memory_bytes ? desc->memory_bytes : MEMORY_DEFAULT;
     if (memory_bytes < STRL__READER_MEMORY_LEAST)
         return strl__fail(err, STRL_ERR_ARGUMENT,
-                          "%s: %" PRIu64 " bytes of memory are too few, a reader needs %" PRIu64,
-                          desc->path, memory_bytes, STRL__READER_MEMORY_LEAST);
+                          "%s: %" PRIu64 " bytes of memory are too few, a reader needs %" PRIu64, desc->path,
+                          memory_bytes, STRL__READER_MEMORY_LEAST);
     strl_reader *reader = strl__alloc_zero(1, sizeof *reader);
     if (!reader)
         return strl__fail(err, STRL_ERR_MEMORY, "%s: no memory for a reader", desc->path);
@@ -216,8 +211,7 @@ strl_status strl__reader_init_batch(strl_reader *reader, bool indexed, strl_erro
 {
     const strl__table *tables[3] = {&reader->vertices, &reader->normals, &reader->texcoords};
     const uint64_t images = indexed && reader->texcoords.count ? reader->textures.limit_bytes : 0;
-    strl__batch_desc desc = {.indexed = indexed,
-                             .bytes = (size_t)(reader->memory_bytes / 8 * 5 - images)};
+    strl__batch_desc desc = {.indexed = indexed, .bytes = (size_t)(reader->memory_bytes / 8 * 5 - images)};
     desc.indexed_normals = indexed && reader->normals.count > 0;
     desc.indexed_texcoords = indexed && reader->texcoords.count > 0;
     for (unsigned i = 0; i < 3; i++)
@@ -249,8 +243,8 @@ static strl_status read_batch(strl_reader *reader, strl_error *err)
     strl__batch_reset(&reader->batch);
     strl_status status = reader->format->fill(reader, err);
     if (!status && reader->batch.vertex)
-        status = strl__batch_resolve(&reader->batch, &reader->vertices,
-                                     reader->normals.count ? &reader->normals : NULL, err);
+        status = strl__batch_resolve(&reader->batch, &reader->vertices, reader->normals.count ? &reader->normals : NULL,
+                                     err);
     if (!status && reader->batch.texcoord)
         status = strl__batch_resolve_texcoords(&reader->batch, &reader->texcoords, err);
     if (!status && reader->format->paint)
@@ -276,14 +270,13 @@ static void note_texcoords(strl_reader *reader, const strl_triangle *triangles, 
     }
 }
 
-static strl_status next_triangles(strl_reader *reader, strl_triangle *triangles, size_t capacity,
-                                  size_t *count, strl_error *err)
+static strl_status next_triangles(strl_reader *reader, strl_triangle *triangles, size_t capacity, size_t *count,
+                                  strl_error *err)
 {
     strl_status status = reader->rests ? STRL_OK : make_ready(reader, err);
     while (!status && !reader->rests && *count < capacity) {
         size_t added = 0;
-        status = strl__batch_emit(&reader->batch, triangles + *count, capacity - *count, &added,
-                                  &reader->drops, err);
+        status = strl__batch_emit(&reader->batch, triangles + *count, capacity - *count, &added, &reader->drops, err);
         if (reader->batch.has_texcoord)
             note_texcoords(reader, triangles + *count, added);
         *count += added;
@@ -296,8 +289,8 @@ static strl_status next_triangles(strl_reader *reader, strl_triangle *triangles,
     return status;
 }
 
-strl_status strl_reader_next(strl_reader *reader, strl_triangle *triangles, size_t capacity,
-                             size_t *count, strl_error *err)
+strl_status strl_reader_next(strl_reader *reader, strl_triangle *triangles, size_t capacity, size_t *count,
+                             strl_error *err)
 {
     *count = 0;
     if (!reader->failed) {
@@ -326,8 +319,7 @@ const char *strl__reader_advise_more(const strl_reader *reader)
     return reader->whole_bytes ? "more --memory may help" : "more memory may help";
 }
 
-strl_status strl__reader_check_unchanged(strl_file *file, const strl_file_info *opened,
-                                         strl_error *err)
+strl_status strl__reader_check_unchanged(strl_file *file, const strl_file_info *opened, strl_error *err)
 {
     strl_file_info now;
     strl_status status = strl_file_stat(file, &now, err);
@@ -335,8 +327,8 @@ strl_status strl__reader_check_unchanged(strl_file *file, const strl_file_info *
         return status;
     if (now.bytes != opened->bytes || now.modified_ns != opened->modified_ns)
         return strl__fail(err, STRL_ERR_IO,
-                          "%s has changed while it was read: it had %" PRIu64
-                          " bytes, now it has %" PRIu64 " and a time of change %s",
+                          "%s has changed while it was read: it had %" PRIu64 " bytes, now it has %" PRIu64
+                          " and a time of change %s",
                           strl_file_path(file), opened->bytes, now.bytes,
                           now.modified_ns != opened->modified_ns ? "of its own" : "as before");
     return STRL_OK;
@@ -370,8 +362,8 @@ void strl_reader_piece_get(const strl_reader *reader, uint32_t piece, strl_reade
 strl_status strl_reader_select(strl_reader *reader, uint32_t piece, strl_error *err)
 {
     if (piece > reader->piece_count)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "%s: there is no piece %u, expected one of %u",
-                          reader->path, piece, reader->piece_count + 1);
+        return strl__fail(err, STRL_ERR_ARGUMENT, "%s: there is no piece %u, expected one of %u", reader->path, piece,
+                          reader->piece_count + 1);
     reader->piece = piece;
     return strl_reader_rewind(reader, err);
 }
@@ -384,12 +376,11 @@ strl_status strl_reader_begin_placements(strl_reader *reader, strl_error *err)
     return status;
 }
 
-strl_status strl_reader_next_placement(strl_reader *reader, strl_reader_placement *placement,
-                                       bool *found, strl_error *err)
+strl_status strl_reader_next_placement(strl_reader *reader, strl_reader_placement *placement, bool *found,
+                                       strl_error *err)
 {
     *found = false;
-    return reader->piece_count ? reader->format->next_placement(reader, placement, found, err)
-                               : STRL_OK;
+    return reader->piece_count ? reader->format->next_placement(reader, placement, found, err) : STRL_OK;
 }
 
 void strl_reader_rest(strl_reader *reader)
@@ -468,19 +459,16 @@ const char *strl_reader_beside(const strl_reader *reader, uint32_t index, strl_f
     return reader->beside[index].path;
 }
 
-bool strl_reader_material_image(const strl_reader *reader, uint32_t material,
-                                strl_reader_image *image)
+bool strl_reader_material_image(const strl_reader *reader, uint32_t material, strl_reader_image *image)
 {
-    if (material >= reader->materials.count ||
-        reader->materials.items[material].texture == STRL__NO_TEXTURE)
+    if (material >= reader->materials.count || reader->materials.items[material].texture == STRL__NO_TEXTURE)
         return false;
     const strl__name *name = &reader->materials.items[material];
     const strl__texture *texture = &reader->textures.items[name->texture];
-    *image = (strl_reader_image){
-        .reference = reader->textures.pictures[texture->picture].reference,
-        .wrap = {texture->wrap[0], texture->wrap[1]},
-        .texcoord_min = {name->least[0], name->least[1]},
-        .texcoord_max = {name->most[0], name->most[1]}};
+    *image = (strl_reader_image){.reference = reader->textures.pictures[texture->picture].reference,
+                                 .wrap = {texture->wrap[0], texture->wrap[1]},
+                                 .texcoord_min = {name->least[0], name->least[1]},
+                                 .texcoord_max = {name->most[0], name->most[1]}};
     return true;
 }
 
@@ -498,8 +486,7 @@ uint64_t strl_reader_bytes_done(const strl_reader *reader)
 {
     if (!reader->started)
         return 0;
-    return reader->format->bytes_done ? reader->format->bytes_done(reader)
-                                      : strl__input_offset(&reader->input);
+    return reader->format->bytes_done ? reader->format->bytes_done(reader) : strl__input_offset(&reader->input);
 }
 
 uint32_t strl_reader_part_count(const strl_reader *reader)

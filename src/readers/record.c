@@ -18,16 +18,13 @@ static void decode_position(const strl__layout *layout, const uint8_t *record, d
     const strl__field *field = layout->position;
     if (field[0].type == STRL__F32 && field[1].type == STRL__F32 && field[2].type == STRL__F32) {
         for (unsigned axis = 0; axis < 3; axis++)
-            position[axis] =
-                (double)strl__load_f32(record + field[axis].offset, layout->big_endian);
-    } else if (field[0].type == STRL__F64 && field[1].type == STRL__F64 &&
-               field[2].type == STRL__F64) {
+            position[axis] = (double)strl__load_f32(record + field[axis].offset, layout->big_endian);
+    } else if (field[0].type == STRL__F64 && field[1].type == STRL__F64 && field[2].type == STRL__F64) {
         for (unsigned axis = 0; axis < 3; axis++)
             position[axis] = strl__load_f64(record + field[axis].offset, layout->big_endian);
     } else {
         for (unsigned axis = 0; axis < 3; axis++)
-            position[axis] = strl__scalar_load(field[axis].type, record + field[axis].offset,
-                                               layout->big_endian);
+            position[axis] = strl__scalar_load(field[axis].type, record + field[axis].offset, layout->big_endian);
     }
 }
 
@@ -36,8 +33,7 @@ static void decode_normal(const strl__layout *layout, const uint8_t *record, flo
     bool finite = true;
     for (unsigned axis = 0; axis < 3; axis++) {
         const strl__field *field = &layout->normal[axis];
-        normal[axis] =
-            (float)strl__scalar_load(field->type, record + field->offset, layout->big_endian);
+        normal[axis] = (float)strl__scalar_load(field->type, record + field->offset, layout->big_endian);
         finite = finite && __builtin_isfinite(normal[axis]);
     }
     if (!finite)
@@ -52,8 +48,7 @@ static uint32_t decode_colour(const strl__layout *layout, const uint8_t *record)
         const uint8_t *bytes = record + field->offset;
         channel[i] = field->type == STRL__U8
                          ? *bytes
-                         : strl__colour_channel(field->type, strl__scalar_load(field->type, bytes,
-                                                                               layout->big_endian));
+                         : strl__colour_channel(field->type, strl__scalar_load(field->type, bytes, layout->big_endian));
     }
     return strl__pack_colour(channel[0], channel[1], channel[2], channel[3]);
 }
@@ -67,6 +62,6 @@ void strl__layout_decode(const strl__layout *layout, const uint8_t *record, strl
     if (layout->has_colour)
         corner->colour = decode_colour(layout, record);
     for (unsigned axis = 0; layout->has_texcoord && axis < 2; axis++)
-        corner->texcoord[axis] = (float)strl__scalar_load(
-            layout->texcoord[axis].type, record + layout->texcoord[axis].offset, layout->big_endian);
+        corner->texcoord[axis] = (float)strl__scalar_load(layout->texcoord[axis].type,
+                                                          record + layout->texcoord[axis].offset, layout->big_endian);
 }

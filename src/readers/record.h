@@ -93,8 +93,8 @@ static inline uint32_t strl__pack_colour(uint8_t red, uint8_t green, uint8_t blu
 /* A corner with all its attributes looked up. */
 typedef struct strl__corner {
     double position[3];
-    float normal[3]; /* zero where absent or not finite */
-    uint32_t colour; /* sRGB-encoded RGBA8; 0xffffffff where absent */
+    float normal[3];   /* zero where absent or not finite */
+    uint32_t colour;   /* sRGB-encoded RGBA8; 0xffffffff where absent */
     float texcoord[2]; /* where there are any */
 } strl__corner;
 

@@ -68,10 +68,9 @@ static strl_status stl_open(strl_reader *reader, strl_error *err)
         return STRL_OK;
     }
     if (file_bytes < HEADER_BYTES)
-        return strl__fail(
-            err, STRL_ERR_FORMAT,
-            "%s: expected the 84 bytes of a binary STL header, found a file of %" PRIu64 " bytes",
-            reader->path, file_bytes);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "%s: expected the 84 bytes of a binary STL header, found a file of %" PRIu64 " bytes",
+                          reader->path, file_bytes);
     uint64_t expected = HEADER_BYTES + FACET_BYTES * stl->facet_count;
     if (file_bytes != expected)
         return strl__fail(err, STRL_ERR_FORMAT,
@@ -117,16 +116,14 @@ static strl_status fill_binary(strl_reader *reader, strl_error *err)
             strl_status failed = strl__input_status(input, err);
             return failed ? failed
                           : strl__fail(err, STRL_ERR_FORMAT,
-                                       "%s, byte %" PRIu64 ": expected triangle %" PRIu64
-                                       " of %" PRIu64 ", found the end of the file",
-                                       reader->path, strl__input_offset(input), stl->facet + 1,
-                                       stl->facet_count);
+                                       "%s, byte %" PRIu64 ": expected triangle %" PRIu64 " of %" PRIu64
+                                       ", found the end of the file",
+                                       reader->path, strl__input_offset(input), stl->facet + 1, stl->facet_count);
         }
         for (unsigned corner = 0; corner < 3; corner++) {
             double position[3];
             for (unsigned axis = 0; axis < 3; axis++)
-                position[axis] =
-                    (double)strl__load_f32(input->at + 12 + 12 * corner + 4 * axis, false);
+                position[axis] = (double)strl__load_f32(input->at + 12 + 12 * corner + 4 * axis, false);
             set_corner(&batch->corners[batch->corner_count + corner], position);
         }
         input->at += FACET_BYTES;
@@ -145,11 +142,9 @@ static strl_status end_facet(strl_reader *reader, strl_error *err)
         return STRL_OK;
     }
     if (!stl->part_known) {
-        strl_status status =
-            strl__names_add(&reader->parts, stl->name, stl->name_length, &stl->part, err);
+        strl_status status = strl__names_add(&reader->parts, stl->name, stl->name_length, &stl->part, err);
         if (status)
-            return strl__fail_context(err, status, "%s, line %" PRIu64, reader->path,
-                                      reader->input.line);
+            return strl__fail_context(err, status, "%s, line %" PRIu64, reader->path, reader->input.line);
         stl->part_known = true;
     }
     strl__batch_add(&reader->batch, &(strl__face){stl->vertex_count, stl->part, 0, 0xffffffffu});
@@ -166,8 +161,7 @@ static strl_status read_vertex(strl_reader *reader, strl_error *err)
             return strl__text_expected(&reader->input, "a coordinate", err);
     }
     if (stl->vertex_count == STRL__POLYGON_CORNERS_MAX)
-        return strl__fail(err, STRL_ERR_LIMIT,
-                          "%s, line %" PRIu64 ": expected at most %u vertices in a facet",
+        return strl__fail(err, STRL_ERR_LIMIT, "%s, line %" PRIu64 ": expected at most %u vertices in a facet",
                           reader->path, reader->input.line, STRL__POLYGON_CORNERS_MAX);
     set_corner(&reader->batch.corners[reader->batch.corner_count + stl->vertex_count++], position);
     return STRL_OK;
@@ -241,8 +235,7 @@ static strl_status read_facet(strl_reader *reader, strl_error *err)
         input->at += 8;
         return end_facet(reader, err);
     }
-    if (!strl__text_token_is_caseless(input, "outer") &&
-        !strl__text_token_is_caseless(input, "endloop"))
+    if (!strl__text_token_is_caseless(input, "outer") && !strl__text_token_is_caseless(input, "endloop"))
         return strl__text_expected(input, "'outer loop', 'vertex', 'endloop' or 'endfacet'", err);
     input->at += strl__text_token(input);
     strl__text_skip_blanks(input);

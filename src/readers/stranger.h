@@ -7,8 +7,8 @@
 
 #include "readers/input.h"
 
-/* What the file is and what to do instead, "a ZIP archive: unpack it and name the model in it", by its first bytes, which are in
- * the input, or by the ending of its name. NULL where neither tells. Static. */
+/* What the file is and what to do instead, "a ZIP archive: unpack it and name the model in it", by its first bytes,
+ * which are in the input, or by the ending of its name. NULL where neither tells. Static. */
 const char *strl__stranger_describe(const strl__input *input, const char *path);
 
 /* What stands in place of a file in a repository of large ones that were not fetched. */

@@ -6,8 +6,8 @@
 #include "base/fail.h"
 #include "base/memory.h"
 
-void strl__table_place(strl__table *table, const strl__layout *layout, strl_file *file,
-                       uint64_t offset, uint64_t count, size_t window_limit)
+void strl__table_place(strl__table *table, const strl__layout *layout, strl_file *file, uint64_t offset, uint64_t count,
+                       size_t window_limit)
 {
     *table = (strl__table){.layout = *layout, .file = file, .offset = offset, .count = count};
     table->window_limit = window_limit;
@@ -17,8 +17,7 @@ void strl__table_place(strl__table *table, const strl__layout *layout, strl_file
         table->window_limit = layout->stride;
 }
 
-void strl__table_build(strl__table *table, const strl__layout *layout, const char *scratch_dir,
-                       size_t window_limit)
+void strl__table_build(strl__table *table, const strl__layout *layout, const char *scratch_dir, size_t window_limit)
 {
     strl__table_place(table, layout, NULL, 0, 0, window_limit);
     table->scratch_dir = scratch_dir;
@@ -35,10 +34,9 @@ void strl__table_deinit(strl__table *table)
 static strl_status create_spill(strl__table *table, strl_error *err)
 {
     if (!table->scratch_dir)
-        return strl__fail(
-            err, STRL_ERR_ARGUMENT,
-            "the vertices do not fit %zu bytes of memory and no scratch folder was given",
-            table->window_limit);
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "the vertices do not fit %zu bytes of memory and no scratch folder was given",
+                          table->window_limit);
     char name[40];
     snprintf(name, sizeof name, "reader-%" PRIxPTR ".spill", (uintptr_t)table);
     char *path = strl_path_join(table->scratch_dir, name);
@@ -56,9 +54,8 @@ static strl_status flush(strl__table *table, strl_error *err)
 {
     strl_status status = table->spill ? STRL_OK : create_spill(table, err);
     if (!status)
-        status =
-            strl_file_write(table->spill, table->window_first * table->layout.stride, table->window,
-                            (size_t)table->window_count * table->layout.stride, err);
+        status = strl_file_write(table->spill, table->window_first * table->layout.stride, table->window,
+                                 (size_t)table->window_count * table->layout.stride, err);
     table->window_first += table->window_count;
     table->window_count = 0;
     return status;
@@ -73,8 +70,7 @@ static strl_status reserve(strl__table *table, size_t bytes, strl_error *err)
     wanted = wanted > table->window_limit ? table->window_limit : wanted;
     uint8_t *grown = strl__realloc(table->window, wanted, 1);
     if (!grown)
-        return strl__fail(err, STRL_ERR_MEMORY,
-                          "no memory for a window of %zu bytes on the vertices", wanted);
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for a window of %zu bytes on the vertices", wanted);
     table->window = grown;
     table->window_capacity = wanted;
     return STRL_OK;
@@ -90,9 +86,7 @@ strl_status strl__table_append(strl__table *table, const void *record, strl_erro
             status = flush(table, err);
             used = 0;
         } else {
-            status = reserve(
-                table, used + stride < 4096 && table->window_limit >= 4096 ? 4096 : used + stride,
-                err);
+            status = reserve(table, used + stride < 4096 && table->window_limit >= 4096 ? 4096 : used + stride, err);
         }
         if (status)
             return status;
@@ -128,8 +122,7 @@ strl_status strl__table_load(strl__table *table, uint64_t first, uint64_t last, 
     table->window_count = 0;
     strl_status status = reserve(table, bytes, err);
     if (!status)
-        status = strl_file_read(table->file, table->offset + first * table->layout.stride,
-                                table->window, bytes, err);
+        status = strl_file_read(table->file, table->offset + first * table->layout.stride, table->window, bytes, err);
     if (!status) {
         table->window_first = first;
         table->window_count = last - first + 1;

@@ -16,7 +16,7 @@
 
 typedef struct strl__table {
     strl__layout layout;
-    strl_file *file; /* where the records lie; borrowed, or == spill; NULL: all are in the window */
+    strl_file *file;         /* where the records lie; borrowed, or == spill; NULL: all are in the window */
     strl_file *spill;        /* owned */
     const char *scratch_dir; /* borrowed; NULL: no place to spill to */
     uint64_t offset;         /* of the first record in file */
@@ -33,11 +33,10 @@ typedef struct strl__table {
 #define STRL__TABLE_NARROW 4u
 
 /* The records lie in file, which is borrowed; the caller has checked that they lie inside it. */
-void strl__table_place(strl__table *table, const strl__layout *layout, strl_file *file,
-                       uint64_t offset, uint64_t count, size_t window_limit);
-/* scratch_dir is borrowed for the life of the table. */
-void strl__table_build(strl__table *table, const strl__layout *layout, const char *scratch_dir,
+void strl__table_place(strl__table *table, const strl__layout *layout, strl_file *file, uint64_t offset, uint64_t count,
                        size_t window_limit);
+/* scratch_dir is borrowed for the life of the table. */
+void strl__table_build(strl__table *table, const strl__layout *layout, const char *scratch_dir, size_t window_limit);
 strl_status strl__table_append(strl__table *table, const void *record, strl_error *err);
 strl_status strl__table_finish(strl__table *table, strl_error *err);
 void strl__table_deinit(strl__table *table);
@@ -57,8 +56,7 @@ static inline uint64_t strl__table_window_records(const strl__table *table)
 /* The bytes that the window may take from now on. */
 static inline size_t strl__table_window_bytes(const strl__table *table)
 {
-    return strl__table_is_resident(table) ? (size_t)table->count * table->layout.stride
-                                          : table->window_limit;
+    return strl__table_is_resident(table) ? (size_t)table->count * table->layout.stride : table->window_limit;
 }
 
 /* Has records first..last (inclusive, < count, no more than fit) in the window. */

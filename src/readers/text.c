@@ -112,9 +112,8 @@ bool strl__text_token_is_caseless(const strl__input *input, const char *lower)
 
 size_t strl__text_rest_of_line(const strl__input *input)
 {
-    const char *limit = (size_t)(input->end - input->at) < STRL__TOKEN_BYTES
-                            ? input->end
-                            : input->at + STRL__TOKEN_BYTES - 1;
+    const char *limit =
+        (size_t)(input->end - input->at) < STRL__TOKEN_BYTES ? input->end : input->at + STRL__TOKEN_BYTES - 1;
     const char *last = find_line_end(input->at, limit);
     while (last > input->at && strl__is_blank(last[-1]))
         last--;
@@ -138,6 +137,6 @@ strl_status strl__text_expected(const strl__input *input, const char *what, strl
     } else if (input->at != input->end) {
         snprintf(found, sizeof found, "the end of the line");
     }
-    return strl__fail(err, STRL_ERR_FORMAT, "%s, line %" PRIu64 ": expected %s, found %s",
-                      input->name, input->line, what, found);
+    return strl__fail(err, STRL_ERR_FORMAT, "%s, line %" PRIu64 ": expected %s, found %s", input->name, input->line,
+                      what, found);
 }

@@ -36,22 +36,18 @@ static inline void strl__text_skip_blanks(strl__input *input)
 {
     while (*input->at == ' ' || *input->at == '\t')
         input->at++;
-    if (__builtin_expect((size_t)(input->end - input->at) < STRL__TOKEN_BYTES, 0) ||
-        strl__is_blank(*input->at) || *input->at == '\\')
+    if (__builtin_expect((size_t)(input->end - input->at) < STRL__TOKEN_BYTES, 0) || strl__is_blank(*input->at) ||
+        *input->at == '\\')
         strl__text_skip_blanks_slowly(input);
 }
 
 void strl__text_skip_byte_order_mark(strl__input *input); /* at the start of a file: of UTF-8 */
-void strl__text_skip_space(
-    strl__input *input); /* blanks and line ends; a whole token can be looked at then */
-void strl__text_skip_line(strl__input *input); /* to the start of the next line */
-void strl__text_end_line(strl__input *input);  /* over the line end at `at`, if there is one */
-size_t strl__text_token(
-    const strl__input *input); /* bytes of the token at `at`; 0 at the end of a line */
-bool strl__text_token_is(const strl__input *input,
-                         const char *word); /* the token at `at` is this word */
-bool strl__text_token_is_caseless(const strl__input *input,
-                                  const char *lower); /* the same for letters of any case */
+void strl__text_skip_space(strl__input *input);    /* blanks and line ends; a whole token can be looked at then */
+void strl__text_skip_line(strl__input *input);     /* to the start of the next line */
+void strl__text_end_line(strl__input *input);      /* over the line end at `at`, if there is one */
+size_t strl__text_token(const strl__input *input); /* bytes of the token at `at`; 0 at the end of a line */
+bool strl__text_token_is(const strl__input *input, const char *word);           /* the token at `at` is this word */
+bool strl__text_token_is_caseless(const strl__input *input, const char *lower); /* the same for letters of any case */
 /* The rest of the line without blanks at its end, up to STRL__TOKEN_BYTES - 1 bytes; consumes
  * nothing. */
 size_t strl__text_rest_of_line(const strl__input *input);

@@ -29,21 +29,18 @@ void strl__textures_deinit(strl__textures *textures)
     *textures = (strl__textures){0};
 }
 
-strl_status strl__textures_add_picture(strl__textures *textures, const char *key,
-                                       const char *reference, uint64_t item,
+strl_status strl__textures_add_picture(strl__textures *textures, const char *key, const char *reference, uint64_t item,
                                        uint32_t *picture, strl_error *err)
 {
     const size_t before = textures->keys.count;
-    if (!strl__grow(&textures->pictures, &textures->picture_capacity, before + 1,
-                    sizeof *textures->pictures))
+    if (!strl__grow(&textures->pictures, &textures->picture_capacity, before + 1, sizeof *textures->pictures))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu images", before + 1);
     char cut[REFERENCE_BYTES_MAX + 1];
     snprintf(cut, sizeof cut, "%s", reference);
     strl__picture added = {.key = strl__strdup(key), .reference = strl__strdup(cut), .item = item};
-    strl_status status =
-        added.key && added.reference
-            ? strl__names_add(&textures->keys, key, strlen(key), picture, err)
-            : strl__fail(err, STRL_ERR_MEMORY, "no memory for an image's name");
+    strl_status status = added.key && added.reference
+                             ? strl__names_add(&textures->keys, key, strlen(key), picture, err)
+                             : strl__fail(err, STRL_ERR_MEMORY, "no memory for an image's name");
     if (!status && *picture == before) {
         textures->pictures[before] = added;
         return STRL_OK;
@@ -53,14 +50,11 @@ strl_status strl__textures_add_picture(strl__textures *textures, const char *key
     return status;
 }
 
-strl_status strl__textures_add(strl__textures *textures, const strl__texture *texture,
-                               uint32_t *index, strl_error *err)
+strl_status strl__textures_add(strl__textures *textures, const strl__texture *texture, uint32_t *index, strl_error *err)
 {
-    if (textures->count >= STRL__NO_TEXTURE ||
-        textures->count * sizeof *texture > textures->limit_bytes / 16)
-        return strl__fail(err, STRL_ERR_LIMIT,
-                          "%zu textures are more than the memory budget allows: %s", textures->count,
-                          textures->advice);
+    if (textures->count >= STRL__NO_TEXTURE || textures->count * sizeof *texture > textures->limit_bytes / 16)
+        return strl__fail(err, STRL_ERR_LIMIT, "%zu textures are more than the memory budget allows: %s",
+                          textures->count, textures->advice);
     if (!strl__grow(&textures->items, &textures->capacity, textures->count + 1, sizeof *texture))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu textures", textures->count + 1);
     textures->items[textures->count] = *texture;
@@ -120,12 +114,14 @@ char *strl__texture_rename(const char *name, const char *ending)
     return renamed;
 }
 
-static strl_status decode_as(strl__textures *textures, strl__picture *picture, const char *ending,
-                             strl_error *err)
+static strl_status decode_as(strl__textures *textures, strl__picture *picture, const char *ending, strl_error *err)
 {
     strl__picture_place place = {.close = NULL};
-    const strl__image_room room = {
-        .limit_bytes = textures->limit_bytes, .image_bytes = textures->image_bytes, .advice = textures->advice, .context = textures, .make = make_room};
+    const strl__image_room room = {.limit_bytes = textures->limit_bytes,
+                                   .image_bytes = textures->image_bytes,
+                                   .advice = textures->advice,
+                                   .context = textures,
+                                   .make = make_room};
     strl_status status = textures->open(textures->context, picture, ending, &place, err);
     if (!status)
         status = strl__image_decode(&place.source, &room, &textures->srgb, &picture->image, err);
@@ -162,8 +158,7 @@ static void note_unusable(strl__textures *textures, strl__picture *picture, cons
         strl__fail(&textures->first_unusable, why->status, "%.400s %s", name, why->message);
 }
 
-strl_status strl__textures_get(strl__textures *textures, uint32_t texture,
-                               const strl__image **image, strl_error *err)
+strl_status strl__textures_get(strl__textures *textures, uint32_t texture, const strl__image **image, strl_error *err)
 {
     strl__picture *picture = &textures->pictures[textures->items[texture].picture];
     *image = NULL;

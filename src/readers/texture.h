@@ -38,7 +38,7 @@ typedef struct strl__picture_place {
 typedef struct strl__textures {
     strl__texture *items; /* owned */
     size_t count, capacity;
-    strl__names keys; /* of pictures */
+    strl__names keys;        /* of pictures */
     strl__picture *pictures; /* owned */
     size_t picture_capacity;
     uint64_t limit_bytes, held_bytes, clock;
@@ -48,8 +48,8 @@ typedef struct strl__textures {
     bool is_ready;
     /* ending: NULL, or what the file's name is to end in instead of its own. `err` says why not in
      * words that follow the picture's name. */
-    strl_status (*open)(void *context, const strl__picture *picture, const char *ending,
-                        strl__picture_place *place, strl_error *err);
+    strl_status (*open)(void *context, const strl__picture *picture, const char *ending, strl__picture_place *place,
+                        strl_error *err);
     void *context;
     uint32_t unusable_count;
     strl_error first_unusable; /* its message */
@@ -59,15 +59,13 @@ typedef struct strl__textures {
 void strl__textures_init(strl__textures *textures, uint64_t limit_bytes, const char *advice);
 void strl__textures_deinit(strl__textures *textures); /* zeroed is legal */
 /* The picture of a key, which is added where it is new. */
-strl_status strl__textures_add_picture(strl__textures *textures, const char *key,
-                                       const char *reference, uint64_t item,
+strl_status strl__textures_add_picture(strl__textures *textures, const char *key, const char *reference, uint64_t item,
                                        uint32_t *picture, strl_error *err);
-strl_status strl__textures_add(strl__textures *textures, const strl__texture *texture,
-                               uint32_t *index, strl_error *err);
+strl_status strl__textures_add(strl__textures *textures, const strl__texture *texture, uint32_t *index,
+                               strl_error *err);
 /* The decoded image of a texture, valid until the next call; NULL where it cannot be used, which is
  * counted once. Fails only without memory. */
-strl_status strl__textures_get(strl__textures *textures, uint32_t texture,
-                               const strl__image **image, strl_error *err);
+strl_status strl__textures_get(strl__textures *textures, uint32_t texture, const strl__image **image, strl_error *err);
 void strl__textures_rest(strl__textures *textures); /* gives decoded images back */
 void strl__textures_shed(strl__textures *textures); /* all but the one that was looked up last */
 /* A name with another ending, owned by the caller; NULL without memory. */

@@ -16,16 +16,20 @@ typedef struct strl_cache_entry {
     uint32_t index_capacity;            /* indices that the place has room for */
     uint32_t state;                     /* of the uploaded indices */
     uint32_t placement;                 /* null's: of the item that came last */
-    uint64_t frame;      /* the list whose indices these are; 0 = unknown */
-    uint64_t batch;      /* the backend's: the batch of draws that uses it last */
+    uint64_t frame;                     /* the list whose indices these are; 0 = unknown */
+    uint64_t batch;                     /* the backend's: the batch of draws that uses it last */
     uint64_t bytes;
-    bool translucent;    /* some vertex has alpha below 255, or they are splats */
-    uint64_t styles_version;     /* of the uploaded vertices, counted from 1; 0 = without */
-    bool styled, hides, hidden;  /* as uploaded: some vertex is not plain; some, all vertices are hidden */
-    bool lines;          /* indices are expanded to lines */
+    bool translucent;           /* some vertex has alpha below 255, or they are splats */
+    uint64_t styles_version;    /* of the uploaded vertices, counted from 1; 0 = without */
+    bool styled, hides, hidden; /* as uploaded: some vertex is not plain; some, all vertices are hidden */
+    bool lines;                 /* indices are expanded to lines */
     union {
-        struct { uint32_t slab, vertex_at, vertex_granules, index_at, index_granules; } range; /* gl45 */
-        struct { uint32_t array, vertices, indices; } names;                                  /* gl3 */
+        struct {
+            uint32_t slab, vertex_at, vertex_granules, index_at, index_granules;
+        } range; /* gl45 */
+        struct {
+            uint32_t array, vertices, indices;
+        } names; /* gl3 */
     } place;
     struct strl_cache_entry *newer, *older; /* by last use */
     struct strl_cache_entry *next;          /* in the same bucket */
@@ -53,8 +57,8 @@ typedef struct strl_cache_upload {
     uint32_t first_index, index_count; /* 0 = none */
 } strl_cache_upload;
 
-/* list_frame: strl_draw_list.frame. A dirty range is relative to the list before, so it counts only where the entry holds that list's
- * indices; otherwise a changed state costs all indices. */
+/* list_frame: strl_draw_list.frame. A dirty range is relative to the list before, so it counts only where the entry
+ * holds that list's indices; otherwise a changed state costs all indices. */
 strl_cache_upload strl__cache_plan(const strl_cache_entry *entry, const strl_draw_item *item, uint64_t list_frame);
 /* The entry now holds the item of that list. */
 void strl__cache_commit(strl_cache_entry *entry, const strl_draw_item *item, uint64_t list_frame);

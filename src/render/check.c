@@ -7,10 +7,13 @@
 
 #define NORMAL_MOST 1023
 
-static strl_status fail_item(const strl_draw_item *item, strl_error *err, const char *what, uint64_t found, uint64_t expected)
+static strl_status fail_item(const strl_draw_item *item, strl_error *err, const char *what, uint64_t found,
+                             uint64_t expected)
 {
-    return strl__fail(err, STRL_ERR_ARGUMENT, "draw item of node %" PRIu32 " (placement %" PRIu32 "): %s is %" PRIu64
-                      ", expected at most %" PRIu64, item->node, item->placement, what, found, expected);
+    return strl__fail(err, STRL_ERR_ARGUMENT,
+                      "draw item of node %" PRIu32 " (placement %" PRIu32 "): %s is %" PRIu64
+                      ", expected at most %" PRIu64,
+                      item->node, item->placement, what, found, expected);
 }
 
 strl_status strl__check_item_counts(const strl_draw_item *item, strl_error *err)
@@ -43,8 +46,10 @@ static strl_status check_numbers(const strl_draw_item *item, strl_error *err)
     if (item->positions == STRL_POSITIONS_LATTICE)
         finite = finite && isfinite(item->step) && item->step > 0;
     if (!finite)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "draw item of node %" PRIu32 " (placement %" PRIu32
-                          "): transform, origin, step or error is not a finite number in its range", item->node, item->placement);
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "draw item of node %" PRIu32 " (placement %" PRIu32
+                          "): transform, origin, step or error is not a finite number in its range",
+                          item->node, item->placement);
     return STRL_OK;
 }
 
@@ -59,9 +64,12 @@ static strl_status check_vertex(const strl_draw_item *item, uint32_t v, strl_err
         return STRL_OK;
     for (int i = 0; i < 3; i++) {
         int64_t cell;
-        if (__builtin_add_overflow(item->anchor[i], vertex->position[i], &cell) || cell < item->box_min[i] || cell > item->box_max[i])
-            return strl__fail(err, STRL_ERR_ARGUMENT, "draw item of node %" PRIu32 " (placement %" PRIu32 "): vertex %" PRIu32
-                              " lies outside the node's box along axis %d", item->node, item->placement, v, i);
+        if (__builtin_add_overflow(item->anchor[i], vertex->position[i], &cell) || cell < item->box_min[i] ||
+            cell > item->box_max[i])
+            return strl__fail(err, STRL_ERR_ARGUMENT,
+                              "draw item of node %" PRIu32 " (placement %" PRIu32 "): vertex %" PRIu32
+                              " lies outside the node's box along axis %d",
+                              item->node, item->placement, v, i);
     }
     return STRL_OK;
 }

@@ -13,8 +13,9 @@
 static strl_status check_size(uint32_t width, uint32_t height, strl_error *err)
 {
     if (width == 0 || height == 0 || width > 16384 || height > 16384)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "an image of %" PRIu32 "x%" PRIu32 " pixels is not between 1x1 and 16384x16384",
-                          width, height);
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "an image of %" PRIu32 "x%" PRIu32 " pixels is not between 1x1 and 16384x16384", width,
+                          height);
     return STRL_OK;
 }
 
@@ -25,7 +26,8 @@ static strl_status complete(strl_renderer_desc *desc, strl_error *err)
     if (desc->gpu_memory_bytes == 0)
         desc->gpu_memory_bytes = DEFAULT_GPU_BYTES;
     if (desc->supersample > MOST_SUPERSAMPLE)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "supersample is %" PRIu32 ", expected 1 to %u", desc->supersample, MOST_SUPERSAMPLE);
+        return strl__fail(err, STRL_ERR_ARGUMENT, "supersample is %" PRIu32 ", expected 1 to %u", desc->supersample,
+                          MOST_SUPERSAMPLE);
     if (desc->gpu_memory_bytes < STRL_RENDERER_LEAST_GPU_BYTES)
         return strl__fail(err, STRL_ERR_ARGUMENT, "a GPU memory budget of %" PRIu64 " bytes is below the least, %u",
                           desc->gpu_memory_bytes, STRL_RENDERER_LEAST_GPU_BYTES);
@@ -101,8 +103,11 @@ static void complete_options(strl_draw_options *options)
 strl_status strl_renderer_draw(strl_renderer *renderer, const strl_camera *camera, const strl_draw_list *list,
                                const strl_draw_options *options, strl_render_stats *stats, strl_error *err)
 {
-    strl_draw_setup setup = {.camera = *camera, .near_distance = list->near_distance, .far_distance = list->far_distance,
-                             .cull_back = list->cull == STRL_CULL_BACK, .supersample = renderer->desc.supersample};
+    strl_draw_setup setup = {.camera = *camera,
+                             .near_distance = list->near_distance,
+                             .far_distance = list->far_distance,
+                             .cull_back = list->cull == STRL_CULL_BACK,
+                             .supersample = renderer->desc.supersample};
     strl_render_stats unwanted;
     if (!stats)
         stats = &unwanted;
@@ -111,15 +116,19 @@ strl_status strl_renderer_draw(strl_renderer *renderer, const strl_camera *camer
         setup.options = *options;
     complete_options(&setup.options);
     if (!strl_view_init(&setup.view, camera))
-        return strl__fail(err, STRL_ERR_ARGUMENT, "the camera is degenerate: eye, target, up or angle do not make a view");
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "the camera is degenerate: eye, target, up or angle do not make a view");
     if (camera->width != renderer->desc.width || camera->height != renderer->desc.height)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "the camera's image is %" PRIu32 "x%" PRIu32 ", the renderer's %" PRIu32 "x%" PRIu32,
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "the camera's image is %" PRIu32 "x%" PRIu32 ", the renderer's %" PRIu32 "x%" PRIu32,
                           camera->width, camera->height, renderer->desc.width, renderer->desc.height);
     if (list->cull != STRL_CULL_NONE && list->cull != STRL_CULL_BACK)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "the draw list culls faces of a kind %d, which there is not", (int)list->cull);
+        return strl__fail(err, STRL_ERR_ARGUMENT, "the draw list culls faces of a kind %d, which there is not",
+                          (int)list->cull);
     if (list->count == 0)
         setup.near_distance = setup.far_distance = 1;
-    else if (!(setup.near_distance > 0) || !(setup.far_distance >= setup.near_distance) || !isfinite(setup.far_distance))
+    else if (!(setup.near_distance > 0) || !(setup.far_distance >= setup.near_distance) ||
+             !isfinite(setup.far_distance))
         return strl__fail(err, STRL_ERR_ARGUMENT, "the draw list reaches from %g to %g, expected 0 < near <= far",
                           setup.near_distance, setup.far_distance);
     strl_status status = renderer->klass->draw(renderer, &setup, list, stats, err);
@@ -149,7 +158,8 @@ strl_status strl_renderer_read_depth(strl_renderer *renderer, float *depth, strl
     return status != STRL_OK ? status : renderer->klass->read_depth(renderer, depth, err);
 }
 
-strl_status strl_renderer_present(strl_renderer *renderer, uint32_t window_width, uint32_t window_height, strl_error *err)
+strl_status strl_renderer_present(strl_renderer *renderer, uint32_t window_width, uint32_t window_height,
+                                  strl_error *err)
 {
     strl_status status = check_drawn(renderer, err);
     if (status == STRL_OK)

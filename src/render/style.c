@@ -15,7 +15,8 @@ static strl_part_style style_of(const strl_draw_options *options, const strl_dra
 strl_part_style strl__item_style(const strl_draw_item *item, const strl_draw_options *options)
 {
     uint32_t part = item->own_part - 1; /* of none: more than any count */
-    return options->part_styles && part < options->part_count ? (strl_part_style)options->part_styles[part] : STRL_PART_PLAIN;
+    return options->part_styles && part < options->part_count ? (strl_part_style)options->part_styles[part]
+                                                              : STRL_PART_PLAIN;
 }
 
 bool strl__style_update(strl_cache_entry *entry, const strl_draw_item *item, const strl_draw_options *options)

@@ -21,7 +21,8 @@ void strl__answer_text(strl__answer *answer, const char *type, strl_writer *out)
     strl__body *body = out->failed ? NULL : strl__body_create();
     answer->type = type;
     if (body) {
-        uint8_t *fitting = out->size > 0 ? strl__realloc(out->data, out->size, 1) : NULL; /* it is held until it is sent */
+        /* it is held until it is sent */
+        uint8_t *fitting = out->size > 0 ? strl__realloc(out->data, out->size, 1) : NULL;
         body->head = fitting ? fitting : out->data;
         body->head_bytes = out->size;
         answer->body = body;
@@ -129,7 +130,8 @@ static void answer_path(strl__site *site, strl__request *request, const strl__ta
         answer_metrics(site, answer);
     else if (!strl__is_served_name(name)) {
         if (!redirect_to_folder(site, target->path, answer))
-            strl__answer_sentence(answer, 404, "there is no such file; only files whose names end in .stroll are served");
+            strl__answer_sentence(answer, 404,
+                                  "there is no such file; only files whose names end in .stroll are served");
     } else if (query->format != STRL__FORMAT_ANY)
         strl__answer_sentence(answer, 400, "a file has no format, only a listing has");
     else if (query->kind != STRL__QUERY_NONE)

@@ -10,7 +10,8 @@
 #include "serve/parse.h"
 #include "serve/connections.h"
 
-typedef struct strl__pending strl__pending; /* a query that has had a turn and needs more; it has a place of most_queries */
+/* a query that has had a turn and needs more; it has a place of most_queries */
+typedef struct strl__pending strl__pending;
 void strl__pending_destroy(strl__pending *pending); /* NULL is legal */
 
 typedef struct strl__request {
@@ -28,7 +29,7 @@ typedef struct strl__answer {
     const char *type; /* static; NULL = no body */
     strl__body *body; /* owned; NULL = none */
     bool takes_ranges;
-    bool close;       /* the connection, afterwards */
+    bool close; /* the connection, afterwards */
     bool is_page;
     unsigned retry_s; /* 0 = not said */
     bool is_later;    /* there is none yet: ask again when others have ended, */
@@ -45,9 +46,9 @@ typedef struct strl__site {
     strl__metrics metrics;
     strl__connections connections;
     uint64_t answer_bytes;
-    uint64_t held_most;          /* bytes of memory of all answers that are under way */
+    uint64_t held_most; /* bytes of memory of all answers that are under way */
     _Atomic uint64_t held_bytes;
-    uint32_t most_queries;       /* at work at once, those between two turns included */
+    uint32_t most_queries; /* at work at once, those between two turns included */
     _Atomic uint32_t queries;
     void (*complain)(void *context, const char *sentence); /* NULL = nobody wants to know */
     void *context;
@@ -68,8 +69,10 @@ void strl__answer_file(strl__site *site, const strl__request *request, const cha
 void strl__answer_query(strl__site *site, const strl__query *query, const char *path, strl__pending **pending,
                         strl__answer *answer);
 void strl__answer_listing(strl__site *site, const char *path, bool json, strl__answer *answer);
-/* A regular file of the folder, with what the open file is. False: the answer says why there is none. The caller closes. */
-bool strl__open_served(strl__site *site, const char *path, strl_file **file, strl_file_info *info, strl__answer *answer);
+/* A regular file of the folder, with what the open file is. False: the answer says why there is none. The caller
+ * closes. */
+bool strl__open_served(strl__site *site, const char *path, strl_file **file, strl_file_info *info,
+                       strl__answer *answer);
 bool strl__is_served_name(const char *name);
 
 #endif

@@ -65,7 +65,8 @@ void strl__answer_file(strl__site *site, const strl__request *request, const cha
     } else if (answer->status == 412) {
         strl__answer_sentence(answer, 412, "the file is not the one that was meant");
     } else {
-        uint64_t first = answer->status == 206 ? range.first : 0, bytes = answer->status == 206 ? range.bytes : info.bytes;
+        uint64_t first = answer->status == 206 ? range.first : 0,
+                 bytes = answer->status == 206 ? range.bytes : info.bytes;
         if (answer->status == 206)
             snprintf(answer->range, sizeof answer->range, "bytes %" PRIu64 "-%" PRIu64 "/%" PRIu64, first,
                      first + bytes - 1, info.bytes);

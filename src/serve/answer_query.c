@@ -5,7 +5,7 @@
 #include "serve/answer.h"
 #include "serve/select.h"
 
-#define NODES_A_REQUEST 1024.0  /* looked at, cost as much as a plain request */
+#define NODES_A_REQUEST 1024.0   /* looked at, cost as much as a plain request */
 #define BYTES_A_REQUEST 131072.0 /* of node records read */
 /* Of one turn, after which the thread looks after its other connections. */
 #define TURN_NODES 1024u
@@ -36,7 +36,8 @@ static void refuse(strl__site *site, strl__answer *answer, strl_status status, c
         if (status != STRL_ERR_LIMIT)
             strl__site_complain(site, err->message);
         /* What has been looked up so far is kept, so asking again goes on from there. */
-        strl__answer_sentence(answer, 503, "%s", status == STRL_ERR_LIMIT ? err->message : "the file cannot be read now");
+        strl__answer_sentence(answer, 503, "%s",
+                              status == STRL_ERR_LIMIT ? err->message : "the file cannot be read now");
         answer->retry_s = 1;
     }
 }
@@ -104,12 +105,14 @@ static strl__pending *begin(strl__site *site, const char *path, strl__answer *an
 }
 
 /* A turn. *is_done false, and no failure: there is more to do. */
-static strl_status work(strl__pending *self, strl__model *model, const strl__query *query, bool *is_done, strl_error *err)
+static strl_status work(strl__pending *self, strl__model *model, const strl__query *query, bool *is_done,
+                        strl_error *err)
 {
     strl__site *site = self->site;
     uint64_t left = STRL__LOOKUP_BYTES > self->read_bytes ? STRL__LOOKUP_BYTES - self->read_bytes : 0;
     uint64_t granted = left < TURN_BYTES ? left : TURN_BYTES;
-    uint64_t most = query->most_bytes && query->most_bytes < site->answer_bytes ? query->most_bytes : site->answer_bytes;
+    uint64_t most =
+        query->most_bytes && query->most_bytes < site->answer_bytes ? query->most_bytes : site->answer_bytes;
     strl_status status = STRL_OK;
     *is_done = false;
     if (!self->selecting)

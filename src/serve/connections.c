@@ -140,8 +140,9 @@ static void *next_paused(strl__connections *self, bool closing, uint32_t *at)
 
 void strl__connections_resume(strl__connections *self, bool closing, void (*resume)(void *handle))
 {
-    /* Outside of the lock, for the library has locks of its own; what is suspended is not closed meanwhile. Once over all
-     * of them: one that is suspended anew at once waits for the next time, and when all ends nothing is suspended anew. */
+    /* Outside of the lock, for the library has locks of its own; what is suspended is not closed meanwhile. Once over
+     * all of them: one that is suspended anew at once waits for the next time, and when all ends nothing is suspended
+     * anew. */
     uint32_t at = 0;
     for (void *handle; (handle = next_paused(self, closing, &at));)
         resume(handle);

@@ -1,6 +1,6 @@
-/* The connections that are open: who they are, and since when nothing has come of them. A connection makes progress by a
- * whole request head, by each turn of its query and by each chunk that it takes of an answer, and by nothing else: bytes that
- * dribble in or out keep no place. Thread-safe. Internal. */
+/* The connections that are open: who they are, and since when nothing has come of them. A connection makes progress by
+ * a whole request head, by each turn of its query and by each chunk that it takes of an answer, and by nothing else:
+ * bytes that dribble in or out keep no place. Thread-safe. Internal. */
 #ifndef STRL_SERVE_CONNECTIONS_H
 #define STRL_SERVE_CONNECTIONS_H
 

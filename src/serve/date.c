@@ -147,7 +147,8 @@ bool strl__parse_date(const char *text, int64_t *unix_s)
     const char *rest = text + name + 1;
     bool good = text[name] == ' ' ? take_asctime(rest, &date)
                                   : *rest == ' ' && (take_fixed(rest + 1, &date) || take_dashed(rest + 1, &date));
-    if (!good || date.year < 1 || date.day < 1 || date.day > 31 || date.hour > 23 || date.minute > 59 || date.second > 60)
+    if (!good || date.year < 1 || date.day < 1 || date.day > 31 || date.hour > 23 || date.minute > 59 ||
+        date.second > 60)
         return false;
     *unix_s = days_of(date.year, date.month, date.day) * DAY_S + date.hour * 3600 + date.minute * 60 + date.second;
     return true;

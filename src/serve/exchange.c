@@ -10,7 +10,7 @@
 
 #define CHUNK_BYTES ((size_t)64 << 10)
 #define SMALL_BYTES ((uint64_t)4 << 10) /* of memory of an answer */
-#define SHOWN_BYTES ((size_t)1024) /* of a target in the log */
+#define SHOWN_BYTES ((size_t)1024)      /* of a target in the log */
 
 static strl__connection *connection_of(struct MHD_Connection *connection)
 {
@@ -135,7 +135,8 @@ static void wait_a_while(strl__exchange *exchange, struct MHD_Connection *handle
         MHD_resume_connection(handle);
 }
 
-/* goes_on: a turn was had, and the library asks again as soon as it has looked after the other connections of its thread. */
+/* goes_on: a turn was had, and the library asks again as soon as it has looked after the other connections of its
+ * thread. */
 static void put_off(strl__exchange *exchange, struct MHD_Connection *handle, bool goes_on)
 {
     if (!goes_on) {
@@ -207,7 +208,8 @@ static void put_lines(struct MHD_Response *response, const strl_server *server, 
     put_line(response, "Retry-After", answer->retry_s ? seconds : "");
     put_line(response, "Allow", answer->status == 405 || answer->status == 204 ? "GET, HEAD, OPTIONS" : "");
     put_line(response, "X-Content-Type-Options", "nosniff");
-    put_line(response, "Content-Security-Policy", answer->is_page ? "default-src 'none'; style-src 'unsafe-inline'" : "");
+    put_line(response, "Content-Security-Policy",
+             answer->is_page ? "default-src 'none'; style-src 'unsafe-inline'" : "");
     put_line(response, "Connection", answer->close ? "close" : "");
     put_origin(response, server, answer->status == 204);
 }
@@ -265,7 +267,8 @@ enum MHD_Result strl__exchange_send(strl__exchange *exchange, struct MHD_Connect
 static void turn_away(strl__exchange *exchange, strl__rejection reason, unsigned status, unsigned retry_s,
                       strl__answer *answer)
 {
-    static const char *const sentences[] = {"too many connections are open", "too many connections of your address are open",
+    static const char *const sentences[] = {"too many connections are open",
+                                            "too many connections of your address are open",
                                             "too many requests of your address"};
     atomic_fetch_add(&exchange->server->site.metrics.rejected[reason], 1);
     *answer = (strl__answer){.retry_s = retry_s, .close = reason != STRL__REJECTED_RATE};
@@ -309,8 +312,8 @@ enum MHD_Result strl__exchange_answer(void *cls, struct MHD_Connection *connecti
         return MHD_NO; /* without memory or a place the connection ends */
     if (!self->head_read) {
         take_head(self, connection, method);
-        /* The library ends a connection whose answer comes before its request is whole. That is what a request with a body
-         * deserves, of which nothing is ever taken in; others are asked for again. */
+        /* The library ends a connection whose answer comes before its request is whole. That is what a request with a
+         * body deserves, of which nothing is ever taken in; others are asked for again. */
         if (!self->request.has_body)
             return MHD_YES;
     }

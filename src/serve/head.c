@@ -78,6 +78,7 @@ void strl__exchange_read_head(strl__exchange *exchange, struct MHD_Connection *c
     if (exchange->host_lines > 1)
         refuse(exchange, "the request names two hosts");
     /* Two readers of such a head could disagree about where the next request begins. */
-    if (exchange->length_lines > 1 || exchange->encoding_lines > 1 || (exchange->length_lines && exchange->encoding_lines))
+    if (exchange->length_lines > 1 || exchange->encoding_lines > 1 ||
+        (exchange->length_lines && exchange->encoding_lines))
         refuse(exchange, "the request says twice how long its body is");
 }

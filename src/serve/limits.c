@@ -33,7 +33,8 @@ static strl__rate_slot *find(strl__rates *rates, const strl__rate_slot *key, dou
     memcpy(&number, key->address, sizeof number);
     strl__rate_slot *set = rates->slots[strl__mix64(number + key->is_v6) % STRL__RATE_SETS], *oldest = set;
     for (unsigned i = 0; i < STRL__RATE_WAYS; i++) {
-        if (set[i].last_ns && set[i].is_v6 == key->is_v6 && memcmp(set[i].address, key->address, sizeof key->address) == 0)
+        if (set[i].last_ns && set[i].is_v6 == key->is_v6 &&
+            memcmp(set[i].address, key->address, sizeof key->address) == 0)
             return &set[i];
         if (set[i].last_ns < oldest->last_ns)
             oldest = &set[i];

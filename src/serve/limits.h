@@ -1,5 +1,5 @@
-/* Limits in time: requests of an address a second, bytes of all answers a second. Token buckets; the time is given, so that
- * tests need no clock. Thread-safe. Internal. */
+/* Limits in time: requests of an address a second, bytes of all answers a second. Token buckets; the time is given, so
+ * that tests need no clock. Thread-safe. Internal. */
 #ifndef STRL_SERVE_LIMITS_H
 #define STRL_SERVE_LIMITS_H
 
@@ -31,7 +31,8 @@ void strl__rates_deinit(strl__rates *rates);
 /* 0 = the request may go on, else the whole seconds to wait. A full bucket holds two seconds' worth, at least 1. */
 unsigned strl__rates_take(strl__rates *rates, const strl_peer *peer, uint64_t now_ns);
 
-/* What a request, or a turn of it, cost beyond one: it is paid back before the next one. Debts are two seconds' worth at most. */
+/* What a request, or a turn of it, cost beyond one: it is paid back before the next one. Debts are two seconds' worth
+ * at most. */
 void strl__rates_charge(strl__rates *rates, const strl_peer *peer, double requests, uint64_t now_ns);
 
 typedef struct strl__flow {

@@ -96,8 +96,8 @@ static void put_facts_json(strl_writer *out, const entry *file)
     }
     strl__put_format(out, ",\"triangles\":%" PRIu64 ",\"trees\":%" PRIu32 ",\"model_id\":\"%.32s\",\"unit\":",
                      file->facts.triangles, file->facts.trees, etag + 3);
-    strl__put_json(out, strl__utf8_is_name((const uint8_t *)file->facts.unit, strlen(file->facts.unit)) ? file->facts.unit
-                                                                                                    : "");
+    strl__put_json(
+        out, strl__utf8_is_name((const uint8_t *)file->facts.unit, strlen(file->facts.unit)) ? file->facts.unit : "");
 }
 
 static void put_json_of(strl_writer *out, const listing *all, bool folders)
@@ -178,9 +178,10 @@ static void put_page(strl_writer *out, const char *folder, const listing *all)
     strl__put(out, "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
                    "<meta name=\"viewport\" content=\"width=device-width\"><title>Stroll: /");
     strl__put_html(out, folder);
-    strl__put(out, "</title><style>body{font:16px system-ui,sans-serif;margin:2em}td,th{padding:.2em 1em;text-align:right}"
-                   "td:first-child,th:first-child{text-align:left}tr:nth-child(even){background:#8882}</style></head><body>"
-                   "<h1>/");
+    strl__put(out,
+              "</title><style>body{font:16px system-ui,sans-serif;margin:2em}td,th{padding:.2em 1em;text-align:right}"
+              "td:first-child,th:first-child{text-align:left}tr:nth-child(even){background:#8882}</style></head><body>"
+              "<h1>/");
     strl__put_html(out, folder);
     strl__put(out, "</h1>\n<table><tr><th>name<th>size<th>triangles<th>unit</tr>\n");
     if (*folder)

@@ -8,11 +8,12 @@ static const struct {
     uint64_t ns;
     const char *text;
 } bounds[STRL__SECONDS_BUCKETS] = {
-    {1000000, "0.001"},    {5000000, "0.005"},    {10000000, "0.01"},    {50000000, "0.05"},    {100000000, "0.1"},
-    {500000000, "0.5"},    {1000000000, "1"},     {5000000000, "5"},     {30000000000, "30"},   {120000000000, "120"},
+    {1000000, "0.001"}, {5000000, "0.005"}, {10000000, "0.01"}, {50000000, "0.05"},  {100000000, "0.1"},
+    {500000000, "0.5"}, {1000000000, "1"},  {5000000000, "5"},  {30000000000, "30"}, {120000000000, "120"},
 };
 
-static const char *const reasons[STRL__REJECTIONS] = {"connections", "address", "rate", "timeout", "idle", "protocol", "memory"};
+static const char *const reasons[STRL__REJECTIONS] = {"connections", "address",  "rate",  "timeout",
+                                                      "idle",        "protocol", "memory"};
 
 void strl__metrics_count_request(strl__metrics *metrics, unsigned status, uint64_t duration_ns)
 {
@@ -42,7 +43,8 @@ static void put_requests(strl__metrics *metrics, strl_writer *out)
     for (unsigned i = 0; i < STRL__STATUSES; i++) {
         uint64_t count = atomic_load(&metrics->requests[i]);
         if (count)
-            strl__put_format(out, "stroll_serve_requests_total{code=\"%u\"} %" PRIu64 "\n", i + STRL__LEAST_STATUS, count);
+            strl__put_format(out, "stroll_serve_requests_total{code=\"%u\"} %" PRIu64 "\n", i + STRL__LEAST_STATUS,
+                             count);
     }
 }
 
@@ -79,9 +81,9 @@ void strl__metrics_write(strl__metrics *metrics, const strl__gauges *gauges, str
     put_one(out, "aborted_total", "counter", "Answers that did not end as announced.", atomic_load(&metrics->aborted));
     put_one(out, "query_nodes_total", "counter", "Nodes that queries were answered with.",
             atomic_load(&metrics->query_nodes));
-    put_one(out, "query_turns_total", "counter", "Turns of a thread that queries took.", atomic_load(&metrics->query_turns));
-    put_one(out, "queries_cut_total", "counter", "Query answers that were cut.",
-            atomic_load(&metrics->queries_cut));
+    put_one(out, "query_turns_total", "counter", "Turns of a thread that queries took.",
+            atomic_load(&metrics->query_turns));
+    put_one(out, "queries_cut_total", "counter", "Query answers that were cut.", atomic_load(&metrics->queries_cut));
     put_rejected(metrics, out);
     put_seconds(metrics, out);
 }

@@ -23,7 +23,7 @@ typedef enum strl__rejection {
 } strl__rejection;
 
 typedef struct strl__metrics {
-    _Atomic uint64_t requests[STRL__STATUSES]; /* by status - 100 */
+    _Atomic uint64_t requests[STRL__STATUSES];           /* by status - 100 */
     _Atomic uint64_t seconds[STRL__SECONDS_BUCKETS + 1]; /* the last one: longer than all bounds */
     _Atomic uint64_t duration_ns, bytes, connections, rejected[STRL__REJECTIONS];
     _Atomic uint64_t query_nodes, query_turns, queries_cut, aborted;

@@ -218,8 +218,8 @@ static strl_status ready(strl__model *model, strl_error *err)
     strl_container_close(model->container);
     model->container = NULL;
     return strl__fail(err, STRL_ERR_UNSUPPORTED,
-                      "looking nodes up takes %" PRIu64 " bytes of memory, more than the %" PRIu64 " of a container", bytes,
-                      STRL__MODEL_BYTES);
+                      "looking nodes up takes %" PRIu64 " bytes of memory, more than the %" PRIu64 " of a container",
+                      bytes, STRL__MODEL_BYTES);
 }
 
 strl_status strl__models_borrow(strl__models *models, const strl_file *file, const strl_file_info *info,

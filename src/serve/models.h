@@ -1,5 +1,6 @@
 /* What the server knows of the containers in its folder: facts of many, and a few that are open for queries. Both are
- * recognised by what the system says of the open file, so that a file that was replaced is another. Thread-safe. Internal. */
+ * recognised by what the system says of the open file, so that a file that was replaced is another. Thread-safe.
+ * Internal. */
 #ifndef STRL_SERVE_MODELS_H
 #define STRL_SERVE_MODELS_H
 
@@ -55,8 +56,9 @@ void strl__models_facts(strl__models *models, strl_file *file, const strl_file_i
 /* The tag of a file: a container's is its model id, so that it is the same on every server. */
 void strl__model_etag(const strl__model_facts *facts, const strl_file_info *info, char *etag, size_t size);
 
-/* For one query: locked and opened, for which *read_bytes (NULL: not wanted) were read, also where it fails. STRL_ERR_FORMAT or _UNSUPPORTED: it is no container, or one too large to look nodes up
- * in; STRL_ERR_LIMIT: one place too few; STRL_ERR_CANCELLED: another query is at work in it, nothing is waited for. */
+/* For one query: locked and opened, for which *read_bytes (NULL: not wanted) were read, also where it fails.
+ * STRL_ERR_FORMAT or _UNSUPPORTED: it is no container, or one too large to look nodes up in; STRL_ERR_LIMIT: one place
+ * too few; STRL_ERR_CANCELLED: another query is at work in it, nothing is waited for. */
 strl_status strl__models_borrow(strl__models *models, const strl_file *file, const strl_file_info *info,
                                 strl__model **model, uint64_t *read_bytes, strl_error *err);
 void strl__models_return(strl__models *models, strl__model *model); /* NULL is legal */

@@ -70,8 +70,9 @@ static strl__refusal take_items(const char *value, strl__query_kind kind, strl__
     for (;; value++) {
         strl__query_item item;
         if (!take_item(&value, kind == STRL__QUERY_SUBTREES, &item))
-            return REFUSED(400, "the query has a node that is not well-formed: expected numbers below 2^32 - 1, and with "
-                                "subtrees a depth below 65536 behind a slash");
+            return REFUSED(400,
+                           "the query has a node that is not well-formed: expected numbers below 2^32 - 1, and with "
+                           "subtrees a depth below 65536 behind a slash");
         if (query->count > 0 && item.node <= query->items[query->count - 1].node)
             return REFUSED(400, "the nodes of the query are not in increasing order");
         if (query->count == STRL__QUERY_ITEMS)

@@ -1,6 +1,7 @@
-/* Nodes to pieces of the file. Ids are breadth first, so what a subtree has at one depth is one run of ids, and its children
- * are the run of the next depth. A query is a heap of such runs by their next id: taking the lowest always gives all nodes
- * asked for in the order of their ids, each once, however the subtrees overlap, in memory that depends on the query alone. */
+/* Nodes to pieces of the file. Ids are breadth first, so what a subtree has at one depth is one run of ids, and its
+ * children are the run of the next depth. A query is a heap of such runs by their next id: taking the lowest always
+ * gives all nodes asked for in the order of their ids, each once, however the subtrees overlap, in memory that depends
+ * on the query alone. */
 #include "serve/select.h"
 
 #include <inttypes.h>
@@ -14,7 +15,7 @@
 /* Of one subtree, what is left of one depth, and what is known of the next. */
 typedef struct run {
     uint32_t next, end;
-    uint32_t depth; /* how many more levels are wanted below */
+    uint32_t depth;                  /* how many more levels are wanted below */
     uint32_t child_first, child_end; /* equal: no child so far */
 } run;
 
@@ -25,8 +26,9 @@ struct strl__selecting {
     strl__selection out;
     run *runs; /* [count], owned; a heap: the lowest next first */
     uint32_t count;
-    uint64_t last_treelet, last_page; /* offsets of the pieces that were added last; 0 = none, for there is the header */
-    uint32_t last_node;               /* answered last; STRL_NONE = none */
+    /* offsets of the pieces that were added last; 0 = none, for there is the header */
+    uint64_t last_treelet, last_page;
+    uint32_t last_node; /* answered last; STRL_NONE = none */
 };
 
 typedef struct strl__selecting choice;
@@ -113,8 +115,8 @@ static strl_status answer_node(choice *self, uint32_t id, const strl_node *node,
         return status;
     uint64_t cost = cost_of(self->last_treelet, place.offset, place.bytes) +
                     cost_of(self->last_page, node->page.offset, node->page.bytes);
-    if (out->node_count > 0 && (out->node_count == STRL__SELECTED_NODES ||
-                                STRL__ANSWER_HEAD_BYTES + out->bytes + cost > self->most_bytes)) {
+    if (out->node_count > 0 &&
+        (out->node_count == STRL__SELECTED_NODES || STRL__ANSWER_HEAD_BYTES + out->bytes + cost > self->most_bytes)) {
         cut_before(self, id);
         return STRL_OK;
     }
@@ -204,12 +206,13 @@ static strl_status check_query(const strl_container *container, const strl__quer
 {
     const strl_tree *tree = strl_container_tree(container, query->tree);
     if (!tree)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "there is no tree %" PRIu32 ", expected less than %" PRIu32, query->tree,
-                          strl_container_get_info(container)->tree_count);
+        return strl__fail(err, STRL_ERR_ARGUMENT, "there is no tree %" PRIu32 ", expected less than %" PRIu32,
+                          query->tree, strl_container_get_info(container)->tree_count);
     uint32_t last = query->items[query->count - 1].node; /* they increase */
     if (last >= tree->node_count)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "there is no node %" PRIu32 " in tree %" PRIu32 ", expected less than %" PRIu32,
-                          last, query->tree, tree->node_count);
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "there is no node %" PRIu32 " in tree %" PRIu32 ", expected less than %" PRIu32, last,
+                          query->tree, tree->node_count);
     return STRL_OK;
 }
 

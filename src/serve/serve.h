@@ -29,7 +29,8 @@ typedef struct strl_server_desc {
     uint64_t bandwidth;               /* bytes a second of all answers together; 0 = no limit */
     double rate;                      /* requests a second of one address; 0 = no limit */
     uint64_t timeout_ns;              /* without progress, then a connection is ended; 0 = 30 s */
-    const char *origin;               /* whose pages may read: Access-Control-Allow-Origin; NULL = "*", "" = nobody's */
+    /* whose pages may read: Access-Control-Allow-Origin; NULL = "*", "" = nobody's */
+    const char *origin;
     /* One line of the access log, without its end. NULL = none. Called by several threads at once, as is complain. */
     void (*log)(void *context, const char *line);
     /* A sentence about what is wrong with the server itself. NULL = none. */

@@ -104,13 +104,14 @@ static void resume(void *handle)
     MHD_resume_connection(handle);
 }
 
-/* Looks after what no request drives: connections without progress, connections that wait for bandwidth or for their turn to
- * query, idle models. */
+/* Looks after what no request drives: connections without progress, connections that wait for bandwidth or for their
+ * turn to query, idle models. */
 static void tend(void *context)
 {
     strl_server *server = context;
     strl__metrics *metrics = &server->site.metrics;
-    uint64_t tick_ns = server->timeout_ns / 8 < TICK_NS ? server->timeout_ns / 8 + 1 : TICK_NS, models_ns = strl_clock_ns();
+    uint64_t tick_ns = server->timeout_ns / 8 < TICK_NS ? server->timeout_ns / 8 + 1 : TICK_NS,
+             models_ns = strl_clock_ns();
     while (!atomic_load(&server->stopping)) {
         strl_sleep_ns(tick_ns);
         strl__connections_resume(&server->site.connections, false, resume);
@@ -158,18 +159,13 @@ static strl_status start_daemon(strl_server *server, const strl_server_desc *des
     size_t request_bytes = desc->request_bytes ? desc->request_bytes : STRL_SERVE_REQUEST_BYTES;
     server->daemon = MHD_start_daemon(
         MHD_USE_EPOLL_INTERNAL_THREAD | MHD_USE_ERROR_LOG | MHD_USE_ITC | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL,
-        strl__exchange_answer, server,
-        MHD_OPTION_EXTERNAL_LOGGER, take_remark, server, /* first, so that it hears of the others */
-        MHD_OPTION_LISTEN_SOCKET, server->listener,
-        MHD_OPTION_THREAD_POOL_SIZE, threads_of(desc),
-        MHD_OPTION_CONNECTION_LIMIT, (unsigned)capacity_of(desc),
-        MHD_OPTION_CONNECTION_MEMORY_LIMIT, request_bytes,
-        MHD_OPTION_STRICT_FOR_CLIENT, 1,
-        MHD_OPTION_UNESCAPE_CALLBACK, keep_as_it_is, server,
-        MHD_OPTION_URI_LOG_CALLBACK, strl__exchange_begin, server,
-        MHD_OPTION_NOTIFY_COMPLETED, strl__exchange_end, server,
-        MHD_OPTION_NOTIFY_CONNECTION, notice_connection, server,
-        MHD_OPTION_END);
+        strl__exchange_answer, server, MHD_OPTION_EXTERNAL_LOGGER, take_remark,
+        server, /* first, so that it hears of the others */
+        MHD_OPTION_LISTEN_SOCKET, server->listener, MHD_OPTION_THREAD_POOL_SIZE, threads_of(desc),
+        MHD_OPTION_CONNECTION_LIMIT, (unsigned)capacity_of(desc), MHD_OPTION_CONNECTION_MEMORY_LIMIT, request_bytes,
+        MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_UNESCAPE_CALLBACK, keep_as_it_is, server,
+        MHD_OPTION_URI_LOG_CALLBACK, strl__exchange_begin, server, MHD_OPTION_NOTIFY_COMPLETED, strl__exchange_end,
+        server, MHD_OPTION_NOTIFY_CONNECTION, notice_connection, server, MHD_OPTION_END);
     if (!server->daemon)
         return strl__fail(err, STRL_ERR_NETWORK, "cannot start the HTTP server of port %u", server->port);
     return STRL_OK;
@@ -212,7 +208,8 @@ strl_status strl_server_open(const strl_server_desc *desc, strl_server **server,
     add_running(made);
     strl_status status = prepare(made, desc, err);
     if (status == STRL_OK)
-        status = strl_socket_listen(desc->host ? desc->host : "127.0.0.1", desc->port, &made->listener, &made->port, err);
+        status =
+            strl_socket_listen(desc->host ? desc->host : "127.0.0.1", desc->port, &made->listener, &made->port, err);
     if (status == STRL_OK)
         status = start_daemon(made, desc, err);
     if (status == STRL_OK)

@@ -32,8 +32,8 @@ enum MHD_Result strl__exchange_answer(void *cls, struct MHD_Connection *connecti
                                       const char *version, const char *data, size_t *data_bytes, void **exchange);
 void strl__exchange_end(void *cls, struct MHD_Connection *connection, void **exchange,
                         enum MHD_RequestTerminationCode reason);
-/* Ends what the library began on the connection and did not end: with requests that it refuses in the middle of their first
- * line, libmicrohttpd 0.9.75 forgets that. On the connection's thread; NULL is legal. */
+/* Ends what the library began on the connection and did not end: with requests that it refuses in the middle of their
+ * first line, libmicrohttpd 0.9.75 forgets that. On the connection's thread; NULL is legal. */
 void strl__exchange_drop(strl__connection *connection);
 
 #endif

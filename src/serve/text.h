@@ -1,4 +1,5 @@
-/* Text of strangers, escaped for where it goes. Each appends to a writer, whose sticky failure the caller checks. Internal. */
+/* Text of strangers, escaped for where it goes. Each appends to a writer, whose sticky failure the caller checks.
+ * Internal. */
 #ifndef STRL_SERVE_TEXT_H
 #define STRL_SERVE_TEXT_H
 

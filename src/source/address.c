@@ -4,7 +4,8 @@
 
 const char *strl__address_shown(const char *address, char *shown, size_t size)
 {
-    const char *colon = address + strcspn(address, ":/?#@"), *host = strncmp(colon, "://", 3) == 0 ? colon + 3 : address;
+    const char *colon = address + strcspn(address, ":/?#@"),
+               *host = strncmp(colon, "://", 3) == 0 ? colon + 3 : address;
     size_t prefix = (size_t)(host - address), length = strcspn(host, "?#");
     for (size_t i = length; i-- > 0;)
         if (host[i] == '@') {

@@ -185,8 +185,8 @@ static uint64_t kept_bytes(const strl__cache *cache)
     return (uint64_t)(KEPT_SHARE * (double)cache->most_bytes);
 }
 
-/* Counts what is there; where that is more than `most`, what was used least lately goes until `target` is left. A step of
- * that; false when it is done. */
+/* Counts what is there; where that is more than `most`, what was used least lately goes until `target` is left. A step
+ * of that; false when it is done. */
 static bool count_step(strl__cache *cache, uint64_t most, uint64_t target)
 {
     listing *all = &cache->listing;

@@ -39,8 +39,8 @@ static const uint8_t *find_known(const strl__http *http, uint64_t offset, size_t
     return NULL;
 }
 
-/* Mutex held. Whether all of a range is in memory already; copies it where data is not NULL. What came along with another read
- * is new to the cache. */
+/* Mutex held. Whether all of a range is in memory already; copies it where data is not NULL. What came along with
+ * another read is new to the cache. */
 static bool copy_known(strl__http *http, uint64_t offset, size_t size, uint8_t *data)
 {
     size_t count = 0;
@@ -67,7 +67,8 @@ static const strl__http_ahead *find_near(const strl__http *http, const strl__htt
         if (is_used && read->begin >= ahead->begin && read->begin <= ahead->end + AHEAD_GAP && read->end > ahead->end)
             return ahead;
         *is_backward = true;
-        if (is_used && read->end <= ahead->end && read->end + BACKWARD_GAP >= ahead->begin && read->begin < ahead->begin)
+        if (is_used && read->end <= ahead->end && read->end + BACKWARD_GAP >= ahead->begin &&
+            read->begin < ahead->begin)
             return ahead;
     }
     return NULL;

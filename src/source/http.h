@@ -9,8 +9,8 @@
  * buffer, so that a transfer does not care who still wants them: it spreads what comes over the reads that are
  * attached to it at the moment.
  *
- * Where nothing comes any more a transfer beside the others looks whether the server answers again: one byte, that no read
- * wants. What was silent while a later request was answered is overtaken: it is given up and asked for again.
+ * Where nothing comes any more a transfer beside the others looks whether the server answers again: one byte, that no
+ * read wants. What was silent while a later request was answered is overtaken: it is given up and asked for again.
  *
  * Invariants: (1) an accepted read is in `reads` until it is DONE, then in `finished` (or its waiter's hands)
  * until it is taken, so it is answered exactly once; (2) everything under `mutex` is touched with it held, and
@@ -30,7 +30,7 @@
 #define STRL__HTTP_HEAD_BYTES 4096u /* what opening reads: a container's header, which says what model it is */
 #define STRL__HTTP_MOST_CONNECTIONS 32u
 #define STRL__HTTP_MOST_REDIRECTS 5
-#define STRL__HTTP_AHEAD 64u /* reads whose surroundings are kept, */
+#define STRL__HTTP_AHEAD 64u                       /* reads whose surroundings are kept, */
 #define STRL__HTTP_AHEAD_BYTES ((uint64_t)8 << 20) /* so much of them at most */
 #define STRL__HTTP_MOST_MERGED ((uint64_t)2 << 20) /* bytes of a request for several reads */
 
@@ -97,15 +97,16 @@ typedef struct strl__http {
     char *shown; /* for sentences: without what may be secret in it */
     strl_http_desc desc;
     char *certificates; /* NULL = libcurl's */
-    bool secure; /* https */
+    bool secure;        /* https */
     strl_thread *network, *disk;
     CURLM *multi;       /* the network thread's, once it runs */
     strl__cache *cache; /* the disk thread's; NULL = none */
     /* The network thread's own. */
-    strl__http_transfer transfers[STRL__HTTP_MOST_CONNECTIONS + 1]; /* desc.connections for reads, and one that looks */
-    uint64_t heard_ns;    /* when bytes that a read wants came last */
-    uint64_t answered_ns; /* when the latest of the requests that were answered was begun */
-    uint64_t renewed_ns;  /* connections that are older are not used again; 0 = there are none such */
+    /* desc.connections for reads, and one that looks */
+    strl__http_transfer transfers[STRL__HTTP_MOST_CONNECTIONS + 1];
+    uint64_t heard_ns;          /* when bytes that a read wants came last */
+    uint64_t answered_ns;       /* when the latest of the requests that were answered was begun */
+    uint64_t renewed_ns;        /* connections that are older are not used again; 0 = there are none such */
     char *target;               /* where the address leads to; NULL = not known */
     struct curl_slist *headers; /* of every request */
     bool headers_conditional;   /* they name what was opened */
@@ -158,8 +159,8 @@ uint64_t strl__http_random(strl__http *http);
 /* ---- http_url.c */
 /* Normalises and checks. *url and *shown are the caller's (strl__free). */
 strl_status strl__http_url(const char *text, char **url, char **shown, bool *secure, strl_error *err);
-/* Where a redirect from `url` led to, with the user and the password of `url` where that is the same server. The caller's;
- * NULL without memory. */
+/* Where a redirect from `url` led to, with the user and the password of `url` where that is the same server. The
+ * caller's; NULL without memory. */
 char *strl__http_url_target(const char *url, const char *led_to);
 
 /* ---- http_disk.c */

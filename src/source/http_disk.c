@@ -5,8 +5,8 @@
 #include "base/memory.h"
 #include "source/http.h"
 
-#define MOST_KEPT_BYTES                                                                                                \
-    ((size_t)16 << 20) /* that wait to be written: what comes faster than the disk takes it is not kept */
+/* that wait to be written: what comes faster than the disk takes it is not kept */
+#define MOST_KEPT_BYTES ((size_t)16 << 20)
 
 static strl__cache_key key_of(const strl__http *http, uint64_t offset, size_t size)
 {
@@ -156,8 +156,8 @@ static bool trim_some(strl__http *http)
     return more;
 }
 
-/* Room first, in steps, so that no read waits behind looking a large folder through. Meanwhile what was to be written may have been
- * forgotten: what comes after it may need more room than was made. */
+/* Room first, in steps, so that no read waits behind looking a large folder through. Meanwhile what was to be written
+ * may have been forgotten: what comes after it may need more room than was made. */
 static void keep_some(strl__http *http)
 {
     size_t size = http->kept->size;

@@ -22,7 +22,7 @@ typedef struct strl__http_fields {
     bool range_known; /* Content-Range is there, and is "bytes first-last/total" */
     uint64_t first, last;
     strl__http_identity identity; /* its total also of "bytes * /total" (without the space); 0 = not known */
-    char encoding[32]; /* of the content; "" = as it is */
+    char encoding[32];            /* of the content; "" = as it is */
 } strl__http_fields;
 
 /* One line as it comes, with or without its end. A status line begins the next answer: all before it is forgotten. */

@@ -7,11 +7,11 @@
 #include "base/memory.h"
 #include "source/http.h"
 
-#define LEAST_REQUESTS 2u    /* under way whatever they weigh: while one answer comes the next is asked for */
-#define MOST_CANDIDATES 256u /* for sharing a request */
-#define IDLE_NS 1000000000u  /* the longest sleep */
-#define LOOK_NS 1000000000u  /* of silence, and between two looks whether the server answers again: */
-#define LOOK_SHARE 4u        /* this part of the silence, */
+#define LEAST_REQUESTS 2u        /* under way whatever they weigh: while one answer comes the next is asked for */
+#define MOST_CANDIDATES 256u     /* for sharing a request */
+#define IDLE_NS 1000000000u      /* the longest sleep */
+#define LOOK_NS 1000000000u      /* of silence, and between two looks whether the server answers again: */
+#define LOOK_SHARE 4u            /* this part of the silence, */
 #define MOST_LOOK_NS 4000000000u /* so much at most */
 
 /* ---- which */

@@ -1,7 +1,8 @@
 #include "source/http_pace.h"
 
-#define QUEUE_S 0.15            /* of bytes ahead of what is more urgent */
-#define ROOM_S 0.3              /* of bytes that a walk has asked for: what is on its way, and as much to choose from */
+#define QUEUE_S 0.15 /* of bytes ahead of what is more urgent */
+/* of bytes that a walk has asked for: what is on its way, and as much to choose from */
+#define ROOM_S 0.3
 #define UNKNOWN_WINDOW 262144.0 /* before the first measurement */
 #define LEAST_WINDOW 65536.0
 #define LEAST_ROOM 262144.0
@@ -9,7 +10,8 @@
 #define LATENCY_OF_A_NETWORK 0.01
 #define LEAST_GAP 4096.0 /* less than a header and its answer weigh; pages of a container lie some bytes apart */
 #define MOST_GAP 262144.0
-#define UNKNOWN_GAP 49152.0 /* at the latency of a network worth a request on any but a slow link, as the first bytes will tell */
+/* at the latency of a network worth a request on any but a slow link, as the first bytes will tell */
+#define UNKNOWN_GAP 49152.0
 #define SAMPLE_NS 50000000u /* of bytes coming make a measurement, or so many bytes: */
 #define SAMPLE_BYTES 1048576u
 #define SMOOTHING 0.3

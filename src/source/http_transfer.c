@@ -245,8 +245,8 @@ static uint64_t stall_ns(const strl__http_transfer *transfer)
     return (uint64_t)transfer->http->desc.stall_ms * 1000000u;
 }
 
-/* Mutex held. How long it may be silent while a later request is answered: the last attempt has all the time there is, since
- * a server may be slow with these bytes alone. */
+/* Mutex held. How long it may be silent while a later request is answered: the last attempt has all the time there is,
+ * since a server may be slow with these bytes alone. */
 static uint64_t patience_ns(const strl__http_transfer *transfer)
 {
     const strl__http *http = transfer->http;
@@ -309,8 +309,8 @@ static const struct {
     {CURLE_SSL_CONNECT_ERROR, STRL__HTTP_AGAIN, "there is no secure connection"},
 };
 
-/* Such as the end of an answer that was longer than it said, on a connection that is used again. After a redirect the code is of where
- * that leads to. */
+/* Such as the end of an answer that was longer than it said, on a connection that is used again. After a redirect the
+ * code is of where that leads to. */
 static bool is_no_answer(const strl__http_transfer *transfer, CURLcode code)
 {
     return code == CURLE_UNSUPPORTED_PROTOCOL && transfer->fields.status / 100 != 3;
@@ -324,7 +324,8 @@ static void explain(strl__http_transfer *transfer, CURLcode code)
         return;
     transfer->verdict = STRL__HTTP_AGAIN;
     if (is_no_answer(transfer, code)) {
-        strl__fail(&transfer->error, STRL_ERR_NETWORK, "the server sends more than it says, or what is no answer: %s", reason);
+        strl__fail(&transfer->error, STRL_ERR_NETWORK, "the server sends more than it says, or what is no answer: %s",
+                   reason);
         return;
     }
     for (size_t i = 0; i < sizeof failures / sizeof *failures; i++)

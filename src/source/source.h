@@ -22,7 +22,7 @@ typedef struct strl_source_result {
 typedef struct strl_source_span {
     uint64_t offset;
     size_t size;
-    void *data; /* the caller's, of `size` bytes */
+    void *data;        /* the caller's, of `size` bytes */
     uint64_t checksum; /* that they should have, as strl__checksum */
 } strl_source_span;
 
@@ -60,13 +60,14 @@ bool strl_source_poll(strl_source *source, strl_source_result *result);
 void strl_source_cancel(strl_source *source, uint64_t token);
 /* Reads and waits: for opening a container and for tools, never for a frame. */
 strl_status strl_source_read(strl_source *source, uint64_t offset, void *data, size_t size, strl_error *err);
-/* The same of bytes whose checksum is known. Over a network they are asked for again while they have another; after some attempts it
- * succeeds all the same, and who looks at them says what is wrong. */
+/* The same of bytes whose checksum is known. Over a network they are asked for again while they have another; after
+ * some attempts it succeeds all the same, and who looks at them says what is wrong. */
 strl_status strl_source_read_known(strl_source *source, const strl_source_span *span, strl_error *err);
-/* The same of several of them, which a network brings in a few round trips. The failure is that of the first of them that failed. */
+/* The same of several of them, which a network brings in a few round trips. The failure is that of the first of them
+ * that failed. */
 strl_status strl_source_read_many(strl_source *source, const strl_source_span *spans, size_t count, strl_error *err);
-/* Whether to read once more what was not what it should be, this having been attempt 1, 2, ...: counts it, and doubts the bytes. Never of what
- * is no network's. */
+/* Whether to read once more what was not what it should be, this having been attempt 1, 2, ...: counts it, and doubts
+ * the bytes. Never of what is no network's. */
 bool strl_source_ask_again(strl_source *source, unsigned *attempt, uint64_t offset, size_t size);
 /* Whether reading the same range once more may give other bytes, as over a network. */
 bool strl_source_may_differ(const strl_source *source);
@@ -79,8 +80,8 @@ void strl_source_doubt(strl_source *source, uint64_t offset, size_t size);
 /* Puts the source's name before the sentence of a failure, unless there is none or it is there. Returns status. */
 strl_status strl_source_fail(const strl_source *source, strl_status status, strl_error *err);
 
-/* An address as sentences may show it, also one that is none: without a user and a password, without a query. Cut to size,
- * which is at least 1. Returns shown. */
+/* An address as sentences may show it, also one that is none: without a user and a password, without a query. Cut to
+ * size, which is at least 1. Returns shown. */
 const char *strl__address_shown(const char *address, char *shown, size_t size);
 
 /* Wraps another source (owned from then on; still the caller's on failure) and holds each answer back until delay_ns

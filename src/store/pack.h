@@ -157,7 +157,8 @@ static inline void strl_pack_beside(strl_packer *packer, strl_pack_same *model, 
 
 static inline uint32_t strl_unpack_beside(strl_unpacker *unpacker, strl_pack_same *model, uint32_t guide)
 {
-    return strl_unpack(unpacker, &model->differs) ? guide + strl_unpack_zigzag(strl_unpack(unpacker, &model->step)) : guide;
+    return strl_unpack(unpacker, &model->differs) ? guide + strl_unpack_zigzag(strl_unpack(unpacker, &model->step))
+                                                  : guide;
 }
 
 /* A colour, four bytes, that is mostly the same as another. */

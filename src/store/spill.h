@@ -26,9 +26,9 @@ uint64_t strl_spill_set_peak_bytes(strl_spill_set *set); /* the most there ever 
 /* The files of all streams end in this, which tells them from others in their folder. */
 #define STRL_SPILL_SUFFIX ".spill"
 
-/* An empty stream in the file `name`.spill of the set's folder; a file left there by an earlier run is overwritten, a name
- * that is open in this set is refused. buffer_bytes: 0 = 256 KiB; the buffer exists from the first append to the next
- * flush. */
+/* An empty stream in the file `name`.spill of the set's folder; a file left there by an earlier run is overwritten, a
+ * name that is open in this set is refused. buffer_bytes: 0 = 256 KiB; the buffer exists from the first append to the
+ * next flush. */
 strl_status strl_spill_open(strl_spill_set *set, const char *name, size_t buffer_bytes, strl_spill **spill,
                             strl_error *err);
 /* On failure nothing has been appended, and the stream can be used on: STRL_ERR_DISK_FULL where the disk is full,
@@ -53,8 +53,8 @@ strl_status strl_spill_close_and_delete(strl_spill *spill, strl_error *err);
 
 /* ---- streams that a later run of the program can go on with ----
  *
- * open_kept, append, drop -> set_save -> (the saved words are put where the later run finds them) -> set_settle -> append ...
- * later run: set_restore -> set_check -> take -> read, append ...
+ * open_kept, append, drop -> set_save -> (the saved words are put where the later run finds them) -> set_settle ->
+ * append ... later run: set_restore -> set_check -> take -> read, append ...
  *
  * What is dropped or deleted of a kept stream stays on disk until a save that does not need it is in place; what was
  * appended since the last save is lost with the run. Of each 16 KiB step there is a checksum, 8 bytes in memory and in

@@ -10,19 +10,10 @@
 #define MOST_SPLATS 4096u
 #define MOST_SIDE 36u
 
-enum brick_stream {
-    SIDE = 0,
-    CENTRE,
-    COVERAGE,
-    NORMAL,
-    PARALLEL,
-    COLOUR,
-    LEVEL = 9,
-    COUNT,
-    STREAMS = 12
-};
+enum brick_stream { SIDE = 0, CENTRE, COVERAGE, NORMAL, PARALLEL, COLOUR, LEVEL = 9, COUNT, STREAMS = 12 };
 
-static strl_status check_levels(strl_cursor *cursor, uint32_t levels, const strl__vnode *node, uint32_t *splats, strl_error *err)
+static strl_status check_levels(strl_cursor *cursor, uint32_t levels, const strl__vnode *node, uint32_t *splats,
+                                strl_error *err)
 {
     float above = INFINITY;
     *splats = 0;
@@ -30,11 +21,12 @@ static strl_status check_levels(strl_cursor *cursor, uint32_t levels, const strl
         float size = strl_cursor_f32(cursor);
         uint32_t end = strl_cursor_u16(cursor);
         if (!(size >= 0 && size <= above) || (i == 0 && size > node->geometric_max))
-            return strl__fail(err, STRL_ERR_FORMAT, "cells of level %u have the size %g, expected at most %g, and its record says %g", i + 1,
+            return strl__fail(err, STRL_ERR_FORMAT,
+                              "cells of level %u have the size %g, expected at most %g, and its record says %g", i + 1,
                               (double)size, (double)above, (double)node->geometric_max);
         if (end < *splats || end > MOST_SPLATS)
-            return strl__fail(err, STRL_ERR_FORMAT, "splats of level %u end at %u, those above at %u, at most are %u", i + 1, end, *splats,
-                              MOST_SPLATS);
+            return strl__fail(err, STRL_ERR_FORMAT, "splats of level %u end at %u, those above at %u, at most are %u",
+                              i + 1, end, *splats, MOST_SPLATS);
         above = size;
         *splats = end;
     }
@@ -73,7 +65,8 @@ static strl_status check_splats(strl__v_payload *self, uint32_t splats, const st
             centre[k] = middle(units, shift);
             int64_t at = node->anchor[k] + centre[k];
             if (centre[k] != (int32_t)centre[k] || at < node->box[0][k] || at > node->box[1][k])
-                return strl__fail(self->err, STRL_ERR_FORMAT, "splat %u is at %" PRId64 " on axis %u, outside its node's box", i, at, k);
+                return strl__fail(self->err, STRL_ERR_FORMAT,
+                                  "splat %u is at %" PRId64 " on axis %u, outside its node's box", i, at, k);
         }
         strl__v_pull(self, COVERAGE);
         strl__v_pull(self, PARALLEL);
@@ -94,7 +87,8 @@ static strl_status check_runs(strl__v_payload *self, uint32_t levels, const strl
         if (i > 0 && up >= before)
             up++;
         if (up > levels)
-            return strl__fail(self->err, STRL_ERR_FORMAT, "run %u is of a level %" PRIu64 " above the finest of %u", i, up, levels);
+            return strl__fail(self->err, STRL_ERR_FORMAT, "run %u is of a level %" PRIu64 " above the finest of %u", i,
+                              up, levels);
         sum += (uint64_t)1 + strl__v_pull(self, up == 0 ? COUNT : COUNT + 1);
         before = up;
     }
@@ -104,17 +98,20 @@ static strl_status check_runs(strl__v_payload *self, uint32_t levels, const strl
     return STRL_OK;
 }
 
-strl_status strl__v_brick_check(const uint8_t *payload, const strl__vnode *node, strl_arena *arena, size_t *bytes, strl_error *err)
+strl_status strl__v_brick_check(const uint8_t *payload, const strl__vnode *node, strl_arena *arena, size_t *bytes,
+                                strl_error *err)
 {
     strl_cursor cursor = strl_cursor_make(payload, node->payload_bytes);
     strl__v_payload self = {.arena = arena, .err = err};
-    uint32_t version = strl_cursor_u8(&cursor), levels = strl_cursor_u8(&cursor), coded = strl_cursor_u32(&cursor), splats;
+    uint32_t version = strl_cursor_u8(&cursor), levels = strl_cursor_u8(&cursor), coded = strl_cursor_u32(&cursor),
+             splats;
     if (!cursor.failed && (version != VERSION || levels < 1 || levels > MOST_LEVELS))
         return strl__fail(err, STRL_ERR_FORMAT, "a brick of version %u with %u levels", version, levels);
     strl_status status = check_levels(&cursor, levels, node, &splats, err);
     const uint8_t *streams = strl_cursor_take(&cursor, coded);
     if (status == STRL_OK && !streams)
-        status = strl__fail(err, STRL_ERR_FORMAT, "the payload of %u bytes ends within the head of a brick", node->payload_bytes);
+        status = strl__fail(err, STRL_ERR_FORMAT, "the payload of %u bytes ends within the head of a brick",
+                            node->payload_bytes);
     if (status == STRL_OK)
         status = read_streams(&self, streams, coded);
     if (status == STRL_OK)

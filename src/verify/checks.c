@@ -5,8 +5,8 @@
 #include <string.h>
 
 static const char *const names[STRL_VERIFY_KINDS] = {
-    "header", "references", "checksums", "tables", "records", "pages",  "payloads",       "counts",    "boxes",
-    "cones",  "errors", "groups",     "root",      "unions", "closed",  "cracks", "leaf_triangles", "distances",
+    "header", "references", "checksums", "tables", "records", "pages",  "payloads", "counts",         "boxes",
+    "cones",  "errors",     "groups",    "root",   "unions",  "closed", "cracks",   "leaf_triangles", "distances",
 };
 
 const char *strl_verify_name(strl_verify_kind kind)

@@ -71,9 +71,10 @@ strl_status strl__v_check_cones(strl__model *model, const strl__vtree *tree, uin
         strl__v_checked(model->checks, STRL_VERIFY_CONES, 1);
         uint32_t outside = find_outside(n, normals, mesh->triangle_count);
         if (outside < mesh->triangle_count)
-            strl__v_flaw(model->checks, STRL_VERIFY_CONES, strl__key(tree, id),
-                         "tree %u node %u: its triangle %u does not lie in the cone of node %u (about %d %d %d, cosine %u)", tree->index,
-                         id, outside, above, n->cone_axis[0], n->cone_axis[1], n->cone_axis[2], n->cone_cosine);
+            strl__v_flaw(
+                model->checks, STRL_VERIFY_CONES, strl__key(tree, id),
+                "tree %u node %u: its triangle %u does not lie in the cone of node %u (about %d %d %d, cosine %u)",
+                tree->index, id, outside, above, n->cone_axis[0], n->cone_axis[1], n->cone_axis[2], n->cone_cosine);
     }
     return STRL_OK;
 }

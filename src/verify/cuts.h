@@ -12,8 +12,9 @@ typedef struct strl__vview {
     double eye[3];
     double angle;    /* allowed error over distance */
     double refusing; /* share of groups that refuse to split */
-    bool by_demand;  /* only what a node too coarse asks for splits, and what is above it; else all that bounds allow */
-    bool any_state;  /* nodes take any state that is fine enough, not the coarsest */
+    /* only what a node too coarse asks for splits, and what is above it; else all that bounds allow */
+    bool by_demand;
+    bool any_state; /* nodes take any state that is fine enough, not the coarsest */
     uint64_t seed;
 } strl__vview;
 

@@ -1,5 +1,5 @@
-/* Nodes' meshes. A payload may be told by the parent's mesh, whose own may be told by its parent's: a worker keeps one such
- * chain, which the nodes of a page share for the most part. */
+/* Nodes' meshes. A payload may be told by the parent's mesh, whose own may be told by its parent's: a worker keeps one
+ * such chain, which the nodes of a page share for the most part. */
 #include <inttypes.h>
 
 #include "base/fail.h"
@@ -24,8 +24,8 @@ static strl_status counts_agree(const strl__vnode *node, const strl__vmesh *mesh
 }
 
 /* A payload whose parent's mesh is at hand where it needs that. */
-static strl_status decode_one(const strl__vnode *node, const uint8_t *bytes, bool with_looks, const strl__vchain *parent,
-                              strl_arena *arena, strl__vmesh *mesh, strl_error *err)
+static strl_status decode_one(const strl__vnode *node, const uint8_t *bytes, bool with_looks,
+                              const strl__vchain *parent, strl_arena *arena, strl__vmesh *mesh, strl_error *err)
 {
     strl__v_told told = {0};
     if (parent) {
@@ -36,7 +36,8 @@ static strl_status decode_one(const strl__vnode *node, const uint8_t *bytes, boo
     size_t head = 0;
     strl_status status = node->rung == 4 ? strl__v_brick_check(bytes, node, arena, &head, err) : STRL_OK;
     if (status == STRL_OK)
-        status = strl__v_payload_decode(bytes + head, node->payload_bytes - head, parent ? &told : NULL, arena, with_looks, mesh, err);
+        status = strl__v_payload_decode(bytes + head, node->payload_bytes - head, parent ? &told : NULL, arena,
+                                        with_looks, mesh, err);
     if (status == STRL_OK)
         status = counts_agree(node, mesh, err);
     return status == STRL_OK ? strl__v_mesh_check_ranges(mesh, err) : status;
@@ -46,7 +47,8 @@ static strl_status read_bytes(strl__model *model, const strl__vnode *node, strl_
 {
     if (!strl__grow(&worker->payload, &worker->payload_capacity, node->payload_bytes, 1))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a payload of %u bytes", node->payload_bytes);
-    return strl_file_read(model->file, node->page.offset + node->payload_offset, worker->payload, node->payload_bytes, err);
+    return strl_file_read(model->file, node->page.offset + node->payload_offset, worker->payload, node->payload_bytes,
+                          err);
 }
 
 static strl_status keep(strl__model *model, const strl__vtree *tree, uint32_t id, bool with_looks, strl__worker *worker,
@@ -64,11 +66,12 @@ static strl_status keep(strl__model *model, const strl__vtree *tree, uint32_t id
     if (status == STRL_OK)
         status = decode_one(node, worker->payload, with_looks, depth ? link - 1 : NULL, &link->arena, &link->mesh, err);
     link->is_whole = status == STRL_OK;
-    return status == STRL_OK ? STRL_OK : strl__fail_context(err, status, "its parent's mesh is needed, but node %u", id);
+    return status == STRL_OK ? STRL_OK
+                             : strl__fail_context(err, status, "its parent's mesh is needed, but node %u", id);
 }
 
-strl_status strl__v_decode_node(strl__model *model, const strl__vtree *tree, uint32_t id, const uint8_t *bytes, bool with_looks,
-                                strl__worker *worker, strl__vmesh *mesh, strl_error *err)
+strl_status strl__v_decode_node(strl__model *model, const strl__vtree *tree, uint32_t id, const uint8_t *bytes,
+                                bool with_looks, strl__worker *worker, strl__vmesh *mesh, strl_error *err)
 {
     uint32_t above[STRL__V_CHAIN];
     unsigned count = 0;
@@ -83,20 +86,21 @@ strl_status strl__v_decode_node(strl__model *model, const strl__vtree *tree, uin
     for (unsigned i = 0; i < count && status == STRL_OK; i++)
         status = keep(model, tree, above[count - 1 - i], with_looks, worker, i, err);
     if (status == STRL_OK)
-        status = decode_one(&tree->nodes[id], bytes, with_looks, count ? &worker->chain[count - 1] : NULL, &worker->arena, mesh,
-                            err);
+        status = decode_one(&tree->nodes[id], bytes, with_looks, count ? &worker->chain[count - 1] : NULL,
+                            &worker->arena, mesh, err);
     return status;
 }
 
-strl_status strl__v_load_mesh(strl__model *model, const strl__vtree *tree, uint32_t id, strl__worker *worker, strl__vmesh *mesh,
-                              strl_error *err)
+strl_status strl__v_load_mesh(strl__model *model, const strl__vtree *tree, uint32_t id, strl__worker *worker,
+                              strl__vmesh *mesh, strl_error *err)
 {
     const strl__vnode *node = &tree->nodes[id];
     strl_status status = STRL_OK;
     if (!strl__grow(&worker->bytes, &worker->capacity, node->payload_bytes, 1))
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for a payload of %u bytes", node->payload_bytes);
     if (status == STRL_OK)
-        status = strl_file_read(model->file, node->page.offset + node->payload_offset, worker->bytes, node->payload_bytes, err);
+        status = strl_file_read(model->file, node->page.offset + node->payload_offset, worker->bytes,
+                                node->payload_bytes, err);
     if (status == STRL_OK)
         status = strl__v_decode_node(model, tree, id, worker->bytes, false, worker, mesh, err);
     return status == STRL_OK ? STRL_OK : strl__fail_context(err, status, "tree %u node %u", tree->index, id);

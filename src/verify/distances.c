@@ -69,8 +69,8 @@ static void check_excess(comparison *self, uint64_t key, const char *name, const
     for (unsigned k = 0; k < 3; k++)
         p[k] = tree->origin[k] + tree->step * from->most_excessive[k];
     strl__v_flaw(self->model->checks, STRL_VERIFY_DISTANCES, key,
-                 "%s: the input's point at %g %g %g is farther from every node than it claims, by %g at least", name, p[0],
-                 p[1], p[2], from->excess * tree->step);
+                 "%s: the input's point at %g %g %g is farther from every node than it claims, by %g at least", name,
+                 p[0], p[1], p[2], from->excess * tree->step);
 }
 
 /* Each node's own claim, towards the input. */

@@ -32,7 +32,7 @@ typedef struct strl__measured {
     double worst[3];  /* where the largest was */
     double excess;    /* the largest excess over what the nearest chunks claim; at least 0 */
     double most_excessive[3];
-    double claimed;   /* of the chunk */
+    double claimed; /* of the chunk */
     uint64_t points;
 } strl__measured;
 

@@ -95,15 +95,16 @@ static void check_sections(strl__model *model)
 {
     const strl__section *s = model->sections;
     const uint64_t least[STRL__SECTIONS] = {0, 1, 1, 1, 1, 0, 0};
-    const uint64_t most[STRL__SECTIONS] = {0, 512, model->file_bytes / 104, UINT32_MAX - 1, UINT32_MAX - 1, UINT32_MAX - 1,
-                                           model->file_bytes / 80};
+    const uint64_t most[STRL__SECTIONS] = {
+        0, 512, model->file_bytes / 104, UINT32_MAX - 1, UINT32_MAX - 1, UINT32_MAX - 1, model->file_bytes / 80};
     const uint64_t placements = s[STRL__PLACEMENTS].item_count;
     const uint64_t runs = placements > STRL__RUN_PLACEMENTS ? (placements - 1) / STRL__RUN_PLACEMENTS + 1 : 0;
     HEADER_RULE(model, s[STRL__IMAGES].item_count == 0 || s[STRL__IMAGES].item_count == s[STRL__MATERIALS].item_count,
                 "header: images of %" PRIu64 " materials, expected of all %" PRIu64, s[STRL__IMAGES].item_count,
                 s[STRL__MATERIALS].item_count);
-    HEADER_RULE(model, s[STRL__RUNS].item_count == runs, "header: %" PRIu64 " runs of %" PRIu64 " placements, expected %" PRIu64,
-                s[STRL__RUNS].item_count, placements, runs);
+    HEADER_RULE(model, s[STRL__RUNS].item_count == runs,
+                "header: %" PRIu64 " runs of %" PRIu64 " placements, expected %" PRIu64, s[STRL__RUNS].item_count,
+                placements, runs);
     for (unsigned kind = STRL__TREES; kind < STRL__SECTIONS; kind++)
         HEADER_RULE(model, s[kind].item_count >= least[kind] && s[kind].item_count <= most[kind],
                     "header: section kind %u has %" PRIu64 " items, expected %" PRIu64 " to %" PRIu64, kind,

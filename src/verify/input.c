@@ -48,7 +48,8 @@ static strl_status take(reading *self, const strl_triangle *triangle, strl_error
     strl__hash128 points[3];
     bool inside;
     self->input->triangles++;
-    /* Of a tree without a triangle the lattice is not known on which they lost their area. The header has to count them. */
+    /* Of a tree without a triangle the lattice is not known on which they lost their area. The header has to count
+     * them. */
     bool none_kept = self->tree->triangle_count == 0 && self->model->tree_count > 1;
     if (none_kept || !quantise(self->tree, triangle, corners, points, &inside)) {
         self->input->degenerate++;
@@ -100,8 +101,8 @@ static strl_status read_input(reading *self, uint32_t index, uint32_t piece, str
     return status;
 }
 
-static strl_status read_inputs(strl__model *model, const strl__vtree *tree, const strl__vpiece *piece, strl__vinput *input,
-                               strl__regions *regions, strl_error *err)
+static strl_status read_inputs(strl__model *model, const strl__vtree *tree, const strl__vpiece *piece,
+                               strl__vinput *input, strl__regions *regions, strl_error *err)
 {
     reading self = {.model = model,
                     .tree = tree,
@@ -359,8 +360,8 @@ static double rounding_of(const strl__vtree *tree)
     return 16 * DBL_EPSILON * largest;
 }
 
-strl_status strl__v_input_read(strl__model *model, const strl__vtree *tree, const strl__vpiece *piece, strl__vinput *input,
-                               strl_error *err)
+strl_status strl__v_input_read(strl__model *model, const strl__vtree *tree, const strl__vpiece *piece,
+                               strl__vinput *input, strl_error *err)
 {
     uint64_t slice_triangles = model->memory_bytes / 8 / strl_pool_workers(model->pool) / SLICE_TRIANGLE_BYTES;
     uint64_t wanted = tree->triangle_count / (slice_triangles / 2) + 1;

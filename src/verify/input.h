@@ -15,12 +15,13 @@ typedef struct strl__vinput {
     double rounding;       /* lattice units: what doubles cannot tell apart at these coordinates */
     strl__surface surface; /* of the kept triangles */
     strl_file *file;       /* of chunks */
-    uint64_t *offset; /* [surface.count] of a chunk in the file */
-    uint64_t *bytes;  /* [surface.count] */
+    uint64_t *offset;      /* [surface.count] of a chunk in the file */
+    uint64_t *bytes;       /* [surface.count] */
 } strl__vinput;
 
 /* Reads what the tree is of from desc->inputs. Uses desc->scratch_dir; what it leaves there goes with deinit. */
-strl_status strl__v_input_read(strl__model *model, const strl__vtree *tree, const strl__vpiece *piece, strl__vinput *input, strl_error *err);
+strl_status strl__v_input_read(strl__model *model, const strl__vtree *tree, const strl__vpiece *piece,
+                               strl__vinput *input, strl_error *err);
 void strl__v_input_deinit(strl__vinput *input);
 /* The multiset of triangles. */
 void strl__v_check_leaves(strl__model *model, const strl__vtree *tree, const strl__vinput *input);

@@ -35,9 +35,10 @@ typedef struct strl__v_told {
 
 /* docs/format-payload.md. STRL_ERR_FORMAT with a sentence where the bytes are not a payload; the arrays live in
  * arena. told: NULL = self-contained. Without with_looks normals and colours are not decoded, and zero. */
-/* What stands before the mesh in a payload of a sample tree (docs/format-payload.md, "Bricks"). *bytes: its length. Its streams
- * live in arena. */
-strl_status strl__v_brick_check(const uint8_t *payload, const strl__vnode *node, strl_arena *arena, size_t *bytes, strl_error *err);
+/* What stands before the mesh in a payload of a sample tree (docs/format-payload.md, "Bricks"). *bytes: its length. Its
+ * streams live in arena. */
+strl_status strl__v_brick_check(const uint8_t *payload, const strl__vnode *node, strl_arena *arena, size_t *bytes,
+                                strl_error *err);
 strl_status strl__v_payload_decode(const uint8_t *data, size_t size, const strl__v_told *told, strl_arena *arena,
                                    bool with_looks, strl__vmesh *mesh, strl_error *err);
 
@@ -130,10 +131,10 @@ typedef struct strl__worker {
 strl__worker *strl__v_workers_create(const strl__model *model); /* NULL without memory */
 void strl__v_workers_destroy(const strl__model *model, strl__worker *workers);
 
-/* Decodes and checks a node's payload, `bytes`; the meshes that it is told by are read and decoded too. The mesh lives in
- * worker->arena until the next call, which rewinds worker->scratch too. */
-strl_status strl__v_decode_node(strl__model *model, const strl__vtree *tree, uint32_t id, const uint8_t *bytes, bool with_looks,
-                                strl__worker *worker, strl__vmesh *mesh, strl_error *err);
+/* Decodes and checks a node's payload, `bytes`; the meshes that it is told by are read and decoded too. The mesh lives
+ * in worker->arena until the next call, which rewinds worker->scratch too. */
+strl_status strl__v_decode_node(strl__model *model, const strl__vtree *tree, uint32_t id, const uint8_t *bytes,
+                                bool with_looks, strl__worker *worker, strl__vmesh *mesh, strl_error *err);
 
 /* Reads and decodes one node's payload again, after the main pass has found it sound; what could not be indexed
  * fails. The mesh lives in worker->arena until the next call, which rewinds worker->scratch too. */

@@ -80,7 +80,7 @@ typedef struct strl__model {
     strl__vtree *trees; /* [tree_count], owned */
     uint32_t tree_count;
     strl__hash128 placements; /* sum of the hashes of all of them */
-    strl__vrun *runs; /* [run_count], owned; NULL where all placements are on one page */
+    strl__vrun *runs;         /* [run_count], owned; NULL where all placements are on one page */
     uint32_t run_count;
     uint64_t record_bytes; /* held by all trees' arrays */
 } strl__model;
@@ -94,14 +94,15 @@ void strl__v_trees_deinit(strl__model *model);
 /* Whether what the file says of the area of each run is that of its placements. All payloads must be sound. */
 strl_status strl__v_check_run_areas(strl__model *model, strl_error *err);
 
-/* runs.c, for the tables: an item of the table of runs; its page of placements as the table's index names it; the box of a placement;
- * what its placements come to when they have been read. */
+/* runs.c, for the tables: an item of the table of runs; its page of placements as the table's index names it; the box
+ * of a placement; what its placements come to when they have been read. */
 strl_status strl__v_runs_create(strl__model *model, strl_error *err);
 void strl__v_run_read(strl__model *model, uint64_t run, const uint8_t *bytes, size_t size);
 void strl__v_run_page(strl__model *model, uint64_t first, uint64_t count, const strl__place *place);
 void strl__v_run_placement(strl__model *model, uint64_t item, const double low[3], const double high[3]);
 void strl__v_run_end(strl__model *model, uint64_t first);
-/* Another reading of the placements, for their areas. area: [tree_count] of the trees as placed as they are, world units. */
+/* Another reading of the placements, for their areas. area: [tree_count] of the trees as placed as they are, world
+ * units. */
 strl_status strl__v_read_areas(strl__model *model, const double *area, strl_error *err);
 /* By how much the transform enlarges areas at most. */
 double strl__v_area_scale(const double transform[12]);

@@ -49,8 +49,9 @@ static strl_status read_head(strl__v_payload *self, strl_cursor *cursor)
     if (self->normal_bits != 8 && self->normal_bits != 10)
         return strl__fail(self->err, STRL_ERR_FORMAT, "payload with normals of %" PRIu32 " bits", self->normal_bits);
     if ((self->flags & 4) == 0 ? self->told_by != NULL : self->told_by == NULL)
-        return strl__fail(self->err, STRL_ERR_FORMAT, "payload with flags %" PRIu32 ", but its record says that it is %s",
-                          self->flags, self->told_by ? "told by its parent's" : "self-contained");
+        return strl__fail(self->err, STRL_ERR_FORMAT,
+                          "payload with flags %" PRIu32 ", but its record says that it is %s", self->flags,
+                          self->told_by ? "told by its parent's" : "self-contained");
     if (self->base_vertices > self->vertices || self->steps > self->vertices - self->base_vertices ||
         self->entries == 0 || self->triangles > MOST_TRIANGLES || self->base_triangles > self->triangles)
         return strl__fail(self->err, STRL_ERR_FORMAT,
@@ -87,10 +88,9 @@ static strl_status reserve(strl__v_payload *self)
     self->ring = strl_arena_alloc(arena, v, sizeof *self->ring);
     self->from = strl_arena_alloc_zero(arena, self->base_vertices, sizeof *self->from);
     bool good = mesh->position && mesh->normal && (mesh->colour || !(self->flags & 1)) &&
-                (mesh->texcoord || !(self->flags & 8)) &&
-                (mesh->palette_index || !(self->flags & 2)) && mesh->parent && mesh->triangle && mesh->vertex_end &&
-                mesh->triangle_end && mesh->geometric_error && mesh->appearance_error && mesh->palette && self->first &&
-                self->next && self->ring && self->from;
+                (mesh->texcoord || !(self->flags & 8)) && (mesh->palette_index || !(self->flags & 2)) && mesh->parent &&
+                mesh->triangle && mesh->vertex_end && mesh->triangle_end && mesh->geometric_error &&
+                mesh->appearance_error && mesh->palette && self->first && self->next && self->ring && self->from;
     if (!good)
         return strl__fail(self->err, STRL_ERR_MEMORY, "no memory for a mesh of %" PRIu32 " vertices", v);
     memset(self->first, 0xff, (size_t)v * sizeof *self->first);

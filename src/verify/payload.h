@@ -59,7 +59,8 @@ typedef struct strl__v_payload {
 
 /* All fail with STRL_ERR_FORMAT and a sentence, or STRL_ERR_MEMORY. */
 /* All that is left of cursor, behind the words' number and the states; payload_bytes: with what stands before. */
-strl_status strl__v_payload_streams(strl__v_payload *self, strl_cursor *cursor, size_t payload_bytes, unsigned stream_count);
+strl_status strl__v_payload_streams(strl__v_payload *self, strl_cursor *cursor, size_t payload_bytes,
+                                    unsigned stream_count);
 strl_status strl__v_payload_copies(strl__v_payload *self);
 strl_status strl__v_payload_base(strl__v_payload *self);
 strl_status strl__v_payload_steps(strl__v_payload *self);

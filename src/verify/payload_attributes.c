@@ -96,8 +96,8 @@ static void read_texcoords(strl__v_payload *self)
     uint16_t(*texcoord)[2] = self->mesh->texcoord;
     for (uint32_t v = 0; texcoord && v < self->mesh->vertex_count; v++)
         for (unsigned i = 0; i < 2; i++)
-            texcoord[v][i] = (uint16_t)((v ? texcoord[predecessor(self, v)][i] : 0) +
-                                        strl__v_residual(self, STRL__V_TEXCOORD + i));
+            texcoord[v][i] =
+                (uint16_t)((v ? texcoord[predecessor(self, v)][i] : 0) + strl__v_residual(self, STRL__V_TEXCOORD + i));
 }
 
 static strl_status read_palette(strl__v_payload *self)

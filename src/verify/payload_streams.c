@@ -142,7 +142,8 @@ static strl_status read_streams(strl__v_payload *self, rans_coder *coder, size_t
                : strl__fail(self->err, STRL_ERR_FORMAT, "the payload does not end where its streams do");
 }
 
-strl_status strl__v_payload_streams(strl__v_payload *self, strl_cursor *cursor, size_t payload_bytes, unsigned stream_count)
+strl_status strl__v_payload_streams(strl__v_payload *self, strl_cursor *cursor, size_t payload_bytes,
+                                    unsigned stream_count)
 {
     if (self->words > strl_cursor_left(cursor) / 2)
         return strl__fail(self->err, STRL_ERR_FORMAT, "%" PRIu32 " words do not stand in the payload's last %zu bytes",

@@ -64,11 +64,11 @@ strl_status strl__v_pieces_list(strl__model *model, strl__vpieces *pieces, strl_
 {
     const uint32_t inputs = model->desc->input_count;
     bool is_empty = true;
-    *pieces = (strl__vpieces){.count = 1, .items = strl__alloc_zero(1, sizeof *pieces->items),
+    *pieces = (strl__vpieces){.count = 1,
+                              .items = strl__alloc_zero(1, sizeof *pieces->items),
                               .first = strl__alloc_zero(inputs, sizeof *pieces->first)};
-    strl_status status = pieces->items && pieces->first
-                             ? STRL_OK
-                             : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u inputs", inputs);
+    strl_status status =
+        pieces->items && pieces->first ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u inputs", inputs);
     if (status == STRL_OK)
         pieces->items[0] = (strl__vpiece){.input = STRL__EVERY_INPUT, .placements = 1};
     for (uint32_t i = 0; status == STRL_OK && i < inputs; i++)
@@ -91,15 +91,16 @@ void strl__v_pieces_deinit(strl__vpieces *pieces)
     *pieces = (strl__vpieces){0};
 }
 
-/* Parts of several inputs are numbered one input after the other, and how many an input has is known when it was read. */
+/* Parts of several inputs are numbered one input after the other, and how many an input has is known when it was read.
+ */
 bool strl__v_compares_parts(const strl__model *model)
 {
     return model->desc->input_count == 1;
 }
 
 /* Adds what the input says of trees that hold a triangle: others are not placed. */
-static strl_status sum_input(strl__model *model, strl__vpieces *pieces, uint32_t input, strl__hash128 *sum, uint64_t *count,
-                             strl_error *err)
+static strl_status sum_input(strl__model *model, strl__vpieces *pieces, uint32_t input, strl__hash128 *sum,
+                             uint64_t *count, strl_error *err)
 {
     strl_reader *reader = NULL;
     strl_reader_placement placement;
@@ -115,7 +116,8 @@ static strl_status sum_input(strl__model *model, strl__vpieces *pieces, uint32_t
         pieces->items[tree].placements++;
         if (model->trees[tree].triangle_count == 0)
             continue;
-        strl__hash_add(sum, strl__hash_placement(tree, strl__v_compares_parts(model) ? placement.part + 1 : 0, placement.transform));
+        strl__hash_add(sum, strl__hash_placement(tree, strl__v_compares_parts(model) ? placement.part + 1 : 0,
+                                                 placement.transform));
         ++*count;
     }
     if (status == STRL_OK) {
@@ -135,8 +137,8 @@ strl_status strl__v_check_placements(strl__model *model, strl__vpieces *pieces, 
     strl__v_checked(model->checks, STRL_VERIFY_LEAVES, 1);
     *comparable = pieces->count == model->tree_count;
     if (!*comparable)
-        strl__v_flaw(model->checks, STRL_VERIFY_LEAVES, 0, "the input makes %u trees, the container has %u", pieces->count,
-                     model->tree_count);
+        strl__v_flaw(model->checks, STRL_VERIFY_LEAVES, 0, "the input makes %u trees, the container has %u",
+                     pieces->count, model->tree_count);
     if (!*comparable)
         return STRL_OK;
     if (pieces->items[0].input == STRL__EVERY_INPUT && (pieces->is_plain || model->trees[0].triangle_count)) {
@@ -150,9 +152,11 @@ strl_status strl__v_check_placements(strl__model *model, strl__vpieces *pieces, 
         return status;
     strl__v_checked(model->checks, STRL_VERIFY_LEAVES, count);
     if (count != model->sections[STRL__PLACEMENTS].item_count)
-        strl__v_flaw(model->checks, STRL_VERIFY_LEAVES, 0, "the input has %" PRIu64 " placements, the container %" PRIu64, count,
+        strl__v_flaw(model->checks, STRL_VERIFY_LEAVES, 0,
+                     "the input has %" PRIu64 " placements, the container %" PRIu64, count,
                      model->sections[STRL__PLACEMENTS].item_count);
     else if (!strl__hash_same(sum, model->placements))
-        strl__v_flaw(model->checks, STRL_VERIFY_LEAVES, 0, "the %" PRIu64 " placements are not those of the input", count);
+        strl__v_flaw(model->checks, STRL_VERIFY_LEAVES, 0, "the %" PRIu64 " placements are not those of the input",
+                     count);
     return STRL_OK;
 }

@@ -110,7 +110,8 @@ static void check_ranges(treelets *self, uint32_t id, strl__vnode *n)
 {
     const strl__vtree *tree = self->tree;
     RECORD_RULE(self,
-                (tree->structure == 3 ? n->rung == 4 && !n->told_by_parent : n->rung <= 3) && n->level < tree->level_count && n->group < tree->group_count && n->group_size >= 1 &&
+                (tree->structure == 3 ? n->rung == 4 && !n->told_by_parent : n->rung <= 3) &&
+                    n->level < tree->level_count && n->group < tree->group_count && n->group_size >= 1 &&
                     n->group_size <= tree->node_count,
                 id, "tree %u node %u: rung %u, level %u of %u, group %u of %u with %u members", tree->index, id,
                 n->rung, n->level, tree->level_count, n->group, tree->group_count, n->group_size);
@@ -129,8 +130,8 @@ static void check_ranges(treelets *self, uint32_t id, strl__vnode *n)
                 id, "tree %u node %u: %u of %u vertices, %u of %u triangles, %u steps, %u shared vertices", tree->index,
                 id, n->base_vertex_count, n->vertex_count, n->base_triangle_count, n->triangle_count, n->step_count,
                 n->shared_vertices);
-    RECORD_RULE(self, cone_range(tree, n), id, "tree %u node %u: a cone about %d %d %d of the cosine %u", tree->index, id,
-                n->cone_axis[0], n->cone_axis[1], n->cone_axis[2], n->cone_cosine);
+    RECORD_RULE(self, cone_range(tree, n), id, "tree %u node %u: a cone about %d %d %d of the cosine %u", tree->index,
+                id, n->cone_axis[0], n->cone_axis[1], n->cone_axis[2], n->cone_cosine);
     RECORD_RULE(self,
                 n->page.bytes <= MOST_PAGE_BYTES && n->payload_bytes >= 1 && n->payload_offset <= n->page.bytes &&
                     n->payload_bytes <= n->page.bytes - n->payload_offset,

@@ -1,4 +1,5 @@
-/* What the file says of runs of placements: docs/format.md, "Run". Colours and normals are looks, which nothing relies on. */
+/* What the file says of runs of placements: docs/format.md, "Run". Colours and normals are looks, which nothing relies
+ * on. */
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>
@@ -25,10 +26,12 @@ strl_status strl__v_runs_create(strl__model *model, strl_error *err)
     if (count == 0)
         return STRL_OK;
     if (count > UINT32_MAX || count * sizeof *model->runs > model->memory_bytes / 4)
-        return strl__fail(err, STRL_ERR_MEMORY, "%" PRIu64 " runs of placements do not fit into a quarter of --memory", count);
+        return strl__fail(err, STRL_ERR_MEMORY, "%" PRIu64 " runs of placements do not fit into a quarter of --memory",
+                          count);
     model->runs = strl__alloc_zero((size_t)count, sizeof *model->runs);
     model->run_count = model->runs ? (uint32_t)count : 0;
-    return model->runs ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %" PRIu64 " runs of placements", count);
+    return model->runs ? STRL_OK
+                       : strl__fail(err, STRL_ERR_MEMORY, "no memory for %" PRIu64 " runs of placements", count);
 }
 
 /* ---- the table of runs */
@@ -71,11 +74,16 @@ void strl__v_run_page(strl__model *model, uint64_t first, uint64_t count, const 
     uint64_t expected = left < STRL__RUN_PLACEMENTS ? left : STRL__RUN_PLACEMENTS;
     const strl__vrun *run = run_of(model, first);
     RUN_RULE(model, first % STRL__RUN_PLACEMENTS == 0 && count == expected, first / STRL__RUN_PLACEMENTS,
-             "page of placements from %" PRIu64 ": %" PRIu64 " of them, expected 512 on each page and the rest on the last", first, count);
+             "page of placements from %" PRIu64 ": %" PRIu64
+             " of them, expected 512 on each page and the rest on the last",
+             first, count);
     if (run)
-        RUN_RULE(model, run->page.offset == place->offset && run->page.bytes == place->bytes && run->page.checksum == place->checksum,
+        RUN_RULE(model,
+                 run->page.offset == place->offset && run->page.bytes == place->bytes &&
+                     run->page.checksum == place->checksum,
                  first / STRL__RUN_PLACEMENTS,
-                 "run %" PRIu64 ": its page is said to be %u bytes at byte %" PRIu64 ", the table of placements has %u at byte %" PRIu64,
+                 "run %" PRIu64 ": its page is said to be %u bytes at byte %" PRIu64
+                 ", the table of placements has %u at byte %" PRIu64,
                  first / STRL__RUN_PLACEMENTS, run->page.bytes, run->page.offset, place->bytes, place->offset);
 }
 
@@ -96,9 +104,10 @@ void strl__v_run_end(strl__model *model, uint64_t first)
     for (unsigned i = 0; run && i < 6; i++)
         scale = fmax(scale, fabs(run->found[i / 3][i % 3]));
     for (unsigned i = 0; run && i < 6; i++)
-        RUN_RULE(model, fabs(run->found[i / 3][i % 3] - run->box[i / 3][i % 3]) <= 1e-12 * scale, first / STRL__RUN_PLACEMENTS,
-                 "run %" PRIu64 ": bound %u of its box is %.17g, its placements' is %.17g", first / STRL__RUN_PLACEMENTS, i,
-                 run->box[i / 3][i % 3], run->found[i / 3][i % 3]);
+        RUN_RULE(model, fabs(run->found[i / 3][i % 3] - run->box[i / 3][i % 3]) <= 1e-12 * scale,
+                 first / STRL__RUN_PLACEMENTS,
+                 "run %" PRIu64 ": bound %u of its box is %.17g, its placements' is %.17g",
+                 first / STRL__RUN_PLACEMENTS, i, run->box[i / 3][i % 3], run->found[i / 3][i % 3]);
 }
 
 /* ---- areas */
@@ -119,8 +128,9 @@ double strl__v_area_scale(const double transform[12])
     if (!(spread > 0))
         return mean;
     for (unsigned k = 0; k < 3; k++)
-        determinant += b[0][k] / spread * (b[1][(k + 1) % 3] / spread * (b[2][(k + 2) % 3] / spread) -
-                                           b[1][(k + 2) % 3] / spread * (b[2][(k + 1) % 3] / spread));
+        determinant += b[0][k] / spread *
+                       (b[1][(k + 1) % 3] / spread * (b[2][(k + 2) % 3] / spread) -
+                        b[1][(k + 2) % 3] / spread * (b[2][(k + 1) % 3] / spread));
     return mean + 2 * spread * cos(acos(fmin(fmax(determinant / 2, -1), 1)) / 3);
 }
 
@@ -130,8 +140,9 @@ void strl__v_run_area(strl__model *model, uint64_t first, double area, bool samp
     if (!run || !(area < 1e37))
         return;
     double said = (double)run->area;
-    RUN_RULE(model, said >= area * (1 - ROUNDING) && (samples || said <= area * (1 + ROUNDING)), first / STRL__RUN_PLACEMENTS,
-             "run %" PRIu64 ": its area is said to be %g, its placements' roots have %g", first / STRL__RUN_PLACEMENTS, said, area);
+    RUN_RULE(model, said >= area * (1 - ROUNDING) && (samples || said <= area * (1 + ROUNDING)),
+             first / STRL__RUN_PLACEMENTS, "run %" PRIu64 ": its area is said to be %g, its placements' roots have %g",
+             first / STRL__RUN_PLACEMENTS, said, area);
 }
 
 static double area_of_mesh(const strl__vmesh *mesh)
@@ -155,7 +166,8 @@ strl_status strl__v_check_run_areas(strl__model *model, strl_error *err)
         return STRL_OK;
     double *area = strl__alloc_zero(model->tree_count, sizeof *area);
     strl__worker *workers = strl__v_workers_create(model);
-    strl_status status = area && workers ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u trees", model->tree_count);
+    strl_status status =
+        area && workers ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u trees", model->tree_count);
     for (uint32_t t = 0; status == STRL_OK && t < model->tree_count; t++) {
         strl__vmesh mesh;
         status = strl__v_load_mesh(model, &model->trees[t], 0, workers, &mesh, err);

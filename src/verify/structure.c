@@ -51,9 +51,14 @@ static void check_errors(strl__model *model, const strl__vtree *tree, uint32_t i
              "tree %u node %u: a leaf claims %g, less than quantisation (%g)", tree->index, id,
              (double)n->geometric_min, (double)tree->leaf_geometric);
     if (tree->structure == 3)
-        RULE(ERRORS, n->geometric_min == n->geometric_max && n->geometric_max == n->group_geometric && n->step_count == 0 && n->group_size == 1, id,
-             "tree %u node %u: a brick has the sizes %g, %g and %g, %u steps and %u members, expected one size, no step and no other member",
-             tree->index, id, (double)n->geometric_min, (double)n->geometric_max, (double)n->group_geometric, n->step_count, n->group_size);
+        RULE(
+            ERRORS,
+            n->geometric_min == n->geometric_max && n->geometric_max == n->group_geometric && n->step_count == 0 &&
+                n->group_size == 1,
+            id,
+            "tree %u node %u: a brick has the sizes %g, %g and %g, %u steps and %u members, expected one size, no step and no other member",
+            tree->index, id, (double)n->geometric_min, (double)n->geometric_max, (double)n->group_geometric,
+            n->step_count, n->group_size);
     if (id == 0)
         return;
     const strl__vnode *p = &tree->nodes[n->parent];
@@ -156,11 +161,10 @@ static uint32_t check_page(strl__model *model, const strl__vtree *tree, uint32_t
     uint64_t decoded = 0;
     for (; id < tree->node_count && tree->nodes[id].page.offset == head->page.offset; id++) {
         const strl__vnode *n = &tree->nodes[id];
-        RULE(
-            PAGES, same_page(n, head) && n->payload_offset == at, id,
-            "tree %u node %u: its payload is at byte %u of its page, expected %u, or it "
+        RULE(PAGES, same_page(n, head) && n->payload_offset == at, id,
+             "tree %u node %u: its payload is at byte %u of its page, expected %u, or it "
              "says otherwise of the page than node %u",
-            tree->index, id, n->payload_offset, at, first);
+             tree->index, id, n->payload_offset, at, first);
         at = n->payload_offset + n->payload_bytes;
         decoded += decoded_bytes(n);
     }

@@ -82,8 +82,8 @@ void strl__v_seeker_deinit(strl__seeker *seeker);
 /* Squared distance of p from the surface. Exact up to rounding. */
 double strl__v_seeker_distance2(strl__seeker *seeker, const double p[3]);
 
-/* By how much p is farther from the surface than claimed: the least, over all chunks, of the distance from a chunk less its own
- * claim. found: an upper bound of that. */
+/* By how much p is farther from the surface than claimed: the least, over all chunks, of the distance from a chunk less
+ * its own claim. found: an upper bound of that. */
 double strl__v_seeker_excess(strl__seeker *seeker, const double p[3], double found);
 /* The claim of the chunk that was found last. */
 double strl__v_seeker_claimed(const strl__seeker *seeker);

@@ -20,11 +20,11 @@ typedef struct table {
     strl__model *model;
     unsigned kind;
     const char *name_of_kind;
-    double bounds[6]; /* of the placements so far */
+    double bounds[6];        /* of the placements so far */
     const double *tree_area; /* [tree_count] NULL: everything is checked; else areas alone are summed up */
-    double area; /* of the page's placements so far */
-    bool samples; /* of a tree that adds up is one of them */
-    size_t name_bytes; /* of the name before, in the same page */
+    double area;             /* of the page's placements so far */
+    bool samples;            /* of a tree that adds up is one of them */
+    size_t name_bytes;       /* of the name before, in the same page */
     uint8_t name[MOST_NAME_BYTES];
 } table;
 
@@ -58,8 +58,8 @@ static bool read_name(table *self, uint64_t item, const uint8_t *tail, size_t by
 {
     size_t shared = bytes < 2 ? SIZE_MAX : tail[0] | (size_t)tail[1] << 8;
     bool good = shared <= self->name_bytes && shared + bytes - 2 <= MOST_NAME_BYTES;
-    TABLE_RULE(self, good, item, "%s %" PRIu64 ": %zu bytes after %zu of the %zu of the name before", self->name_of_kind, item,
-               bytes, shared, self->name_bytes);
+    TABLE_RULE(self, good, item, "%s %" PRIu64 ": %zu bytes after %zu of the %zu of the name before",
+               self->name_of_kind, item, bytes, shared, self->name_bytes);
     if (good) {
         memcpy(self->name + shared, tail + 2, bytes - 2);
         self->name_bytes = shared + bytes - 2;
@@ -73,8 +73,8 @@ static void check_name(table *self, uint64_t item, const uint8_t *text, size_t b
     while (at < bytes && (step = utf8_sequence(text + at, bytes - at)) != 0)
         at += step;
     TABLE_RULE(self, at == bytes && bytes <= MOST_NAME_BYTES, item,
-               "%s %" PRIu64 ": its name of %zu bytes is not UTF-8 of at most 32000 bytes (byte %zu)", self->name_of_kind, item,
-               bytes, at);
+               "%s %" PRIu64 ": its name of %zu bytes is not UTF-8 of at most 32000 bytes (byte %zu)",
+               self->name_of_kind, item, bytes, at);
 }
 
 static void widen_bounds(table *self, uint64_t item, const strl__vtree *tree, const double m[12])
@@ -113,11 +113,12 @@ static void check_placement(table *self, uint64_t item, const uint8_t *bytes, si
     }
     bool good = size == PLACEMENT_BYTES && tree < self->model->tree_count &&
                 own_part <= self->model->sections[STRL__PARTS].item_count && finite;
-    TABLE_RULE(self, good, item, "placement %" PRIu64 ": %zu bytes, tree %u of %u, its own part plus one %u, %s", item, size,
-               tree, self->model->tree_count, own_part, finite ? "finite" : "not finite");
+    TABLE_RULE(self, good, item, "placement %" PRIu64 ": %zu bytes, tree %u of %u, its own part plus one %u, %s", item,
+               size, tree, self->model->tree_count, own_part, finite ? "finite" : "not finite");
     if (good) {
         widen_bounds(self, item, &self->model->trees[tree], m);
-        strl__hash_add(&self->model->placements, strl__hash_placement(tree, strl__v_compares_parts(self->model) ? own_part : 0, m));
+        strl__hash_add(&self->model->placements,
+                       strl__hash_placement(tree, strl__v_compares_parts(self->model) ? own_part : 0, m));
     }
 }
 
@@ -134,8 +135,8 @@ static void check_image(table *self, uint64_t item, const uint8_t *bytes, size_t
     if (size == 0)
         return;
     bool good = !cursor.failed && wrap_u <= 2 && wrap_v <= 2 && reserved == 0 && finite;
-    TABLE_RULE(self, good, item, "image %" PRIu64 ": %zu bytes, wraps %u and %u, reserved word %u, %s", item, size, wrap_u,
-               wrap_v, reserved, finite ? "a good range" : "a bad range");
+    TABLE_RULE(self, good, item, "image %" PRIu64 ": %zu bytes, wraps %u and %u, reserved word %u, %s", item, size,
+               wrap_u, wrap_v, reserved, finite ? "a good range" : "a bad range");
     if (good)
         check_name(self, item, bytes + cursor.at, size - cursor.at);
 }
@@ -165,8 +166,8 @@ static void check_leaf(table *self, const uint8_t *bytes, size_t size, uint64_t 
     strl_cursor cursor = strl_cursor_make(bytes, size);
     uint32_t items = strl_cursor_u32(&cursor);
     bool good = items == count && items <= (size - 4) / 4;
-    TABLE_RULE(self, good, first, "%s page from item %" PRIu64 ": %u items, expected %" PRIu64, self->name_of_kind, first,
-               items, count);
+    TABLE_RULE(self, good, first, "%s page from item %" PRIu64 ": %u items, expected %" PRIu64, self->name_of_kind,
+               first, items, count);
     if (!good)
         return;
     size_t head = 4 + (size_t)items * 4, before = 0;
@@ -176,8 +177,8 @@ static void check_leaf(table *self, const uint8_t *bytes, size_t size, uint64_t 
     for (uint32_t i = 0; i < items; i++) {
         size_t end = strl_cursor_u32(&cursor);
         good = end >= before && end <= size - head && (i + 1 < items || end == size - head);
-        TABLE_RULE(self, good, first + i, "%s %" PRIu64 ": ends at %zu of %zu, after %zu", self->name_of_kind, first + i, end,
-                   size - head, before);
+        TABLE_RULE(self, good, first + i, "%s %" PRIu64 ": ends at %zu of %zu, after %zu", self->name_of_kind,
+                   first + i, end, size - head, before);
         if (!good)
             return;
         check_item(self, first + i, bytes + head + before, end - before);
@@ -194,8 +195,8 @@ static strl_status check_index(table *self, const uint8_t *bytes, size_t size, u
     strl_cursor cursor = strl_cursor_make(bytes, size);
     uint32_t refs = strl_cursor_u32(&cursor), reserved = strl_cursor_u32(&cursor);
     bool good = refs >= 1 && refs <= MOST_REFS && reserved == 0 && size == 8 + (size_t)refs * REF_BYTES;
-    TABLE_RULE(self, good, first, "%s index page from item %" PRIu64 ": %u references in %zu bytes", self->name_of_kind, first,
-               refs, size);
+    TABLE_RULE(self, good, first, "%s index page from item %" PRIu64 ": %u references in %zu bytes", self->name_of_kind,
+               first, refs, size);
     strl_status status = STRL_OK;
     for (uint32_t i = 0; good && status == STRL_OK && i < refs; i++) {
         strl__place place = {.offset = strl_cursor_u64(&cursor)};
@@ -207,8 +208,8 @@ static strl_status check_index(table *self, const uint8_t *bytes, size_t size, u
             end = strl__load_le(bytes + cursor.at + 8, 8);
         good = zero == 0 && place.bytes <= PAGE_BYTES && from < end && end <= first + count && (i > 0 || from == first);
         TABLE_RULE(self, good, from,
-                   "%s index page from item %" PRIu64 ": reference %u is for items %" PRIu64 " to %" PRIu64, self->name_of_kind,
-                   first, i, from, end);
+                   "%s index page from item %" PRIu64 ": reference %u is for items %" PRIu64 " to %" PRIu64,
+                   self->name_of_kind, first, i, from, end);
         if (good)
             status = check_page(self, &place, depth - 1, from, end - from, err);
     }
@@ -229,8 +230,8 @@ static strl_status check_page(table *self, const strl__place *place, uint32_t de
                               strl_error *err)
 {
     bool good = place->bytes >= 8 && place->bytes <= PAGE_BYTES;
-    TABLE_RULE(self, good, first, "%s page from item %" PRIu64 ": %u bytes, expected 8 to 65536", self->name_of_kind, first,
-               place->bytes);
+    TABLE_RULE(self, good, first, "%s page from item %" PRIu64 ": %u bytes, expected 8 to 65536", self->name_of_kind,
+               first, place->bytes);
     if (!good)
         return STRL_OK;
     uint8_t *bytes = strl__alloc(place->bytes, 1);

@@ -38,7 +38,7 @@ static void check_totals(strl__model *model, strl_verify_report *report)
         strl__v_flaw(
             model->checks, STRL_VERIFY_COUNTS, 0,
             "header: %llu triangles came in, the leaves have %llu, %llu not finite and %llu degenerate ones were "
-                     "dropped",
+            "dropped",
             (unsigned long long)model->triangles_in, (unsigned long long)report->triangles_leaf,
             (unsigned long long)model->dropped_nonfinite, (unsigned long long)model->dropped_degenerate);
 }
@@ -110,7 +110,8 @@ static strl_status compare_tree(strl__model *model, strl__vtree *tree, const str
         add_totals(total, &input);
         strl__v_check_leaves(model, tree, &input);
     }
-    if (status == STRL_OK && strl__replaces(tree) && input.kept) /* in the others nothing moves but onto the lattice */
+    /* in the others nothing moves but onto the lattice */
+    if (status == STRL_OK && strl__replaces(tree) && input.kept)
         status = strl__v_check_distances(model, tree, &input, report, err);
     strl__v_input_deinit(&input);
     return status;
@@ -119,9 +120,10 @@ static strl_status compare_tree(strl__model *model, strl__vtree *tree, const str
 /* Of several trees the figures of cuts and levels are those of the tree whose claims are nearest to being broken. */
 static void keep_worse(strl_verify_report *report, strl_verify_report *one)
 {
-    bool worse = one->uniform_count && (!report->uniform_count || (one->worst_claimed_over_measured > 0 &&
-                                                                   (report->worst_claimed_over_measured == 0 ||
-                                                                    one->worst_claimed_over_measured < report->worst_claimed_over_measured)));
+    bool worse = one->uniform_count &&
+                 (!report->uniform_count || (one->worst_claimed_over_measured > 0 &&
+                                             (report->worst_claimed_over_measured == 0 ||
+                                              one->worst_claimed_over_measured < report->worst_claimed_over_measured)));
     if (worse) {
         strl_verify_report_deinit(report);
         memcpy(report->uniform, one->uniform, sizeof report->uniform);

@@ -91,9 +91,9 @@ typedef struct strl_verify_report {
     uint32_t uniform_count;  /* 0 without inputs */
     strl_verify_cut *levels; /* owned; [level_count] all nodes of a level in their base state */
     uint32_t level_count;
-    double claimed_over_measured_median; /* of the uniform cuts where something was measured; 0 = nowhere */
+    double claimed_over_measured_median;         /* of the uniform cuts where something was measured; 0 = nowhere */
     double most_claimed_over_measured_of_levels; /* 0 = nothing was measured */
-    double worst_claimed_over_measured;  /* the least of the uniform cuts: below 1 is a broken claim */
+    double worst_claimed_over_measured;          /* the least of the uniform cuts: below 1 is a broken claim */
 } strl_verify_report;
 
 /* Short name of a check, for people and JSON. */

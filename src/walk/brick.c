@@ -1,13 +1,15 @@
-/* Bricks of sample trees as meshes of some states (geometry/sample_payload.h). The states' errors are the sizes of cells, so a state
- * is chosen as that of any mesh (refine.c); from one to the next no vertex moves: triangles come, and other splats stand for what is
- * finer. Seen from afar, of a brick without children only the states are kept that show: a brick that covers some pixels shows a hundredth of
- * itself. Who comes nearer has it decoded anew, with more of them; who goes away has what is too much dropped where room is wanted. */
+/* Bricks of sample trees as meshes of some states (geometry/sample_payload.h). The states' errors are the sizes of
+ * cells, so a state is chosen as that of any mesh (refine.c); from one to the next no vertex moves: triangles come, and
+ * other splats stand for what is finer. Seen from afar, of a brick without children only the states are kept that show:
+ * a brick that covers some pixels shows a hundredth of itself. Who comes nearer has it decoded anew, with more of them;
+ * who goes away has what is too much dropped where room is wanted. */
 #include "walk/internal.h"
 
 #include <inttypes.h>
 #include <string.h>
 
-/* What a mesh has of the brick, and which of it each state shows: the first vertices and triangles, and splats up to an end. */
+/* What a mesh has of the brick, and which of it each state shows: the first vertices and triangles, and splats up to an
+ * end. */
 typedef struct brick_part {
     uint32_t state, vertices, triangles, splats;
     uint16_t *from, *to; /* numbers of vertices: the brick's by the mesh's, and back; NULL = the same ones */
@@ -16,7 +18,8 @@ typedef struct brick_part {
     uint16_t splat_end[STRL_BRICK_LEVELS];        /* but of the last state, which shows none */
 } brick_part;
 
-/* The coarsest state whose closed cells are no larger than that; the finest one that there is where it has not twice as much. */
+/* The coarsest state whose closed cells are no larger than that; the finest one that there is where it has not twice as
+ * much. */
 static uint32_t choose_state(const float *errors, const uint32_t *triangle_end, uint32_t finest, float closed_size)
 {
     uint32_t state = 0;
@@ -75,8 +78,8 @@ static bool number_vertices(const strl_pm *pm, const strl_brick_head *head, strl
 }
 
 /* A brick above others is taken as it is: it has but one level, and all of it is drawn as soon as it is opened. */
-static strl_status choose_part(const strl_node *record, const strl_pm *pm, const strl_brick_head *head, float closed_size, strl_arena *arena,
-                               brick_part *part, strl_error *err)
+static strl_status choose_part(const strl_node *record, const strl_pm *pm, const strl_brick_head *head,
+                               float closed_size, strl_arena *arena, brick_part *part, strl_error *err)
 {
     bool is_leaf = record->child_count == 0;
     *part = (brick_part){.state = head->level_count};
@@ -96,8 +99,10 @@ static strl_status choose_part(const strl_node *record, const strl_pm *pm, const
 /* Of the block of a mesh with so many levels. */
 static size_t block_bytes(uint32_t vertices, uint32_t triangles, uint32_t splats, uint32_t levels, bool labels)
 {
-    return (size_t)vertices * (sizeof(strl_vertex) + (labels ? sizeof(strl_vertex_label) : 0)) + splats * sizeof(strl_splat) +
-           ((size_t)levels + 1) * (sizeof(uint32_t) + sizeof(float) + 2 * sizeof(uint16_t)) + 3 * (size_t)triangles * sizeof(uint16_t);
+    return (size_t)vertices * (sizeof(strl_vertex) + (labels ? sizeof(strl_vertex_label) : 0)) +
+           splats * sizeof(strl_splat) +
+           ((size_t)levels + 1) * (sizeof(uint32_t) + sizeof(float) + 2 * sizeof(uint16_t)) +
+           3 * (size_t)triangles * sizeof(uint16_t);
 }
 
 /* False without memory. */
@@ -114,7 +119,8 @@ static bool allocate(const brick_part *part, uint32_t levels, bool labels, strl_
                          .held = part->state};
     mesh->vertices = (strl_vertex *)block;
     mesh->labels = labels ? (strl_vertex_label *)(mesh->vertices + part->vertices) : NULL;
-    mesh->splats = labels ? (strl_splat *)(mesh->labels + part->vertices) : (strl_splat *)(mesh->vertices + part->vertices);
+    mesh->splats =
+        labels ? (strl_splat *)(mesh->labels + part->vertices) : (strl_splat *)(mesh->vertices + part->vertices);
     mesh->triangle_end = (uint32_t *)(mesh->splats + part->splats);
     mesh->errors = (float *)(mesh->triangle_end + states);
     mesh->vertex_end = (uint16_t *)(mesh->errors + states);
@@ -154,8 +160,9 @@ static void order_triangles(const strl_pm *pm, const strl_brick_head *head, cons
             put_triangle(pm->triangle[t + k], part->to, mesh->indices + 3 * (size_t)next[head->run[i].level]++);
 }
 
-strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const strl_brick_head *head, bool labels, float closed_size,
-                               strl_arena *arena, strl__mesh *mesh, const uint16_t **from, strl_error *err)
+strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const strl_brick_head *head, bool labels,
+                               float closed_size, strl_arena *arena, strl__mesh *mesh, const uint16_t **from,
+                               strl_error *err)
 {
     brick_part part;
     if (pm->step_count != 0)
@@ -166,7 +173,8 @@ strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const
     size_t bytes = block_bytes(part.vertices, part.triangles, part.splats, head->level_count, labels);
     uint64_t most = strl__node_bytes(record, labels);
     if (bytes > most)
-        return strl__fail(err, STRL_ERR_FORMAT, "a brick takes %zu bytes, expected at most %" PRIu64 ": it has too many splats", bytes, most);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "a brick takes %zu bytes, expected at most %" PRIu64 ": it has too many splats", bytes, most);
     if (!allocate(&part, head->level_count, labels, mesh))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a brick of %" PRIu32 " vertices", part.vertices);
     *from = part.from;

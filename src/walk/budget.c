@@ -1,7 +1,8 @@
 /* The allowed error under a tight budget. It moves on a geometric scale of quarter octaves: up at
  * once where the wanted cut does not fit, down by a step a frame where the finer cut would leave
- * some room, so that it does not swing. Bytes are known from records before anything is fetched, but for those of bricks that are opened
- * partly: these are estimated from what came of late, so that under a tight budget what fits depends a little on the way there. */
+ * some room, so that it does not swing. Bytes are known from records before anything is fetched, but for those of
+ * bricks that are opened partly: these are estimated from what came of late, so that under a tight budget what fits
+ * depends a little on the way there. */
 #include "walk/internal.h"
 
 #include <math.h>

@@ -28,14 +28,17 @@ double strl__group_px(const strl__descent *c, const strl_node *record)
 {
     strl_box box = strl__world_box(c->tree, c->placement, record->group_box_min, record->group_box_max);
     double error = fmaxf(record->group_geometric, record->group_appearance);
-    return strl_view_error_px(c->cut->view, &box, error * c->placement->length_scale) / strl__splat_ratio(c->walk, c->tree);
+    return strl_view_error_px(c->cut->view, &box, error * c->placement->length_scale) /
+           strl__splat_ratio(c->walk, c->tree);
 }
 
 bool strl__asks_itself(const strl__descent *c, const strl_node *record)
 {
     strl_box box = strl__world_box(c->tree, c->placement, record->box_min, record->box_max);
     double error = fmaxf(record->geometric_min, record->appearance_min);
-    return strl_view_error_px(c->cut->view, &box, error * c->placement->length_scale) / strl__splat_ratio(c->walk, c->tree) > c->cut->allowed_px;
+    return strl_view_error_px(c->cut->view, &box, error * c->placement->length_scale) /
+               strl__splat_ratio(c->walk, c->tree) >
+           c->cut->allowed_px;
 }
 
 /* ---- lists */
@@ -69,8 +72,8 @@ double strl__reserve(const strl_walk *walk)
     return walk->is_tight ? STRL__LEAST_RESERVE : STRL__RESERVE;
 }
 
-float strl__closed_size(const strl_walk *walk, const strl_tree *tree, const strl_sight *sight, double length_scale, double allowed_px,
-                        double reserve)
+float strl__closed_size(const strl_walk *walk, const strl_tree *tree, const strl_sight *sight, double length_scale,
+                        double allowed_px, double reserve)
 {
     return (float)(strl_sight_error_of(sight, allowed_px * strl__splat_ratio(walk, tree)) / length_scale * reserve);
 }
@@ -83,7 +86,8 @@ static double size_beside(const strl_view *view, const strl_box *box, double px)
         double way = fmax(0, fmax(box->min[k] - view->eye[k], view->eye[k] - box->max[k]));
         square += way * way;
     }
-    return view->orthographic ? px / view->focal_px : px * sqrt(square) / (view->focal_px * view->corner * view->corner);
+    return view->orthographic ? px / view->focal_px
+                              : px * sqrt(square) / (view->focal_px * view->corner * view->corner);
 }
 
 float strl__closed_size_of(const strl__descent *c, const strl__node *child, double reserve)
@@ -93,8 +97,9 @@ float strl__closed_size_of(const strl__descent *c, const strl__node *child, doub
     const strl_box box = strl__world_box(c->tree, c->placement, child->record->box_min, child->record->box_max);
     const strl_sight sight = strl_view_sight(c->cut->view, &box);
     const double px = c->cut->allowed_px * strl__splat_ratio(c->walk, c->tree);
-    return sight.empty ? (float)(size_beside(c->cut->view, &box, px) / c->placement->length_scale * reserve)
-                       : strl__closed_size(c->walk, c->tree, &sight, c->placement->length_scale, c->cut->allowed_px, reserve);
+    return sight.empty
+               ? (float)(size_beside(c->cut->view, &box, px) / c->placement->length_scale * reserve)
+               : strl__closed_size(c->walk, c->tree, &sight, c->placement->length_scale, c->cut->allowed_px, reserve);
 }
 
 void strl__note_size(const strl__descent *c, strl__node *child)
@@ -140,10 +145,12 @@ static void note_foreign(strl_walk *walk, const strl__node *parent, strl__node *
     strl__note_fault(walk, &error);
 }
 
-/* Pages are the unit of reading: of one that is read now, what may be seen after the next step need not be read again. */
+/* Pages are the unit of reading: of one that is read now, what may be seen after the next step need not be read again.
+ */
 static void leave_out(strl__descent *c, strl__node *child)
 {
-    bool may_come = c->cut->kind == STRL__CUT_FRONT && child->residency == STRL__ABSENT && !strl__is_waiting(c->walk, &child->retry);
+    bool may_come = c->cut->kind == STRL__CUT_FRONT && child->residency == STRL__ABSENT &&
+                    !strl__is_waiting(c->walk, &child->retry);
     c->turned_away++;
     if (may_come) /* without memory it does not */
         strl__ask_for_child(c, child, &c->walk->along, 0);
@@ -161,8 +168,8 @@ static strl__outlook find_child(strl__descent *c, strl__node *parent, uint32_t i
         *child = NULL;
         return STRL__BACKING_OFF;
     }
-    /* The place for occlusion too: what is known to be hidden is left out here in the same way, of trees that add alone, because of one
-     * that replaces a group needs all its children. */
+    /* The place for occlusion too: what is known to be hidden is left out here in the same way, of trees that add
+     * alone, because of one that replaces a group needs all its children. */
     if (*child && strl__faces_away(&c->facing, (*child)->record)) {
         leave_out(c, *child);
         *child = NULL;

@@ -7,7 +7,8 @@
 /* The eye may stand inside a box; the depth buffer still wants a near plane before it. */
 #define LEAST_NEAR 1e-6
 
-void strl__item_place(strl_draw_item *item, const strl_tree *tree, const strl_node *record, const strl__placement *placement)
+void strl__item_place(strl_draw_item *item, const strl_tree *tree, const strl_node *record,
+                      const strl__placement *placement)
 {
     item->own_part = placement->own_part;
     item->step = tree->step;

@@ -1,12 +1,12 @@
 /* Cones of normals against the eye (Shirman and Abi-Ezzi 1993).
  *
- * A face with the normal n through the point p shows its front to an eye e where n . (e - p) > 0. An affine placement x -> L x + t takes
- * n to det(L) L^-T n, or, as one that mirrors does not turn faces round, to |det(L)| L^-T n; so the sign of that product is the
- * same before and after it, and the eye is taken into the tree's lattice: nothing need be known of the placement but that it has an
- * inverse.
+ * A face with the normal n through the point p shows its front to an eye e where n . (e - p) > 0. An affine placement x
+ * -> L x + t takes n to det(L) L^-T n, or, as one that mirrors does not turn faces round, to |det(L)| L^-T n; so the
+ * sign of that product is the same before and after it, and the eye is taken into the tree's lattice: nothing need be
+ * known of the placement but that it has an inverse.
  *
- * With a cone of the half angle alpha about a all normals at p show their backs where p - e is within 90 degrees - alpha of a. Such
- * vectors are a convex cone themselves: where the corners of a box lie in it, so does the box. */
+ * With a cone of the half angle alpha about a all normals at p show their backs where p - e is within 90 degrees -
+ * alpha of a. Such vectors are a convex cone themselves: where the corners of a box lie in it, so does the box. */
 #include "walk/facing.h"
 
 #include <float.h>
@@ -61,7 +61,8 @@ strl__facing strl__facing_find(const strl_view *view, const strl_tree *tree, con
             error += back.error[i][j] * fabs(from);
         }
         facing.eye[i] = view->orthographic ? sum : (sum - tree->origin[i]) / tree->step;
-        facing.error[i] = view->orthographic ? error : (error + ROUNDINGS * (fabs(sum) + fabs(tree->origin[i]))) / tree->step;
+        facing.error[i] =
+            view->orthographic ? error : (error + ROUNDINGS * (fabs(sum) + fabs(tree->origin[i]))) / tree->step;
         facing.known = facing.known && isfinite(facing.eye[i]) && isfinite(facing.error[i]);
     }
     return facing;

@@ -12,7 +12,8 @@ typedef struct strl__facing {
 } strl__facing;
 
 strl__facing strl__facing_find(const strl_view *view, const strl_tree *tree, const double transform[12]);
-/* Conservative: true only where no point of the record's box, as part of a face whose normal is in its cone, shows its front. */
+/* Conservative: true only where no point of the record's box, as part of a face whose normal is in its cone, shows its
+ * front. */
 bool strl__faces_away(const strl__facing *facing, const strl_node *record);
 
 #endif

@@ -1,7 +1,7 @@
-/* What is too far away to be told apart: a placement, or a run of them, whose box projects to no more than the allowed error is
- * drawn as one point, so that a frame costs what can be seen, however many copies there are. The point lies in the box, so it is
- * off by no more than the box is large; it is as opaque as the share of it that the faces of the run would cover. In the same way,
- * but as large as a point can be, a run is drawn whose placements are on their way. */
+/* What is too far away to be told apart: a placement, or a run of them, whose box projects to no more than the allowed
+ * error is drawn as one point, so that a frame costs what can be seen, however many copies there are. The point lies in
+ * the box, so it is off by no more than the box is large; it is as opaque as the share of it that the faces of the run
+ * would cover. In the same way, but as large as a point can be, a run is drawn whose placements are on their way. */
 #include "walk/internal.h"
 
 #include <math.h>
@@ -55,8 +55,8 @@ static double depth_of(const strl_view *view, const double point[3])
     return depth;
 }
 
-/* Where the point is drawn; its depth is not above 0 where it can't be. Where the middle of a box is behind the eye, what is missing
- * of it is before the eye all the same. */
+/* Where the point is drawn; its depth is not above 0 where it can't be. Where the middle of a box is behind the eye,
+ * what is missing of it is before the eye all the same. */
 static double find_place(const strl_view *view, const strl_box *box, bool is_missing, double place[3])
 {
     for (int k = 0; k < 3; k++)
@@ -69,8 +69,8 @@ static double find_place(const strl_view *view, const strl_box *box, bool is_mis
     return depth_of(view, place);
 }
 
-/* How much of the point's square the faces hide, of which parallel ones are seen as much as they face the eye: `walls` is their area in such
- * squares. */
+/* How much of the point's square the faces hide, of which parallel ones are seen as much as they face the eye: `walls`
+ * is their area in such squares. */
 static double opacity_of(const strl_far *far, const double sight[3], double walls)
 {
     double along = 1 - (double)far->spread / STRL_SPREAD_MOST, square = 0, facing = 0;
@@ -90,7 +90,8 @@ strl_vertex *strl__far_points_add(strl__far_points *points, bool labels, uint32_
         (labels && !strl__grow(&points->labels, &points->label_capacity, points->count + 1, sizeof *points->labels)))
         return NULL;
     if (labels)
-        points->labels[points->count] = (strl_vertex_label){own_part - 1, STRL_NONE, {0, 0}}; /* of none: more than any count */
+        points->labels[points->count] =
+            (strl_vertex_label){own_part - 1, STRL_NONE, {0, 0}}; /* of none: more than any count */
     return &points->items[points->count++];
 }
 
@@ -106,8 +107,8 @@ int32_t strl__far_cell(double at)
     return (int32_t)lrint(at > 0 ? at < LATTICE ? at : LATTICE : 0);
 }
 
-strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far, double px, bool is_missing,
-                           uint32_t own_part, strl_error *err)
+strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far, double px,
+                           bool is_missing, uint32_t own_part, strl_error *err)
 {
     double least, largest, place[3], sight[3], depth = find_place(cut->view, box, is_missing, place);
     if (!(px > 0) || !(depth > 0) || !(far->area > 0)) /* not in the image, or nothing */
@@ -138,7 +139,10 @@ strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box
 /* Without placement, node or level: they stand for many. */
 strl_draw_item strl__far_item(const strl_walk *walk, double point_px, double box_px)
 {
-    strl_draw_item item = {.placement = STRL_NONE, .node = STRL_NONE, .step = strl__far_step(walk), .error_px = (float)box_px,
+    strl_draw_item item = {.placement = STRL_NONE,
+                           .node = STRL_NONE,
+                           .step = strl__far_step(walk),
+                           .error_px = (float)box_px,
                            .point_px = (float)fmin(fmax(point_px, 1), STRL__MOST_POINT_PX)};
     for (int k = 0; k < 3; k++) {
         item.box_max[k] = (int64_t)LATTICE;

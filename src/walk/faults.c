@@ -8,8 +8,8 @@
 
 #define RETRY_FRAMES 8u /* doubles with each failure in a row */
 #define RETRY_DOUBLINGS 7u
-/* From so many on strl_walk_settled does not wait for it; it is still asked for. Over a network what came wrong may come right: where every
- * other answer is wrong, one thing in 256 is given up. */
+/* From so many on strl_walk_settled does not wait for it; it is still asked for. Over a network what came wrong may
+ * come right: where every other answer is wrong, one thing in 256 is given up. */
 #define GIVE_UP_FAILURES 3u
 #define GIVE_UP_WRONG 8u
 #define LOOK_NS 1000000000u /* between two looks: this part of the time for which the source has been away, */
@@ -57,8 +57,8 @@ void strl__retry_asked(const strl_walk *walk, strl__retry *retry)
 
 /* ---- of the source */
 
-/* Where some reads fail and others do not, the source seems to come back all the time: what fails once more when it was called
- * is not called by that. */
+/* Where some reads fail and others do not, the source seems to come back all the time: what fails once more when it was
+ * called is not called by that. */
 void strl__source_answers(strl_walk *walk)
 {
     if (!walk->is_away)

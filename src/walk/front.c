@@ -79,8 +79,9 @@ static bool suffices(const strl__descent *c, const strl__node *child)
     return px / strl__splat_ratio(c->walk, c->tree) <= c->cut->allowed_px;
 }
 
-/* What is to come of a brick that may be opened partly is estimated by those that came. Any of them needs the room, for a moment, to be
- * decoded as a whole. What it holds beyond its need does not count: it goes as soon as room is wanted. */
+/* What is to come of a brick that may be opened partly is estimated by those that came. Any of them needs the room, for
+ * a moment, to be decoded as a whole. What it holds beyond its need does not count: it goes as soon as room is wanted.
+ */
 static uint64_t child_bytes(const strl__descent *c, const strl__node *child)
 {
     bool is_here = child->residency == STRL__RESIDENT, opens_partly = strl__opens_partly(c->walk, child);
@@ -171,7 +172,8 @@ static strl_status descend(strl__descent *c, const strl__group *group, double px
     }
     if (!ready)
         return stay(c, group, 0);
-    strl_status status = c->tree->structure == STRL_STRUCTURE_SAMPLES ? add_members(c, group, true) : STRL_OK; /* drawn with what is below */
+    /* drawn with what is below */
+    strl_status status = c->tree->structure == STRL_STRUCTURE_SAMPLES ? add_members(c, group, true) : STRL_OK;
     return status ? status : note_split(c, group);
 }
 
@@ -263,7 +265,8 @@ strl_status strl__cut_run(strl_walk *walk, strl__cut *cut, strl_error *err)
     cut->bytes = walk->root_bytes;
     if (cut->kind == STRL__CUT_FRONT) {
         walk->wanted.count = walk->split.count = walk->ahead.count = 0;
-        walk->missing.count = walk->prefetch.count = walk->along.count = walk->front.count = walk->wanted_runs.count = 0;
+        walk->missing.count = walk->prefetch.count = walk->along.count = walk->front.count = walk->wanted_runs.count =
+            0;
         for (unsigned size = 0; size < STRL__FAR_SIZES; size++)
             walk->far[size].count = 0, walk->far[size].px = 0;
         walk->far_far = 0;

@@ -9,9 +9,9 @@
  * of all members are resident, so that the front is a cut without cracks whatever is resident; (2)
  * nodes of the wanted cut and all their ancestors carry wanted_frame = this frame and are not
  * evicted, so that collapsing never waits; (3) resident_bytes counts meshes, records,
- * placements, pages kept and reservations of reads under way, and never exceeds memory_bytes (beside it there are, for a moment, meshes that
- * were replaced); (4) a run of placements whose page is not there is
- * drawn as a point; a page that the front points into carries wanted_frame = this frame. */
+ * placements, pages kept and reservations of reads under way, and never exceeds memory_bytes (beside it there are, for
+ * a moment, meshes that were replaced); (4) a run of placements whose page is not there is drawn as a point; a page
+ * that the front points into carries wanted_frame = this frame. */
 #ifndef STRL_WALK_INTERNAL_H
 #define STRL_WALK_INTERNAL_H
 
@@ -23,7 +23,8 @@
 #include "stroll/walk.h"
 
 #define STRL__MAX_REQUESTS 256u
-#define STRL__SPLAT_ROOM 2048u /* bytes that a decoded node may take beside what its record says: splats of an empty brick */
+/* bytes that a decoded node may take beside what its record says: splats of an empty brick */
+#define STRL__SPLAT_ROOM 2048u
 #define STRL__PREVIEW_ROOM (STRL_BRICK_SPLATS * sizeof(strl_splat)) /* the same of the first node of a tree */
 #define STRL__LEAST_GUARD 1.25
 #define STRL__HALVINGS (STRL_BRICK_LEVELS + 1)
@@ -37,21 +38,23 @@ typedef struct strl__retry {
     uint64_t frame;    /* not before this frame, */
     bool is_unread;    /* unless it was the source that failed, and it has come back: */
     uint64_t returns;  /* the walk's, when it failed */
-    bool was_early;    /* the last time it was asked for before its frame: only the end of a lasting outage calls it again */
+    /* the last time it was asked for before its frame: only the end of a lasting outage calls it again */
+    bool was_early;
 } strl__retry;
 
 /* A decoded node: one block of at most strl__node_bytes, which `vertices` begins. indices[k]
  * = resolve(corner k, state) for all corners, also those of triangles that the state does not have
- * yet; of a node that several placements draw (`shared`), each in its state, the corners of some states are there, one after
- * the other, and nothing of it changes. The corners that a vertex v >= base_vertices moves (those in its subtree of the parent
- * forest) are corners[moved_first[v - base] ...], moved_count of them. */
+ * yet; of a node that several placements draw (`shared`), each in its state, the corners of some states are there, one
+ * after the other, and nothing of it changes. The corners that a vertex v >= base_vertices moves (those in its subtree
+ * of the parent forest) are corners[moved_first[v - base] ...], moved_count of them. */
 typedef struct strl__mesh {
     uint32_t vertex_count, base_vertices, triangle_count, step_count;
     uint32_t state; /* of the indices; 0 where shared */
-    uint32_t held;  /* the finest state whose triangles and splats are here: step_count but of bricks that show few (brick.c) */
+    /* the finest state whose triangles and splats are here: step_count but of bricks that show few (brick.c) */
+    uint32_t held;
     uint64_t spare_bytes; /* of strl__node_bytes, that a brick does without */
     bool shared;
-    uint32_t index_total; /* in indices, of all states; shared */
+    uint32_t index_total;  /* in indices, of all states; shared */
     strl_vertex *vertices; /* owned, with all that follows; NULL = not resident */
     uint32_t *corners;
     uint32_t *moved_first, *moved_count; /* [vertex_count - base_vertices] */
@@ -77,7 +80,8 @@ typedef struct strl__node {
     uint32_t decoding;                /* pending nodes that are decoded by this one: it is not evicted */
     strl__mesh mesh;                  /* resident nodes only */
     uint64_t load;                    /* serial number of the mesh's load */
-    float closed_size;                /* of a brick: cells no larger than this need not be opened, lattice units; 0 = all must */
+    /* of a brick: cells no larger than this need not be opened, lattice units; 0 = all must */
+    float closed_size;
     strl__residency residency;
     strl__retry retry;
     uint64_t counted_pass;  /* last traversal that counted its bytes */
@@ -128,9 +132,9 @@ typedef struct strl__run_page {
 
 typedef struct strl__run {
     strl_run facts;
-    strl__run_page *page;          /* owned; resident ones only */
+    strl__run_page *page;            /* owned; resident ones only */
     struct strl__run *older, *newer; /* residency list; resident ones that may go */
-    struct strl__request *request; /* while pending */
+    struct strl__request *request;   /* while pending */
     strl__residency residency;
     strl__retry retry;
     uint64_t wanted_frame;  /* last frame whose front may point into the page */
@@ -146,8 +150,8 @@ typedef struct strl__bound_level {
 
 #define STRL__BOUND_LEVELS 4u /* for 2^24 placements */
 
-/* Of splats: shares of the allowed size, a cell being as a rule half as large as the one above; then those that close holes,
- * STRL__MOST_POINT_PX and halves of it, two for each. */
+/* Of splats: shares of the allowed size, a cell being as a rule half as large as the one above; then those that close
+ * holes, STRL__MOST_POINT_PX and halves of it, two for each. */
 #define STRL__POINT_SHARES 4u
 #define STRL__MISSING_SIZES 8u
 #define STRL__POINT_SIZES (STRL__POINT_SHARES + STRL__MISSING_SIZES)
@@ -206,13 +210,13 @@ typedef struct strl__job {
     atomic_int phase;
     strl__page *page;
     strl_node record;
-    bool labels;      /* wanted */
-    bool shared;      /* as strl__mesh */
-    float closed_size; /* as strl__node */
-    strl__node *node; /* the walk's thread only */
-    bool is_waiting;  /* for the node by which it is decoded; the walk's thread only */
+    bool labels;                      /* wanted */
+    bool shared;                      /* as strl__mesh */
+    float closed_size;                /* as strl__node */
+    strl__node *node;                 /* the walk's thread only */
+    bool is_waiting;                  /* for the node by which it is decoded; the walk's thread only */
     strl_payload_reference reference; /* that node's mesh, which stays as long as the job may run */
-    strl__mesh mesh;  /* result; its block is owned */
+    strl__mesh mesh;                  /* result; its block is owned */
     strl_status status;
     strl_error error;
 } strl__job;
@@ -220,11 +224,11 @@ typedef struct strl__job {
 typedef struct strl__request {
     bool used, answered, cancelled;
     uint64_t token;
-    uint64_t touched_frame; /* last frame that wanted something of it */
-    uint64_t offset;        /* of the page */
-    strl__treelet *treelet; /* records asked for, or */
-    strl__run *run;         /* placements; both NULL = a page for nodes */
-    uint32_t node_count;    /* asked for; after the answer: not decoded yet */
+    uint64_t touched_frame;               /* last frame that wanted something of it */
+    uint64_t offset;                      /* of the page */
+    strl__treelet *treelet;               /* records asked for, or */
+    strl__run *run;                       /* placements; both NULL = a page for nodes */
+    uint32_t node_count;                  /* asked for; after the answer: not decoded yet */
     strl__node *first_asked, *last_asked; /* until the answer */
 } strl__request;
 
@@ -310,10 +314,10 @@ typedef struct strl__active {
     strl__node *node;
     uint32_t placement;            /* its number */
     const strl__placement *placed; /* the placement; its page stays for the frame */
-    bool open;        /* of a sample tree: drawn with what is below it */
-    uint32_t state;   /* to be drawn in */
-    strl_box box;     /* world */
-    strl_sight sight; /* of the box */
+    bool open;                     /* of a sample tree: drawn with what is below it */
+    uint32_t state;                /* to be drawn in */
+    strl_box box;                  /* world */
+    strl_sight sight;              /* of the box */
 } strl__active;
 
 typedef struct strl__front {
@@ -352,7 +356,7 @@ struct strl_walk {
     uint64_t memory_bytes;
     double error_px;
     double splat_ratio; /* pixels of a splat for each of the allowed error */
-    bool labels; /* kept for each vertex */
+    bool labels;        /* kept for each vertex */
     strl_cull cull;
     double bounds[6];
     strl__walk_tree *trees;
@@ -367,18 +371,18 @@ struct strl_walk {
     uint64_t frame, pass, loads, tokens;
     uint32_t coarsening; /* allowed error = error_px * 2^(coarsening / 4) */
     bool settled;
-    /* Of bricks that may be opened partly, those of late, by how often their coarsest cells are halved: what is then held, of how much
-     * (strl__node_bytes). */
+    /* Of bricks that may be opened partly, those of late, by how often their coarsest cells are halved: what is then
+     * held, of how much (strl__node_bytes). */
     double opened_bytes[STRL__HALVINGS], brick_bytes[STRL__HALVINGS];
     double share_guard; /* what has not come is taken for so many times what that tells */
-    uint32_t renewals; /* resident nodes of which another mesh is on its way */
-    bool stands;   /* the camera is that of the frame before */
-    bool went_finer;  /* since it stands, into more memory than is proved to do */
-    bool lacked_room; /* once, for more states of a brick */
-    bool is_tight; /* memory is: the cut looks at what more is to come of bricks that are here */
+    uint32_t renewals;  /* resident nodes of which another mesh is on its way */
+    bool stands;        /* the camera is that of the frame before */
+    bool went_finer;    /* since it stands, into more memory than is proved to do */
+    bool lacked_room;   /* once, for more states of a brick */
+    bool is_tight;      /* memory is: the cut looks at what more is to come of bricks that are here */
 
     strl__treelets treelets;
-    uint64_t treelet_bytes; /* part of resident_bytes */
+    uint64_t treelet_bytes;   /* part of resident_bytes */
     uint64_t placement_bytes; /* the same: what stays of placements; 0 where there are few */
     uint64_t kept_bytes;      /* the same: pages that came a moment ago */
     uint64_t resident_bytes;
@@ -390,20 +394,22 @@ struct strl_walk {
 
     strl__request requests[STRL__MAX_REQUESTS];
     uint32_t requests_in_flight, requests_pending;
-    bool is_away, is_looking; /* the source's last answer was a failure; in this frame one thing that waits may be asked for */
+    /* the source's last answer was a failure; in this frame one thing that waits may be asked for */
+    bool is_away, is_looking;
     uint64_t away_ns, look_ns; /* since when; when to look next */
     uint64_t returns;          /* how often it came back, */
     uint64_t lasting_return;   /* the last of these that ended a lasting outage; 0 = none did */
-    uint64_t room; /* bytes that the source still has room for in this frame */
-    strl__job **jobs; /* owned, in order of submission */
+    uint64_t room;             /* bytes that the source still has room for in this frame */
+    strl__job **jobs;          /* owned, in order of submission */
     size_t job_count, job_capacity;
 
     strl__visits level, below; /* scratch of a traversal */
     strl__groups groups;
     strl__demands demands;
-    strl__nodes children;             /* of the group in work */
-    strl__nodes wanted;               /* the wanted cut and all above it */
-    size_t looked_at;                 /* how many of them, from the first on, were looked at for what they can give back in this frame */
+    strl__nodes children; /* of the group in work */
+    strl__nodes wanted;   /* the wanted cut and all above it */
+    /* how many of them, from the first on, were looked at for what they can give back in this frame */
+    size_t looked_at;
     strl__nodes ahead;                /* resident, likely to be wanted soon */
     strl__runs wanted_runs;           /* of which the front has placements, or may have */
     strl__splits split, split_before; /* of this frame and the last */
@@ -414,15 +420,15 @@ struct strl_walk {
     size_t item_capacity;
     strl_vertex *points; /* splats of the frame */
     size_t point_count, point_capacity;
-    uint64_t hole_work; /* of the frame: left, see points.h */
+    uint64_t hole_work;                 /* of the frame: left, see points.h */
     strl__placed_points *placed_points; /* of the frame */
     size_t placed_count, placed_capacity;
     float scattered[256]; /* of a splat's coverage: 0 = the faces are a wall, 1 = there is nearly none */
-    strl__far_points far[STRL__FAR_SIZES]; /* of the frame */
+    strl__far_points far[STRL__FAR_SIZES];      /* of the frame */
     strl__far_points merged[STRL__POINT_SIZES]; /* splats of placements that show few, of the frame */
-    double far_near, far_far;              /* depths of their boxes; far_far 0: there is none */
-    uint16_t *numbers; /* 0, 1, 2, ...; NULL where there was no splat yet */
-    strl_camera camera; /* of the last frame */
+    double far_near, far_far;                   /* depths of their boxes; far_far 0: there is none */
+    uint16_t *numbers;                          /* 0, 1, 2, ...; NULL where there was no splat yet */
+    strl_camera camera;                         /* of the last frame */
     strl_walk_stats stats;
 };
 
@@ -430,8 +436,9 @@ struct strl_walk {
 /* What a decoded node takes at most, known before anything is fetched. */
 uint64_t strl__node_bytes(const strl_node *record, bool labels);
 /* closed_size: as of strl__node; 0 where the mesh must have all of its states. */
-strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size, const strl_payload_reference *reference, bool labels,
-                              bool shared, float closed_size, strl__mesh *mesh, strl_error *err);
+strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size,
+                              const strl_payload_reference *reference, bool labels, bool shared, float closed_size,
+                              strl__mesh *mesh, strl_error *err);
 /* The finest state of a node's mesh, for the payload of another node. */
 strl_payload_reference strl__mesh_reference(const strl__node *from, const strl_node *record);
 void strl__mesh_deinit(strl__mesh *mesh);
@@ -447,27 +454,29 @@ bool strl__placements_are_few(const strl_walk *walk);
 /* Boxes over them, and the walk's bounds. Roots must be there. */
 strl_status strl__placements_bound(strl_walk *walk, strl_error *err);
 void strl__placements_deinit(strl_walk *walk);
-/* *next: the first placement from `from` on that the camera may see, *placed; placement_count where there is none. Those before it
- * that are too far away to be told apart, or not there yet, are drawn as points by a cut that finds the front. */
-strl_status strl__placements_next(strl_walk *walk, strl__cut *cut, uint32_t from, uint32_t *next, const strl__placement **placed,
-                                  strl_error *err);
+/* *next: the first placement from `from` on that the camera may see, *placed; placement_count where there is none.
+ * Those before it that are too far away to be told apart, or not there yet, are drawn as points by a cut that finds the
+ * front. */
+strl_status strl__placements_next(strl_walk *walk, strl__cut *cut, uint32_t from, uint32_t *next,
+                                  const strl__placement **placed, strl_error *err);
 
 void strl__box_include(strl_box *box, const strl_box *other);
 
 /* runs.c */
 uint32_t strl__run_placements(const strl_walk *walk, const strl__run *run);
-uint64_t strl__run_bytes(uint32_t placements); /* of a page in memory */
+uint64_t strl__run_bytes(uint32_t placements);              /* of a page in memory */
 strl__run_page *strl__run_page_create(uint32_t placements); /* NULL without memory */
-strl_status strl__run_page_place(const strl_walk *walk, strl__run_page *page, uint32_t within, uint64_t index, const strl_placement *stored,
-                                 strl_error *err);
+strl_status strl__run_page_place(const strl_walk *walk, strl__run_page *page, uint32_t within, uint64_t index,
+                                 const strl_placement *stored, strl_error *err);
 /* Boxes and summaries. Roots must be there. */
 void strl__run_page_bound(const strl_walk *walk, strl__run_page *page);
 strl_box strl__placement_box(const strl_walk *walk, const strl__placement *placement);
 strl_far strl__placement_far(const strl_walk *walk, const strl__placement *placement);
 /* Pixels that the tree is allowed for each of the allowed error. */
 double strl__splat_ratio(const strl_walk *walk, const strl_tree *tree);
-void strl__run_reserve(strl_walk *walk, strl__run *run, strl__request *request); /* absent -> pending; room must be there */
-void strl__run_release(strl_walk *walk, strl__run *run);                         /* pending -> absent */
+/* absent -> pending; room must be there */
+void strl__run_reserve(strl_walk *walk, strl__run *run, strl__request *request);
+void strl__run_release(strl_walk *walk, strl__run *run); /* pending -> absent */
 /* Pending -> resident; a failure leaves it pending. */
 strl_status strl__run_load(strl_walk *walk, strl__run *run, const void *data, size_t size, strl_error *err);
 void strl__run_touch(strl_walk *walk, strl__run *run); /* now the youngest */
@@ -476,14 +485,15 @@ void strl__run_evict(strl_walk *walk, strl__run *run);
 /* far.c */
 /* Whether the box projects to at most the allowed error. *px: to how much. */
 bool strl__is_far(const strl__cut *cut, const strl_box *box, double *px);
-/* A point for what the box holds, which projects to px; as large as the box where it is not there yet. own_part: of the placement that it
- * is, as of strl_draw_item; 0 = none or several. */
-strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far, double px, bool is_missing,
-                           uint32_t own_part, strl_error *err);
+/* A point for what the box holds, which projects to px; as large as the box where it is not there yet. own_part: of the
+ * placement that it is, as of strl_draw_item; 0 = none or several. */
+strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far, double px,
+                           bool is_missing, uint32_t own_part, strl_error *err);
 /* Room for one more, its label set; NULL: no memory. */
 strl_vertex *strl__far_points_add(strl__far_points *points, bool labels, uint32_t own_part);
 void strl__far_points_deinit(strl__far_points *points);
-/* These points lie on a lattice of cells of this size, counted from the least corner of the model's box; far_cell: the nearest one. */
+/* These points lie on a lattice of cells of this size, counted from the least corner of the model's box; far_cell: the
+ * nearest one. */
 double strl__far_step(const strl_walk *walk);
 int32_t strl__far_cell(double at);
 double strl__far_px(double allowed_px, unsigned size);
@@ -492,23 +502,26 @@ strl_draw_item strl__far_item(const strl_walk *walk, double point_px, double box
 
 /* treelets.c */
 strl__treelet *strl__treelets_find(const strl__treelets *treelets, uint32_t tree, uint32_t index);
-bool strl__treelets_insert(strl__treelets *treelets, strl__treelet *treelet); /* owned from then on; false: no memory */
+/* owned from then on; false: no memory */
+bool strl__treelets_insert(strl__treelets *treelets, strl__treelet *treelet);
 void strl__treelets_remove(strl__treelets *treelets, strl__treelet *treelet); /* and releases it */
 void strl__treelets_deinit(strl__treelets *treelets);
 
 /* pages.c */
-/* Of bytes that have been checked, which it owns from then on; its one reference is the caller's. NULL without memory: then data still is. */
+/* Of bytes that have been checked, which it owns from then on; its one reference is the caller's. NULL without memory:
+ * then data still is. */
 strl__page *strl__page_create(const strl_page_ref *ref, uint8_t *data);
-strl__page *strl__page_share(strl__page *page); /* a further reference; NULL is legal */
-void strl__page_release(strl__page *page); /* thread-safe; NULL is legal */
+strl__page *strl__page_share(strl__page *page);          /* a further reference; NULL is legal */
+void strl__page_release(strl__page *page);               /* thread-safe; NULL is legal */
 void strl__page_keep(strl_walk *walk, strl__page *page); /* for a while, where there is room for it */
-strl__page *strl__page_find(strl_walk *walk, const strl_page_ref *ref); /* a kept one; borrowed; NULL = there is none */
+/* a kept one; borrowed; NULL = there is none */
+strl__page *strl__page_find(strl_walk *walk, const strl_page_ref *ref);
 bool strl__page_drop_oldest(strl_walk *walk); /* false: none is kept */
 
 /* residency.c */
 /* Evicts what has waited longest and that this frame does not need until `bytes` fit; evict_before:
- * only what was touched before that frame; where that is this one too and memory is tight, what bricks hold beyond their need goes as well,
- * by a shorter copy that is made first. False where it does not fit. */
+ * only what was touched before that frame; where that is this one too and memory is tight, what bricks hold beyond
+ * their need goes as well, by a shorter copy that is made first. False where it does not fit. */
 bool strl__make_room(strl_walk *walk, uint64_t bytes, uint64_t evict_before);
 uint64_t strl__idle_since(const strl_walk *walk); /* what was touched before this frame is needed for nothing soon */
 /* A treelet without content yet, its bytes reserved; NULL where there is no room or no memory. */
@@ -521,9 +534,11 @@ strl__node *strl__node_find(strl_walk *walk, uint32_t tree, uint32_t id);
  * neither there nor on its way. */
 bool strl__node_hold(strl_walk *walk, strl__node *node);
 void strl__node_let_go(strl__node *node);
-void strl__node_reserve(strl_walk *walk, strl__node *node); /* absent -> pending, or resident and more to come; room must be there */
+/* absent -> pending, or resident and more to come; room must be there */
+void strl__node_reserve(strl_walk *walk, strl__node *node);
 void strl__node_release(strl_walk *walk, strl__node *node); /* pending -> absent, or nothing more to come */
-void strl__node_install(strl_walk *walk, strl__node *node, const strl__mesh *mesh); /* pending or resident -> resident */
+/* pending or resident -> resident */
+void strl__node_install(strl_walk *walk, strl__node *node, const strl__mesh *mesh);
 /* Of a resident one: what is held beyond what cells of that size need, and may be dropped. */
 uint64_t strl__node_excess(const strl_walk *walk, const strl__node *node, float closed_size);
 /* What will be held of a brick that has not come, as far as one knows. */
@@ -536,12 +551,13 @@ bool strl__opens_partly(const strl_walk *walk, const strl__node *node);
 uint64_t strl__node_held_bytes(const strl_walk *walk, const strl__node *node);
 /* Meshes that others replaced since the last frame: its list has borrowed them. */
 void strl__retired_free(strl_walk *walk);
-void strl__node_touch(strl_walk *walk, strl__node *node);                           /* now the youngest */
+void strl__node_touch(strl_walk *walk, strl__node *node); /* now the youngest */
 
 /* faults.c */
 void strl__note_fault(strl_walk *walk, const strl_error *error);
 void strl__back_off(const strl_walk *walk, strl__retry *retry, bool is_unread);
-bool strl__is_waiting(const strl_walk *walk, const strl__retry *retry); /* it has failed and is not to be asked for yet */
+/* it has failed and is not to be asked for yet */
+bool strl__is_waiting(const strl_walk *walk, const strl__retry *retry);
 bool strl__is_given_up(const strl_walk *walk, const strl__retry *retry); /* nobody waits for it any more */
 void strl__retry_asked(const strl_walk *walk, strl__retry *retry);
 void strl__source_answers(strl_walk *walk);
@@ -567,10 +583,11 @@ strl_status strl__budget_cut(strl_walk *walk, const strl_view *view, strl__cut *
 /* refine.c */
 void strl__refine_front(strl_walk *walk);
 
-/* brick.c: thread-safe. Vertices and labels are the caller's to fill in: those of pm whose numbers are in *from (of arena), [mesh->vertex_count];
- * NULL = all in their order. */
-strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const strl_brick_head *head, bool labels, float closed_size,
-                               strl_arena *arena, strl__mesh *mesh, const uint16_t **from, strl_error *err);
+/* brick.c: thread-safe. Vertices and labels are the caller's to fill in: those of pm whose numbers are in *from (of
+ * arena), [mesh->vertex_count]; NULL = all in their order. */
+strl_status strl__brick_create(const strl_node *record, const strl_pm *pm, const strl_brick_head *head, bool labels,
+                               float closed_size, strl_arena *arena, strl__mesh *mesh, const uint16_t **from,
+                               strl_error *err);
 /* Bytes of the mesh that go by trimming it to what strl__brick_create would have kept; 0 where it is no brick. */
 uint64_t strl__brick_excess(const strl__mesh *mesh, float closed_size);
 /* False without memory, or where it is in a finer state: then nothing changes. */
@@ -584,7 +601,8 @@ void strl__points_prepare(strl_walk *walk);
 strl_status strl__draw_splats(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err);
 
 /* draw.c: `record`: NULL = of the whole tree. */
-void strl__item_place(strl_draw_item *item, const strl_tree *tree, const strl_node *record, const strl__placement *placement);
+void strl__item_place(strl_draw_item *item, const strl_tree *tree, const strl_node *record,
+                      const strl__placement *placement);
 strl_status strl__draw_list(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err);
 
 #endif

@@ -52,7 +52,9 @@ static bool has_preview(const strl_node *record)
 
 uint64_t strl__node_bytes(const strl_node *record, bool labels)
 {
-    uint64_t splats = has_preview(record) ? STRL__PREVIEW_ROOM : record->rung == STRL_RUNG_SAMPLED ? STRL__SPLAT_ROOM : 0;
+    uint64_t splats = has_preview(record)                 ? STRL__PREVIEW_ROOM
+                      : record->rung == STRL_RUNG_SAMPLED ? STRL__SPLAT_ROOM
+                                                          : 0;
     return strl_node_decoded_bytes(record) + splats + (labels ? record->vertex_count * sizeof(strl_vertex_label) : 0);
 }
 
@@ -60,7 +62,8 @@ static strl_status allocate(const strl_node *record, const strl_pm *pm, bool lab
 {
     size_t vertices = pm->vertex_count, added = vertices - pm->vertex_end[0], states = (size_t)pm->step_count + 1;
     size_t corners = 3 * (size_t)pm->triangle_count;
-    size_t words = corners + 2 * added + 2 * states, halves = states + added + corners + (record->child_count ? corners : 0);
+    size_t words = corners + 2 * added + 2 * states,
+           halves = states + added + corners + (record->child_count ? corners : 0);
     size_t bytes = vertices * (sizeof(strl_vertex) + (labels ? sizeof(strl_vertex_label) : 0)) + words * 4 + halves * 2;
     if (bytes > strl__node_bytes(record, labels))
         return strl__fail(err, STRL_ERR_INTERNAL,
@@ -168,8 +171,8 @@ strl_payload_reference strl__mesh_reference(const strl__node *from, const strl_n
     return reference;
 }
 
-static strl_status make_progressive(const strl_node *record, const strl_pm *pm, bool labels, strl_arena *arena, strl__mesh *mesh,
-                                    strl_error *err)
+static strl_status make_progressive(const strl_node *record, const strl_pm *pm, bool labels, strl_arena *arena,
+                                    strl__mesh *mesh, strl_error *err)
 {
     strl_status status = allocate(record, pm, labels, mesh, err);
     if (status == STRL_OK)
@@ -182,7 +185,8 @@ static strl_status make_progressive(const strl_node *record, const strl_pm *pm, 
 /* ---- nodes that several placements draw */
 
 #define SHARED_STATES 32u
-#define SHARED_RATIO 0.62 /* of triangles from one state to the next coarser: all together have 2.7 times those of the finest */
+/* of triangles from one state to the next coarser: all together have 2.7 times those of the finest */
+#define SHARED_RATIO 0.62
 
 /* From the finest down, each with at most so many of the triangles of the one before; the coarsest is the last. */
 static uint32_t choose_states(const strl__mesh *mesh, uint32_t chosen[SHARED_STATES])
@@ -190,7 +194,8 @@ static uint32_t choose_states(const strl__mesh *mesh, uint32_t chosen[SHARED_STA
     uint32_t count = 1;
     chosen[0] = mesh->step_count;
     for (uint32_t state = mesh->step_count; state-- > 0 && count < SHARED_STATES;)
-        if (state == 0 || (mesh->triangle_end[state] <= SHARED_RATIO * mesh->triangle_end[chosen[count - 1]] && count + 1 < SHARED_STATES))
+        if (state == 0 || (mesh->triangle_end[state] <= SHARED_RATIO * mesh->triangle_end[chosen[count - 1]] &&
+                           count + 1 < SHARED_STATES))
             chosen[count++] = state;
     return count;
 }
@@ -202,14 +207,20 @@ static strl_status keep_states(strl__mesh *mesh, uint64_t most_bytes, strl_error
     for (uint32_t i = 0; i < count; i++)
         triangles += mesh->triangle_end[chosen[i]];
     size_t vertices = mesh->vertex_count, label_bytes = mesh->labels ? vertices * sizeof *mesh->labels : 0;
-    size_t bytes = vertices * sizeof *mesh->vertices + label_bytes + count * 3 * sizeof(uint32_t) + 3 * (size_t)triangles * sizeof(uint16_t);
+    size_t bytes = vertices * sizeof *mesh->vertices + label_bytes + count * 3 * sizeof(uint32_t) +
+                   3 * (size_t)triangles * sizeof(uint16_t);
     if (bytes > most_bytes)
-        return strl__fail(err, STRL_ERR_INTERNAL, "the states of a node take %zu bytes, expected at most %" PRIu64, bytes, most_bytes);
+        return strl__fail(err, STRL_ERR_INTERNAL, "the states of a node take %zu bytes, expected at most %" PRIu64,
+                          bytes, most_bytes);
     uint8_t *block = strl__alloc(1, bytes);
     if (!block)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %" PRIu32 " vertices", mesh->vertex_count);
-    strl__mesh kept = {.vertex_count = mesh->vertex_count, .base_vertices = mesh->base_vertices, .triangle_count = mesh->triangle_count,
-                       .step_count = count - 1, .held = count - 1, .index_total = 3 * triangles};
+    strl__mesh kept = {.vertex_count = mesh->vertex_count,
+                       .base_vertices = mesh->base_vertices,
+                       .triangle_count = mesh->triangle_count,
+                       .step_count = count - 1,
+                       .held = count - 1,
+                       .index_total = 3 * triangles};
     kept.vertices = (strl_vertex *)block;
     kept.labels = mesh->labels ? (strl_vertex_label *)(kept.vertices + vertices) : NULL;
     kept.triangle_end = (uint32_t *)(block + vertices * sizeof *kept.vertices + label_bytes);
@@ -244,8 +255,9 @@ static strl_status share(strl__mesh *mesh, uint64_t most_bytes, strl_error *err)
     return status;
 }
 
-strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size, const strl_payload_reference *reference, bool labels,
-                              bool shared, float closed_size, strl__mesh *mesh, strl_error *err)
+strl_status strl__mesh_create(const strl_node *record, const void *page, size_t size,
+                              const strl_payload_reference *reference, bool labels, bool shared, float closed_size,
+                              strl__mesh *mesh, strl_error *err)
 {
     const uint16_t *from = NULL;
     strl_arena arena;
@@ -255,7 +267,8 @@ strl_status strl__mesh_create(const strl_node *record, const void *page, size_t 
     strl_brick_head head;
     strl_status status = strl_page_mesh(record, page, size, reference, &arena, &head, &pm, err);
     if (status == STRL_OK)
-        status = head.level_count ? strl__brick_create(record, &pm, &head, labels, shared ? 0 : closed_size, &arena, mesh, &from, err)
+        status = head.level_count ? strl__brick_create(record, &pm, &head, labels, shared ? 0 : closed_size, &arena,
+                                                       mesh, &from, err)
                                   : make_progressive(record, &pm, labels, &arena, mesh, err);
     if (status == STRL_OK) {
         make_vertices(&pm, from, mesh->vertex_count, mesh->vertices);

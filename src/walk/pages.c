@@ -1,5 +1,6 @@
-/* Pages that came a moment ago. What is wanted of one of them some frames later (the children of the nodes that it was read
- * for, as a rule) needs no read. They are part of resident_bytes, and the first to go where something is wanted. */
+/* Pages that came a moment ago. What is wanted of one of them some frames later (the children of the nodes that it was
+ * read for, as a rule) needs no read. They are part of resident_bytes, and the first to go where something is wanted.
+ */
 #include <string.h>
 
 #include "walk/internal.h"

@@ -1,9 +1,9 @@
 /* The placements of a model, and boxes over them: a frame looks at those whose boxes the camera sees.
  *
- * A file has placements that are near each other in order (build/place.c), in runs of one page each. What a run looks like from
- * outside is in memory from the beginning, and boxes over 16 runs, 16 of these, and so on; its placements, with boxes over 16 of
- * them, come when the camera sees more of it than a point, and go when others need the room (runs.c). Where all placements are one
- * run, they are in memory as long as the walk. */
+ * A file has placements that are near each other in order (build/place.c), in runs of one page each. What a run looks
+ * like from outside is in memory from the beginning, and boxes over 16 runs, 16 of these, and so on; its placements,
+ * with boxes over 16 of them, come when the camera sees more of it than a point, and go when others need the room
+ * (runs.c). Where all placements are one run, they are in memory as long as the walk. */
 #include "walk/internal.h"
 
 #include <inttypes.h>
@@ -14,7 +14,8 @@
 
 #define MAX_PLACEMENTS (1u << 24)
 #define FEW 16u
-#define RUN_STAYS (sizeof(strl__run) + (sizeof(strl_box) + sizeof(strl_far)) / (STRL__FAN - 1) + 1) /* with its share of the boxes */
+/* with its share of the boxes */
+#define RUN_STAYS (sizeof(strl__run) + (sizeof(strl_box) + sizeof(strl_far)) / (STRL__FAN - 1) + 1)
 
 /* ---- opening */
 
@@ -26,7 +27,9 @@ bool strl__placements_are_few(const strl_walk *walk)
 static strl_status load_page(strl_walk *walk, strl_error *err)
 {
     strl__run_page *page = walk->runs[0].page = strl__run_page_create(walk->placement_count);
-    strl_status status = page ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %" PRIu32 " placements", walk->placement_count);
+    strl_status status =
+        page ? STRL_OK
+             : strl__fail(err, STRL_ERR_MEMORY, "no memory for %" PRIu32 " placements", walk->placement_count);
     for (uint32_t i = 0; status == STRL_OK && i < walk->placement_count; i++) {
         strl_placement stored;
         status = strl_container_placement(walk->container, i, &stored, err);
@@ -117,7 +120,8 @@ static strl_status add_level(strl_walk *walk, const strl__bound_level *below, ui
     level->fars = strl__alloc(level->count, sizeof *level->fars);
     walk->bound_level_count++;
     if (!level->boxes || !level->fars)
-        return strl__fail(err, STRL_ERR_MEMORY, "no memory for the boxes of %" PRIu32 " placements", walk->placement_count);
+        return strl__fail(err, STRL_ERR_MEMORY, "no memory for the boxes of %" PRIu32 " placements",
+                          walk->placement_count);
     strl_far_sums sums = {0};
     for (uint32_t i = 0; i < items; i++) {
         strl_box box = below ? below->boxes[i] : box_of_run(&walk->runs[i]);
@@ -179,7 +183,8 @@ static void draw(looking *self, const strl_box *box, const strl_far *far, double
         self->status = strl__far_draw(self->walk, self->cut, box, far, px, is_missing, own_part, self->err);
 }
 
-/* True where the camera looks past it, or sees no more of it than a point, which is drawn. Else *px is how large it is. */
+/* True where the camera looks past it, or sees no more of it than a point, which is drawn. Else *px is how large it is.
+ */
 static bool passes_over(looking *self, const strl_box *box, const strl_far *far, double *px)
 {
     if (!strl_view_sees(self->cut->view, box))
@@ -190,7 +195,8 @@ static bool passes_over(looking *self, const strl_box *box, const strl_far *far,
     return true;
 }
 
-/* How many runs from this one on are passed over by a box above them; the highest that begins here is looked at first. */
+/* How many runs from this one on are passed over by a box above them; the highest that begins here is looked at first.
+ */
 static uint32_t pass_runs(looking *self, uint32_t run)
 {
     const strl_walk *walk = self->walk;
@@ -248,7 +254,8 @@ static const strl__run_page *open_run(looking *self, strl__run *run, double px)
     }
     if (cut->kind != STRL__CUT_FRONT)
         strl__run_touch(walk, run);
-    else if (strl__grow(&walk->wanted_runs.items, &walk->wanted_runs.capacity, walk->wanted_runs.count + 1, sizeof *walk->wanted_runs.items))
+    else if (strl__grow(&walk->wanted_runs.items, &walk->wanted_runs.capacity, walk->wanted_runs.count + 1,
+                        sizeof *walk->wanted_runs.items))
         walk->wanted_runs.items[walk->wanted_runs.count++] = run;
     else
         self->status = strl__no_memory(self->err);
@@ -274,7 +281,8 @@ static uint32_t pass_placement(looking *self, uint32_t at)
     const strl__run_page *page = self->walk->runs[at / STRL_RUN_PLACEMENTS].page;
     uint32_t within = at % STRL_RUN_PLACEMENTS;
     double px;
-    if (within % STRL__FAN == 0 && passes_over(self, &page->boxes[within / STRL__FAN], &page->fars[within / STRL__FAN], &px))
+    if (within % STRL__FAN == 0 &&
+        passes_over(self, &page->boxes[within / STRL__FAN], &page->fars[within / STRL__FAN], &px))
         return STRL__FAN;
     const strl_box box = strl__placement_box(self->walk, &page->items[within]);
     if (!strl_view_sees(self->cut->view, &box))
@@ -286,8 +294,8 @@ static uint32_t pass_placement(looking *self, uint32_t at)
     return 1;
 }
 
-strl_status strl__placements_next(strl_walk *walk, strl__cut *cut, uint32_t from, uint32_t *next, const strl__placement **placed,
-                                  strl_error *err)
+strl_status strl__placements_next(strl_walk *walk, strl__cut *cut, uint32_t from, uint32_t *next,
+                                  const strl__placement **placed, strl_error *err)
 {
     looking self = {walk, cut, STRL_OK, err};
     uint32_t at = from, passed = strl__placements_are_few(walk) ? 0 : 1;

@@ -6,8 +6,8 @@
 #include "base/affine.h"
 #include "geometry/octahedral.h"
 
-#define MOST_POINTS 65535u   /* of an item: indices have 16 bits */
-#define MOST_MERGED 256u     /* of a placement that has no items of its own */
+#define MOST_POINTS 65535u /* of an item: indices have 16 bits */
+#define MOST_MERGED 256u   /* of a placement that has no items of its own */
 #define SPREAD_BITS (STRL_SPREAD_MOST << STRL_SPREAD_SHIFT)
 
 double strl__points_px(const strl_walk *walk, unsigned size)
@@ -53,7 +53,8 @@ void strl__points_merge(strl__points *self, unsigned size, const strl_vertex *po
     for (int k = 0; k < 3; k++) {
         const double *row = self->rows[k];
         const float *turn = self->turn + 3 * k;
-        to->position[k] = strl__far_cell(row[0] * point->position[0] + row[1] * point->position[1] + row[2] * point->position[2] + row[3]);
+        to->position[k] = strl__far_cell(row[0] * point->position[0] + row[1] * point->position[1] +
+                                         row[2] * point->position[2] + row[3]);
         turned[k] = turn[0] * normal[0] + turn[1] * normal[1] + turn[2] * normal[2];
     }
     strl_oct_encode(turned, to->normal);
@@ -75,7 +76,8 @@ static size_t count_points(strl_walk *walk, const strl_view *view, size_t first,
 {
     const strl__placement *placed = walk->front.items[first].placed;
     size_t all = 0;
-    *counted = (strl__points){.walk = walk, .view = view, .placed = placed, .tree = walk->trees[placed->tree].tree, .work = walk->hole_work};
+    *counted = (strl__points){
+        .walk = walk, .view = view, .placed = placed, .tree = walk->trees[placed->tree].tree, .work = walk->hole_work};
     strl__points_take(counted, first, end);
     for (unsigned k = 0; k < STRL__POINT_SIZES; k++)
         all += counted->at[k];
@@ -143,8 +145,8 @@ static bool fill_numbers(strl_walk *walk)
 }
 
 /* `shape`: all of an item but its points. */
-static strl_status add_items(strl_walk *walk, const strl_draw_item *shape, const strl_vertex *points, const strl_vertex_label *labels,
-                             size_t count, strl_draw_list *list, strl_error *err)
+static strl_status add_items(strl_walk *walk, const strl_draw_item *shape, const strl_vertex *points,
+                             const strl_vertex_label *labels, size_t count, strl_draw_list *list, strl_error *err)
 {
     for (size_t first = 0; first < count; first += MOST_POINTS) {
         uint32_t part = count - first < MOST_POINTS ? (uint32_t)(count - first) : MOST_POINTS;
@@ -167,8 +169,9 @@ static strl_status add_items(strl_walk *walk, const strl_draw_item *shape, const
 /* Of points of one placement. */
 static strl_draw_item shape_of(const strl_walk *walk, const strl__active *active, double px)
 {
-    strl_draw_item item = {
-        .placement = active->placement, .point_px = (float)fmin(fmax(px, 1), STRL__MOST_POINT_PX), .error_px = (float)px};
+    strl_draw_item item = {.placement = active->placement,
+                           .point_px = (float)fmin(fmax(px, 1), STRL__MOST_POINT_PX),
+                           .error_px = (float)px};
     strl__item_place(&item, walk->trees[active->placed->tree].tree, NULL, active->placed);
     return item;
 }
@@ -191,7 +194,8 @@ static strl_status list_splats(strl_walk *walk, strl_draw_list *list, strl_error
 }
 
 /* Of many placements. */
-static strl_status list_far(strl_walk *walk, const strl__far_points *points, double px, strl_draw_list *list, strl_error *err)
+static strl_status list_far(strl_walk *walk, const strl__far_points *points, double px, strl_draw_list *list,
+                            strl_error *err)
 {
     const strl_draw_item shape = strl__far_item(walk, px, points->px);
     return add_items(walk, &shape, points->items, points->labels, points->count, list, err);

@@ -1,5 +1,6 @@
-/* The points of a frame on their way from the front's bricks into a draw list: splats of a placement are counted, then made, for an item
- * of each size; those of a placement that shows few are merged with others', or each of very many copies would cost draws. */
+/* The points of a frame on their way from the front's bricks into a draw list: splats of a placement are counted, then
+ * made, for an item of each size; those of a placement that shows few are merged with others', or each of very many
+ * copies would cost draws. */
 #ifndef STRL_WALK_POINTS_H
 #define STRL_WALK_POINTS_H
 
@@ -18,13 +19,13 @@ typedef struct strl__points {
     const strl__placement *placed;
     const strl_tree *tree; /* points are relative to the least corner of its box, in which all lie */
     strl__points_purpose purpose;
-    float sight[3];        /* direction to the brick in the tree's space, of length 1 */
-    double unit_share;     /* of a point, what the side of a cell of one lattice unit takes */
+    float sight[3];               /* direction to the brick in the tree's space, of length 1 */
+    double unit_share;            /* of a point, what the side of a cell of one lattice unit takes */
     size_t at[STRL__POINT_SIZES]; /* how many so far, or where the next goes */
-    uint64_t work;         /* that may still be done to close holes, see splats.c */
-    double rows[3][4];     /* to be merged: from positions to cells of the far points' lattice, */
-    float turn[9];         /* and of normals, row-major */
-    bool failed;           /* there was no memory to merge */
+    uint64_t work;                /* that may still be done to close holes, see splats.c */
+    double rows[3][4];            /* to be merged: from positions to cells of the far points' lattice, */
+    float turn[9];                /* and of normals, row-major */
+    bool failed;                  /* there was no memory to merge */
 } strl__points;
 
 #define STRL__HOLE_WORK ((uint64_t)4 << 20) /* of a frame: at most half a million points */

@@ -54,11 +54,13 @@ static uint32_t choose_state(const strl_walk *walk, const strl__active *active)
     const strl__mesh *mesh = &active->node->mesh;
     const projector p = {&active->sight, mesh->errors, active->placed->length_scale,
                          strl__splat_ratio(walk, walk->trees[active->placed->tree].tree), walk->stats.allowed_error_px};
-    /* Beside what is below it a brick shows no splats: its record may open it before its own, smaller cells ask for that. */
+    /* Beside what is below it a brick shows no splats: its record may open it before its own, smaller cells ask for
+     * that. */
     return active->open ? mesh->step_count : coarsest_state(&p, mesh->state, mesh->step_count);
 }
 
-/* Of a brick that does not have all of its states: more, where the wanted one is not among them, or is the last, so that it is near. */
+/* Of a brick that does not have all of its states: more, where the wanted one is not among them, or is the last, so
+ * that it is near. */
 static void ask_for_more(strl_walk *walk, const strl__active *active, uint32_t wanted)
 {
     strl__node *node = active->node;
@@ -73,12 +75,13 @@ static void ask_for_more(strl_walk *walk, const strl__active *active, uint32_t w
     bool waiting = strl__is_waiting(walk, &node->retry);
     if (lacks && !(waiting && strl__is_given_up(walk, &node->retry)))
         walk->settled = false;
-    float closed_size = strl__closed_size(walk, tree, &active->sight, active->placed->length_scale, walk->stats.allowed_error_px,
-                                          strl__reserve(walk));
+    float closed_size = strl__closed_size(walk, tree, &active->sight, active->placed->length_scale,
+                                          walk->stats.allowed_error_px, strl__reserve(walk));
     bool reaches_further = mesh->errors[mesh->held] > closed_size;
     if (node->request || waiting || !(lacks || reaches_further))
         return;
-    double px = strl_sight_error_px(&active->sight, mesh->errors[mesh->held] * active->placed->length_scale) / strl__splat_ratio(walk, tree);
+    double px = strl_sight_error_px(&active->sight, mesh->errors[mesh->held] * active->placed->length_scale) /
+                strl__splat_ratio(walk, tree);
     node->closed_size = reaches_further ? closed_size : 0; /* whole, whatever sizes the file tells */
     /* without memory it is asked for in a later frame */
     strl__add_candidate(lacks ? &walk->missing : &walk->prefetch, node, STRL_NONE,
@@ -92,7 +95,8 @@ static void apply_state(strl_walk *walk, strl__node *node, uint32_t state, bool 
     uint32_t before = mesh->state;
     uint32_t count_before = 3 * mesh->triangle_end[before], count = 3 * mesh->triangle_end[state];
     uint32_t first = UINT32_MAX, end = 0;
-    uint32_t moves = mesh->splat_end ? 0 : state > before ? state - before : before - state; /* in a brick no vertex moves */
+    /* in a brick no vertex moves */
+    uint32_t moves = mesh->splat_end ? 0 : state > before ? state - before : before - state;
     *(state > before ? &walk->stats.vertex_splits : &walk->stats.vertex_collapses) += moves;
     if (state != before)
         strl__mesh_set_state(mesh, state, &first, &end);

@@ -1,6 +1,6 @@
-/* Reads and decodes. A request is one page of nodes, one treelet or one page of placements; it keeps its slot until every
- * node of it is decoded, so that undecoded bytes are bounded by the number of slots. Decoding is a
- * job per node: the executor's, or the pump's. */
+/* Reads and decodes. A request is one page of nodes, one treelet or one page of placements; it keeps its slot until
+ * every node of it is decoded, so that undecoded bytes are bounded by the number of slots. Decoding is a job per node:
+ * the executor's, or the pump's. */
 #include "walk/internal.h"
 
 #include <stdlib.h>
@@ -29,18 +29,18 @@ static void run_job(void *context)
         return;
     }
     const strl_payload_reference *reference = job->record.decode_parent != STRL_NONE ? &job->reference : NULL;
-    job->status = strl__mesh_create(&job->record, job->page->data, job->page->ref.bytes, reference, job->labels, job->shared,
-                                    job->closed_size, &job->mesh, &job->error);
+    job->status = strl__mesh_create(&job->record, job->page->data, job->page->ref.bytes, reference, job->labels,
+                                    job->shared, job->closed_size, &job->mesh, &job->error);
     atomic_store_explicit(&job->phase, STRL__JOB_DONE, memory_order_release);
 }
-
 
 void strl__jobs_abandon(strl_walk *walk)
 {
     for (size_t i = 0; i < walk->job_count; i++) {
         strl__job *job = walk->jobs[i];
         int phase = STRL__JOB_QUEUED;
-        if (walk->executor.submit && !job->is_waiting && atomic_compare_exchange_strong(&job->phase, &phase, STRL__JOB_ABANDONED))
+        if (walk->executor.submit && !job->is_waiting &&
+            atomic_compare_exchange_strong(&job->phase, &phase, STRL__JOB_ABANDONED))
             continue; /* the executor still holds it and will release it */
         while (atomic_load_explicit(&job->phase, memory_order_acquire) == STRL__JOB_RUNNING)
             strl_sleep_ns(ABANDON_WAIT_NS);
@@ -141,7 +141,8 @@ uint64_t strl__jobs_pump(strl_walk *walk, uint64_t budget_ns)
     do {
         before = ran;
         for (size_t i = 0; i < walk->job_count && (ran == 0 || strl_clock_ns() - start < budget_ns); i++) {
-            if (walk->jobs[i]->is_waiting || atomic_load_explicit(&walk->jobs[i]->phase, memory_order_relaxed) != STRL__JOB_QUEUED)
+            if (walk->jobs[i]->is_waiting ||
+                atomic_load_explicit(&walk->jobs[i]->phase, memory_order_relaxed) != STRL__JOB_QUEUED)
                 continue;
             run_job(walk->jobs[i]);
             ran++;
@@ -305,15 +306,15 @@ static strl__request *request_of(strl_walk *walk, uint64_t offset, bool answered
 {
     for (uint32_t i = 0; i < walk->requests_in_flight; i++) {
         strl__request *request = &walk->requests[i];
-        if (request->used && request->answered == answered && !request->cancelled && !request->treelet && !request->run &&
-            request->offset == offset)
+        if (request->used && request->answered == answered && !request->cancelled && !request->treelet &&
+            !request->run && request->offset == offset)
             return request;
     }
     return NULL;
 }
 
-/* On a slow link the source has room for less than the slots: what could not come soon is not asked for, so that it cannot
- * be in the way of what the camera wants by then. */
+/* On a slow link the source has room for less than the slots: what could not come soon is not asked for, so that it
+ * cannot be in the way of what the camera wants by then. */
 static bool has_slot(const strl_walk *walk, uint32_t in_flight)
 {
     return walk->requests_pending < in_flight && walk->room > 0;
@@ -348,12 +349,14 @@ static void add_node(strl_walk *walk, strl__request *request, strl__node *node)
     strl__retry_asked(walk, &node->retry);
     node->request = request;
     node->next_asked = NULL;
-    *(request->node_count++ > 0 && !request->answered ? &request->last_asked->next_asked : &request->first_asked) = node;
+    *(request->node_count++ > 0 && !request->answered ? &request->last_asked->next_asked : &request->first_asked) =
+        node;
     request->last_asked = node;
     request->touched_frame = walk->frame;
 }
 
-/* The node's, whose room is there; NULL request: a new one. page: it is here already, and this reference of it is taken over. */
+/* The node's, whose room is there; NULL request: a new one. page: it is here already, and this reference of it is taken
+ * over. */
 static void ask_for_page(strl_walk *walk, strl__request *request, strl__node *node, strl__page *page, float urgency)
 {
     const strl_page_ref *ref = &node->record->page;
@@ -472,7 +475,7 @@ void strl__requests_submit(strl_walk *walk)
     uint32_t in_flight = walk->is_looking ? 1 : walk->requests_in_flight;
     walk->room = strl_source_room(walk->source);
     ask_for_all(walk, &walk->missing, in_flight, walk->frame + 1);
-    uint64_t idle_since = strl__idle_since(walk); /* prefetching evicts only what has been idle for longer */
+    uint64_t idle_since = strl__idle_since(walk);   /* prefetching evicts only what has been idle for longer */
     ask_for_all(walk, &walk->along, 0, idle_since); /* no slot is theirs */
     if (walk->missing.count == 0)
         ask_for_all(walk, &walk->prefetch, (in_flight + 1) / 2, idle_since);

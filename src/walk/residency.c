@@ -1,14 +1,14 @@
-/* What is in memory, under one budget: treelets, meshes, placements (runs.c) and pages (pages.c), and the reservations of those on
- * their way. */
+/* What is in memory, under one budget: treelets, meshes, placements (runs.c) and pages (pages.c), and the reservations
+ * of those on their way. */
 #include "walk/internal.h"
 
 #include <math.h>
 
 /* Ids are breadth first, so the children of 128 nodes fill at most this many treelets. */
 #define MAX_CHILD_TREELETS (STRL_NODE_MAX_CHILDREN + 1)
-#define SHARE_KEEPS 0.998 /* with each brick that comes: half after some 350 */
+#define SHARE_KEEPS 0.998  /* with each brick that comes: half after some 350 */
 #define SURFACE_HALVINGS 3 /* before any brick has come: of a surface so many times halved all is shown */
-#define SPARE_FRAMES 60u /* what has been idle for longer makes room for what is only likely to be wanted */
+#define SPARE_FRAMES 60u   /* what has been idle for longer makes room for what is only likely to be wanted */
 
 /* ---- meshes */
 
@@ -56,7 +56,8 @@ uint64_t strl__node_held_bytes(const strl_walk *walk, const strl__node *node)
 
 bool strl__opens_partly(const strl_walk *walk, const strl__node *node)
 {
-    return node->record->rung == STRL_RUNG_SAMPLED && node->record->child_count == 0 && !walk->trees[node->treelet->tree].shared;
+    return node->record->rung == STRL_RUNG_SAMPLED && node->record->child_count == 0 &&
+           !walk->trees[node->treelet->tree].shared;
 }
 
 uint64_t strl__node_excess(const strl_walk *walk, const strl__node *node, float closed_size)
@@ -65,11 +66,13 @@ uint64_t strl__node_excess(const strl_walk *walk, const strl__node *node, float 
     return may_go ? strl__brick_excess(&node->mesh, closed_size) : 0;
 }
 
-/* By bytes, of the last some hundred bricks. What a brick does not have all of tells nothing of finer cells than it has. */
+/* By bytes, of the last some hundred bricks. What a brick does not have all of tells nothing of finer cells than it
+ * has. */
 static void learn_shares(strl_walk *walk, const strl__node *node)
 {
     const strl__mesh *mesh = &node->mesh;
-    double held = (double)strl__node_held_bytes(walk, node), whole = (double)strl__node_bytes(node->record, walk->labels);
+    double held = (double)strl__node_held_bytes(walk, node),
+           whole = (double)strl__node_bytes(node->record, walk->labels);
     float size = node->record->geometric_max;
     for (unsigned halvings = 0; halvings < STRL__HALVINGS; halvings++, size /= 2) {
         if (mesh->held < mesh->step_count && mesh->errors[mesh->held] > size)
@@ -162,8 +165,8 @@ void strl__node_touch(strl_walk *walk, strl__node *node)
     link_newest(walk, node);
 }
 
-/* Of what this frame wants, the next brick that holds more than it needs. False where there is none. No list has borrowed its mesh: the one
- * of the last frame is no more, that of this one is not made yet. */
+/* Of what this frame wants, the next brick that holds more than it needs. False where there is none. No list has
+ * borrowed its mesh: the one of the last frame is no more, that of this one is not made yet. */
 static bool trim_next(strl_walk *walk)
 {
     while (walk->looked_at < walk->wanted.count) {
@@ -223,8 +226,9 @@ bool strl__make_room(strl_walk *walk, uint64_t bytes, uint64_t evict_before)
     if (bytes > walk->memory_bytes)
         return false;
     while (walk->resident_bytes > walk->memory_bytes - bytes)
-        if (!evict_oldest(walk, evict_before < idle_since ? evict_before : idle_since) && !strl__page_drop_oldest(walk) &&
-            !evict_oldest(walk, evict_before) && !(evict_before > walk->frame && walk->is_tight && trim_next(walk)))
+        if (!evict_oldest(walk, evict_before < idle_since ? evict_before : idle_since) &&
+            !strl__page_drop_oldest(walk) && !evict_oldest(walk, evict_before) &&
+            !(evict_before > walk->frame && walk->is_tight && trim_next(walk)))
             break;
     if (walk->resident_bytes > walk->memory_bytes - bytes)
         strl__treelet_evict_cold(walk, evict_before < walk->frame ? evict_before : walk->frame);

@@ -40,8 +40,8 @@ double strl__splat_ratio(const strl_walk *walk, const strl_tree *tree)
     return tree->structure == STRL_STRUCTURE_SAMPLES ? walk->splat_ratio : 1;
 }
 
-strl_status strl__run_page_place(const strl_walk *walk, strl__run_page *page, uint32_t within, uint64_t index, const strl_placement *stored,
-                                 strl_error *err)
+strl_status strl__run_page_place(const strl_walk *walk, strl__run_page *page, uint32_t within, uint64_t index,
+                                 const strl_placement *stored, strl_error *err)
 {
     strl__placement *placement = &page->items[within];
     const strl_tree *tree = walk->trees[stored->tree].tree; /* its number was checked with the bytes */

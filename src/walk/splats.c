@@ -1,5 +1,5 @@
-/* The points of one placement in a frame: the splats of its bricks whose cells are small enough, and coarser ones that close the holes where
- * what is below a brick has not arrived. */
+/* The points of one placement in a frame: the splats of its bricks whose cells are small enough, and coarser ones that
+ * close the holes where what is below a brick has not arrived. */
 #include "walk/points.h"
 
 #include <math.h>
@@ -7,15 +7,16 @@
 
 #define COARSE_PX 16.0  /* cells that close holes need not be smaller: they are there for moments */
 #define MOST_PARTS 32.0 /* along a side of a cell that is larger than any point */
-/* By measure: less turns more transparent what is seen from the side, and opens pixels between splats; more leaves foliage too dense. */
+/* By measure: less turns more transparent what is seen from the side, and opens pixels between splats; more leaves
+ * foliage too dense. */
 #define SCATTERED 0.25f
 /* What a point that closes a hole takes of the work of a frame (points.h), looking at a splat being 1. */
 #define WORK_OF_POINT 8u
 
 /* ---- points */
 
-/* 0 = all faces are parallel, STRL_SPREAD_MOST = any direction: then their mean is half as long as they are together, all being
- * turned to one side. */
+/* 0 = all faces are parallel, STRL_SPREAD_MOST = any direction: then their mean is half as long as they are together,
+ * all being turned to one side. */
 static uint16_t spread_of(const strl_splat *splat)
 {
     uint32_t twice = 2 * (255u - splat->parallel);
@@ -25,11 +26,13 @@ static uint16_t spread_of(const strl_splat *splat)
 static void place_point(const strl__points *self, const strl_node *record, const int32_t place[3], strl_vertex *point)
 {
     for (int k = 0; k < 3; k++)
-        point->position[k] = (int32_t)(uint32_t)((uint64_t)record->anchor[k] - (uint64_t)self->tree->box_min[k] + (uint64_t)(int64_t)place[k]);
+        point->position[k] = (int32_t)(uint32_t)((uint64_t)record->anchor[k] - (uint64_t)self->tree->box_min[k] +
+                                                 (uint64_t)(int64_t)place[k]);
 }
 
-/* Points that are larger than their cells overlap: as many as lie in one pixel hide together what a cell hides, so that a wall stays one,
- * from wherever it is looked at. Of scattered faces that lie parallel less is seen from the side, the more scattered the more. */
+/* Points that are larger than their cells overlap: as many as lie in one pixel hide together what a cell hides, so that
+ * a wall stays one, from wherever it is looked at. Of scattered faces that lie parallel less is seen from the side, the
+ * more scattered the more. */
 static float opacity_of(const strl__points *self, const strl_splat *splat, const float line[3])
 {
     if (splat->coverage == 255)
@@ -42,7 +45,8 @@ static float opacity_of(const strl__points *self, const strl_splat *splat, const
     return share < 1 ? 1 - powf(1 - hidden, (float)share) : hidden;
 }
 
-static strl_vertex point_of_splat(const strl__points *self, const strl_node *record, const strl_splat *splat, const float line[3])
+static strl_vertex point_of_splat(const strl__points *self, const strl_node *record, const strl_splat *splat,
+                                  const float line[3])
 {
     strl_vertex point;
     place_point(self, record, splat->centre, &point);
@@ -54,7 +58,8 @@ static strl_vertex point_of_splat(const strl__points *self, const strl_node *rec
     return point;
 }
 
-static void take_splats(strl__points *self, const strl_node *record, const strl_splat *splats, uint32_t count, unsigned size)
+static void take_splats(strl__points *self, const strl_node *record, const strl_splat *splats, uint32_t count,
+                        unsigned size)
 {
     for (uint32_t i = 0; i < count && self->purpose != STRL__POINTS_COUNT; i++) {
         float line[3];
@@ -76,8 +81,8 @@ void strl__points_prepare(strl_walk *walk)
 
 /* ---- what is there */
 
-/* The least size that covers the cells of the brick's splats: 0 = a part of the allowed one, to STRL__POINT_SHARES - 1 = all of it. Where that is a
- * pixel there is but one. */
+/* The least size that covers the cells of the brick's splats: 0 = a part of the allowed one, to STRL__POINT_SHARES - 1
+ * = all of it. Where that is a pixel there is but one. */
 static unsigned share_of(const strl_walk *walk, const strl__active *active)
 {
     const strl__mesh *mesh = &active->node->mesh;
@@ -89,8 +94,8 @@ static unsigned share_of(const strl_walk *walk, const strl__active *active)
     return parts >= STRL__POINT_SHARES ? STRL__POINT_SHARES - 1 : parts >= 1 ? (unsigned)parts - 1 : 0;
 }
 
-/* Where the points that follow are seen from, and how much of one a cell of a lattice unit takes: `unit` of its sides. As of a placement that
- * turns and scales alike along all axes; of others near enough for looks. */
+/* Where the points that follow are seen from, and how much of one a cell of a lattice unit takes: `unit` of its sides.
+ * As of a placement that turns and scales alike along all axes; of others near enough for looks. */
 static void aim(strl__points *self, const strl__active *active, double unit)
 {
     const double *transform = active->placed->transform;
@@ -119,7 +124,8 @@ static void take_shown(strl__points *self, const strl__active *active)
     if (first == end)
         return;
     unsigned size = share_of(self->walk, active);
-    aim(self, active, strl_sight_error_px(&active->sight, active->placed->length_scale) / fmax(1, strl__points_px(self->walk, size)));
+    aim(self, active,
+        strl_sight_error_px(&active->sight, active->placed->length_scale) / fmax(1, strl__points_px(self->walk, size)));
     take_splats(self, active->node->record, mesh->splats + first, end - first, size);
 }
 
@@ -153,7 +159,9 @@ strl__preview strl__preview_of(const strl__node *node)
 static unsigned missing_size(double px)
 {
     double halves = px > 0 ? 2 * log2(STRL__MOST_POINT_PX / px) : STRL__MISSING_SIZES;
-    return STRL__POINT_SHARES + (halves <= 0 ? 0 : halves < STRL__MISSING_SIZES ? (unsigned)halves : STRL__MISSING_SIZES - 1);
+    return STRL__POINT_SHARES + (halves <= 0                    ? 0
+                                 : halves < STRL__MISSING_SIZES ? (unsigned)halves
+                                                                : STRL__MISSING_SIZES - 1);
 }
 
 static bool is_within(const strl_node *record, const strl_node *from, const strl_splat *splat)
@@ -167,7 +175,8 @@ static bool is_within(const strl_node *record, const strl_node *from, const strl
 }
 
 /* What the camera sees of the cell. */
-static strl_sight sight_of(const strl__points *self, const strl__active *active, const strl_node *record, const strl_splat *splat)
+static strl_sight sight_of(const strl__points *self, const strl__active *active, const strl_node *record,
+                           const strl_splat *splat)
 {
     int64_t least[3], most[3], half = ((int64_t)1 << splat->side) / 2;
     for (int k = 0; k < 3; k++) {
@@ -194,7 +203,8 @@ static void find_plane(const strl_splat *splat, float across[3], float up[3])
         least = fabsf(normal[k]) < fabsf(normal[least]) ? k : least;
     axis[least] = 1;
     cross(normal, axis, across);
-    float length = sqrtf(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]); /* not 0: the axis is far from the normal */
+    /* not 0: the axis is far from the normal */
+    float length = sqrtf(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]);
     for (int k = 0; k < 3; k++)
         across[k] /= length;
     cross(normal, across, up);
@@ -217,8 +227,10 @@ static void take_plane(strl__points *self, const strl_node *record, const strl_s
         strl_splat part = *splat;
         double x = side * (i % parts + 0.5 - parts / 2.0), y = side * (i / parts + 0.5 - parts / 2.0);
         for (int k = 0; k < 3; k++) {
-            double at = splat->centre[k] + x * (double)across[k] + y * (double)up[k], anchor = (double)record->anchor[k];
-            part.centre[k] = (int32_t)lrint(fmin(fmax(at, (double)self->tree->box_min[k] - anchor), (double)self->tree->box_max[k] - anchor));
+            double at = splat->centre[k] + x * (double)across[k] + y * (double)up[k],
+                   anchor = (double)record->anchor[k];
+            part.centre[k] = (int32_t)lrint(
+                fmin(fmax(at, (double)self->tree->box_min[k] - anchor), (double)self->tree->box_max[k] - anchor));
         }
         take_splats(self, record, &part, 1, STRL__POINT_SHARES);
     }
@@ -239,8 +251,9 @@ static void take_cell(strl__points *self, const strl__active *active, const strl
     }
 }
 
-/* The coarsest splats of the brick whose cells are no more than a few pixels, else the finest, or those of the tree's preview that lie in the
- * brick, where these are finer. A frame does so much of this and no more, whatever a file says. */
+/* The coarsest splats of the brick whose cells are no more than a few pixels, else the finest, or those of the tree's
+ * preview that lie in the brick, where these are finer. A frame does so much of this and no more, whatever a file says.
+ */
 static void take_missing(strl__points *self, const strl__active *active)
 {
     const strl__node *node = active->node;
@@ -253,7 +266,8 @@ static void take_missing(strl__points *self, const strl__active *active)
         state++;
     const strl__splat_run own = splats_of_state(node, state);
     const strl__preview *preview = &self->walk->trees[active->placed->tree].preview;
-    bool is_coarse = strl_sight_error_px(&active->sight, (double)mesh->errors[state] * active->placed->length_scale) > COARSE_PX;
+    bool is_coarse =
+        strl_sight_error_px(&active->sight, (double)mesh->errors[state] * active->placed->length_scale) > COARSE_PX;
     bool is_finer = is_coarse && preview->least_side < least_side(&own);
     const strl__splat_run run = is_finer ? preview->run : own;
     aim(self, active, 1);

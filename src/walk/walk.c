@@ -9,10 +9,10 @@
 
 #define DEFAULT_MEMORY_BYTES ((uint64_t)512 << 20)
 #define DEFAULT_REQUESTS 16u
-#define DEFAULT_REMOTE_REQUESTS 64u /* the source says how many of them are of use now */
+#define DEFAULT_REMOTE_REQUESTS 64u         /* the source says how many of them are of use now */
 #define MOST_ROOT_BYTES ((uint64_t)8 << 20) /* that are read together while a walk is opened */
-#define AHEAD_FRAMES 15           /* how far the eye's motion is carried on for prefetching */
-#define AHEAD_EVERY 4             /* frames between two looks ahead */
+#define AHEAD_FRAMES 15                     /* how far the eye's motion is carried on for prefetching */
+#define AHEAD_EVERY 4                       /* frames between two looks ahead */
 
 /* ---- opening */
 
@@ -28,7 +28,8 @@ typedef struct root_reads {
 typedef strl_status (*take_fn)(strl_walk *walk, uint32_t tree, strl_source_span *span, strl_error *err);
 
 /* The container has bounded the size. */
-static strl_status add_read(root_reads *reads, uint32_t tree, uint64_t offset, uint32_t size, uint64_t checksum, strl_error *err)
+static strl_status add_read(root_reads *reads, uint32_t tree, uint64_t offset, uint32_t size, uint64_t checksum,
+                            strl_error *err)
 {
     void *data = strl__alloc(size, 1);
     if (!data)
@@ -320,8 +321,8 @@ static strl_status select_front(strl_walk *walk, const strl_camera *camera, cons
 static bool is_same_camera(const strl_camera *a, const strl_camera *b)
 {
     return memcmp(a->eye, b->eye, sizeof a->eye) == 0 && memcmp(a->target, b->target, sizeof a->target) == 0 &&
-           memcmp(a->up, b->up, sizeof a->up) == 0 && a->fov_y_deg == b->fov_y_deg && a->ortho_height == b->ortho_height &&
-           a->width == b->width && a->height == b->height;
+           memcmp(a->up, b->up, sizeof a->up) == 0 && a->fov_y_deg == b->fov_y_deg &&
+           a->ortho_height == b->ortho_height && a->width == b->width && a->height == b->height;
 }
 
 strl_status strl_walk_frame(strl_walk *walk, const strl_camera *camera, strl_draw_list *list, strl_error *err)
@@ -342,7 +343,8 @@ strl_status strl_walk_frame(strl_walk *walk, const strl_camera *camera, strl_dra
     if (status == STRL_OK) {
         strl__refine_front(walk);
         strl__requests_submit(walk);
-        walk->settled &= walk->coarsening == 0 || walk->renewals == 0; /* what comes of them tells whether a finer cut fits */
+        /* what comes of them tells whether a finer cut fits */
+        walk->settled &= walk->coarsening == 0 || walk->renewals == 0;
         status = strl__draw_list(walk, &view, list, err);
         walk->camera = *camera;
     }

@@ -111,7 +111,8 @@ static void a_sentence_of_somebody_else_is_copied_as_it_stands(void **state)
 static void the_checksum_is_xxh3(void **state)
 {
     (void)state;
-    assert_true(strl__checksum("", 0) == 0x2d06800538d394c2u); /* XXH3_64bits of the empty input, from its specification */
+    /* XXH3_64bits of the empty input, from its specification */
+    assert_true(strl__checksum("", 0) == 0x2d06800538d394c2u);
 }
 
 int main(void)

@@ -16,8 +16,8 @@ static void must(strl_status status, const strl_error *err)
         fail_msg("%s", err->message);
 }
 
-static void copy_node(strl_container_writer *to, uint32_t id, strl_node record, const uint8_t *payload, strl_pm *mesh, brick_lie lie,
-                      void *context)
+static void copy_node(strl_container_writer *to, uint32_t id, strl_node record, const uint8_t *payload, strl_pm *mesh,
+                      brick_lie lie, void *context)
 {
     strl_error err = {0};
     strl_arena arena = {0};
@@ -42,7 +42,8 @@ static void copy_node(strl_container_writer *to, uint32_t id, strl_node record, 
     strl_arena_deinit(&arena);
 }
 
-void plant_placed_bricks(const char *good, const char *bad, brick_lie lie, void *context, const strl_placement *placement, uint32_t count)
+void plant_placed_bricks(const char *good, const char *bad, brick_lie lie, void *context,
+                         const strl_placement *placement, uint32_t count)
 {
     strl_error err = {0};
     strl_container_writer *to;
@@ -51,12 +52,13 @@ void plant_placed_bricks(const char *good, const char *bad, brick_lie lie, void 
     uint64_t bytes;
     uint8_t *file = built_read_file(built_path(good), &size);
     built_open(&model, built_path(good));
-    const strl_container_writer_desc desc = {.path = built_path(bad), .scratch_dir = built_path(""), .info = model.info};
+    const strl_container_writer_desc desc = {
+        .path = built_path(bad), .scratch_dir = built_path(""), .info = model.info};
     must(strl_container_writer_create(&desc, &to, &err), &err);
     must(strl_container_writer_begin_tree(to, &model.tree, &err), &err);
     for (uint32_t id = 0; id < model.tree.node_count; id++)
-        copy_node(to, id, model.node[id], file + model.node[id].page.offset + model.node[id].payload_offset, &model.mesh[id], lie,
-                  context);
+        copy_node(to, id, model.node[id], file + model.node[id].page.offset + model.node[id].payload_offset,
+                  &model.mesh[id], lie, context);
     must(strl_container_writer_end_tree(to, &err), &err);
     for (uint32_t i = 0; i < count; i++)
         must(strl_container_writer_add_placement(to, &placement[i], &err), &err);

@@ -233,7 +233,8 @@ void sample_tree_verify(const char *name, const char *input)
         if (report.checks[kind].failures)
             fail_msg("%s: %s", strl_verify_name((strl_verify_kind)kind), report.checks[kind].first);
     assert_true(report.ok);
-    assert_true(report.checks[STRL_VERIFY_PAYLOADS].count > 0 && (report.triangles_leaf == 0 || report.checks[STRL_VERIFY_LEAVES].done));
+    assert_true(report.checks[STRL_VERIFY_PAYLOADS].count > 0 &&
+                (report.triangles_leaf == 0 || report.checks[STRL_VERIFY_LEAVES].done));
     strl_verify_report_deinit(&report);
 }
 

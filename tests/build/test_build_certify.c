@@ -1,4 +1,5 @@
-/* `--certify`: the same geometry, claims that hold by the independent check and are no larger, the same bytes for any number of threads. */
+/* `--certify`: the same geometry, claims that hold by the independent check and are no larger, the same bytes for any
+ * number of threads. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -23,7 +24,11 @@
 
 static void build(const char *input, const char *output, bool certify, unsigned jobs)
 {
-    strl_build_desc desc = {.inputs = &input, .input_count = 1, .output = output, .memory_bytes = 256u << 20, .jobs = jobs,
+    strl_build_desc desc = {.inputs = &input,
+                            .input_count = 1,
+                            .output = output,
+                            .memory_bytes = 256u << 20,
+                            .jobs = jobs,
                             .certify = certify};
     strl_build_result result;
     strl_error err = {0};
@@ -37,8 +42,13 @@ static double worst_ratio(const char *model, const char *input)
     strl_verify_report report;
     char folder[512];
     snprintf(folder, sizeof folder, "%s", built_path(""));
-    const strl_verify_desc desc = {.model = model, .inputs = &input, .input_count = 1, .scratch_dir = folder,
-                                   .memory_bytes = 256u << 20, .jobs = 2, .cuts = 20};
+    const strl_verify_desc desc = {.model = model,
+                                   .inputs = &input,
+                                   .input_count = 1,
+                                   .scratch_dir = folder,
+                                   .memory_bytes = 256u << 20,
+                                   .jobs = 2,
+                                   .cuts = 20};
     if (strl_verify_run(&desc, &report, &err) != STRL_OK)
         fail_msg("%s", err.message);
     for (unsigned kind = 0; kind < STRL_VERIFY_KINDS; kind++)
@@ -75,7 +85,8 @@ static void compare_claims(const char *plain, const char *certified)
         uint32_t level = a.node[i].level;
         float claim_a = a.node[i].geometric_max, claim_b = b.node[i].geometric_max;
         assert_int_equal(a.mesh[i].step_count, b.mesh[i].step_count);
-        assert_memory_equal(a.mesh[i].position, b.mesh[i].position, a.mesh[i].vertex_count * sizeof *a.mesh[i].position);
+        assert_memory_equal(a.mesh[i].position, b.mesh[i].position,
+                            a.mesh[i].vertex_count * sizeof *a.mesh[i].position);
         most_a[level] = fmaxf(most_a[level], claim_a);
         most_b[level] = fmaxf(most_b[level], claim_b);
         lower += claim_b < claim_a;
@@ -83,7 +94,8 @@ static void compare_claims(const char *plain, const char *certified)
     }
     for (uint32_t level = 0; level <= a.node[0].level; level++)
         if ((double)most_b[level] > CODEC_STEP * (double)most_a[level])
-            fail_msg("level %u claims %g, without certificates %g", level, (double)most_b[level], (double)most_a[level]);
+            fail_msg("level %u claims %g, without certificates %g", level, (double)most_b[level],
+                     (double)most_a[level]);
     assert_true(lower > 2 * higher);
     built_close(&a);
     built_close(&b);
@@ -124,9 +136,17 @@ static bool say_no(void *context, const strl_build_progress *progress)
 
 static strl_status build_kept(const char *input, const char *output, bool certify, stop *s, strl_error *err)
 {
-    const strl_build_desc desc = {.inputs = &input, .input_count = 1, .output = output, .memory_bytes = 256u << 20, .jobs = 1,
-                                  .certify = certify, .keep = true, .keep_triangles = 1, .resume = !s,
-                                  .progress = s ? say_no : NULL, .context = s};
+    const strl_build_desc desc = {.inputs = &input,
+                                  .input_count = 1,
+                                  .output = output,
+                                  .memory_bytes = 256u << 20,
+                                  .jobs = 1,
+                                  .certify = certify,
+                                  .keep = true,
+                                  .keep_triangles = 1,
+                                  .resume = !s,
+                                  .progress = s ? say_no : NULL,
+                                  .context = s};
     strl_build_result result;
     return strl_build_clusters(&desc, &result, err);
 }

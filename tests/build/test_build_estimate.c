@@ -1,4 +1,5 @@
-/* The time that a build says it still needs: near the truth where stages take their usual shares, and soon where not. */
+/* The time that a build says it still needs: near the truth where stages take their usual shares, and soon where not.
+ */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -51,7 +52,8 @@ static void the_stages_of_samples_make_a_whole(void **state)
         assert_true(estimate.share - before < most[i]);
     }
     assert_true(fabs(estimate.share - 1) < 1e-9);
-    assert_true(strl__estimate_seconds(STRL_BUILD_SAMPLES, 1000000, 1) < strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 1) / 4);
+    assert_true(strl__estimate_seconds(STRL_BUILD_SAMPLES, 1000000, 1) <
+                strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 1) / 4);
 }
 
 static void ask_seconds(double seconds[STAGES], double total)
@@ -175,9 +177,12 @@ static void without_anything_known_nothing_is_said(void **state)
     assert_true(estimate.seconds_left == 0 && strl__estimate_rate(&estimate, 1000) == 0);
     strl__estimate_update(&estimate, 0, 0, 7);
     assert_true(estimate.seconds_left == 0 && estimate.share == 0);
-    assert_true(strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 0) == strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 1));
-    assert_true(strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 2) < strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 1));
-    assert_true(strl__estimate_seconds(STRL_BUILD_CERTIFIED, 1000000, 1) > strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 1));
+    assert_true(strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 0) ==
+                strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 1));
+    assert_true(strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 2) <
+                strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 1));
+    assert_true(strl__estimate_seconds(STRL_BUILD_CERTIFIED, 1000000, 1) >
+                strl__estimate_seconds(STRL_BUILD_CLUSTERS, 1000000, 1));
 }
 
 static void more_triangles_need_more_memory(void **state)

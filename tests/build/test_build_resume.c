@@ -232,8 +232,8 @@ static void cancelled_at_any_node_that_is_written_it_resumes(void **state)
     assert_output();
 }
 
-/* Fails the n-th call, then resumes until it gets through, for growing n. before: a folder with stages that each try goes on
- * with, or NULL to begin anew. */
+/* Fails the n-th call, then resumes until it gets through, for growing n. before: a folder with stages that each try
+ * goes on with, or NULL to begin anew. */
 static void fail_each(void (*fail_after)(uint64_t n), strl_status failure, const saved_folder *before)
 {
     unsigned kept = 0;
@@ -341,7 +341,8 @@ static void assert_sound(const char *model)
     strl_verify_report report;
     strl_error err = {0};
     snprintf(folder, sizeof folder, "%s", built_path(""));
-    const strl_verify_desc desc = {.model = model, .scratch_dir = folder, .memory_bytes = 256u << 20, .jobs = 1, .cuts = 1};
+    const strl_verify_desc desc = {
+        .model = model, .scratch_dir = folder, .memory_bytes = 256u << 20, .jobs = 1, .cuts = 1};
     if (strl_verify_run(&desc, &report, &err) != STRL_OK)
         fail_msg("%s", err.message);
     for (unsigned kind = 0; kind < STRL_VERIFY_KINDS; kind++)
@@ -350,8 +351,9 @@ static void assert_sound(const char *model)
     strl_verify_report_deinit(&report);
 }
 
-/* Whatever it says, it is refused or built. What is built may be another model; of a checkpoint, whose counts are checked, not a
- * broken container, but the record of a node is believed: who forges one with its checksums gets what it says. */
+/* Whatever it says, it is refused or built. What is built may be another model; of a checkpoint, whose counts are
+ * checked, not a broken container, but the record of a node is believed: who forges one with its checksums gets what it
+ * says. */
 static void resume_what_lies(const saved_folder *saved, bool is_sound, unsigned *refused)
 {
     strl_build_result result;

@@ -46,7 +46,8 @@ static void build_and_check(const char *input, const char *name, uint32_t sample
             fail_msg("%s: node %u: %s", name, i, err.message);
         diagonal = 1 + diagonal * CLAIM_ROUNDING;
         if (node->geometric_max > diagonal || node->appearance_max > diagonal)
-            fail_msg("%s: node %u claims %g and %g in a box of %g", name, i, node->geometric_max, node->appearance_max, diagonal);
+            fail_msg("%s: node %u claims %g and %g in a box of %g", name, i, node->geometric_max, node->appearance_max,
+                     diagonal);
     }
     assert_uniform_cuts_hold(&model, name, 4, samples / SMALLER);
     built_close(&model);

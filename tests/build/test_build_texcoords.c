@@ -1,5 +1,5 @@
-/* Texture coordinates from a model to the vertices of all nodes. On a sheet they are a linear function of the place, so that
- * whatever a collapse, a seam or a spill does wrong would show at some vertex. */
+/* Texture coordinates from a model to the vertices of all nodes. On a sheet they are a linear function of the place, so
+ * that whatever a collapse, a seam or a spill does wrong would show at some vertex. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -29,7 +29,8 @@ static void put_square(FILE *file, unsigned x, unsigned y, unsigned first_uv)
     const bool right = x >= MIDDLE;
     const unsigned a = y * (SIDE + 1) + x + 1, b = a + 1, c = a + SIDE + 2, d = a + SIDE + 1;
     const unsigned uv = first_uv + (right ? (SIDE + 1) * (SIDE + 1) : 0);
-    fprintf(file, "f %u/%u %u/%u %u/%u\nf %u/%u %u/%u %u/%u\n", a, a + uv, b, b + uv, c, c + uv, a, a + uv, c, c + uv, d, d + uv);
+    fprintf(file, "f %u/%u %u/%u %u/%u\nf %u/%u %u/%u %u/%u\n", a, a + uv, b, b + uv, c, c + uv, a, a + uv, c, c + uv,
+            d, d + uv);
 }
 
 /* v of an OBJ is up. */
@@ -39,7 +40,8 @@ static void write_sheet(void)
     assert_non_null(file);
     fprintf(file, "mtllib sheet.mtl\n");
     for (unsigned i = 0; i < (SIDE + 1) * (SIDE + 1); i++)
-        fprintf(file, "v %u %u %.6f\n", i % (SIDE + 1), i / (SIDE + 1), 2 * sin(i % (SIDE + 1) * 0.13) * cos(i / (SIDE + 1) * 0.21));
+        fprintf(file, "v %u %u %.6f\n", i % (SIDE + 1), i / (SIDE + 1),
+                2 * sin(i % (SIDE + 1) * 0.13) * cos(i / (SIDE + 1) * 0.21));
     for (unsigned half = 0; half < 2; half++)
         for (unsigned i = 0; i < (SIDE + 1) * (SIDE + 1); i++) {
             double uv[2];
@@ -54,8 +56,9 @@ static void write_sheet(void)
     }
     fprintf(file, "usemtl plain\nv 0 0 30\nv 50 0 30\nv 0 50 30\nf -3 -2 -1\n");
     assert_int_equal(fclose(file), 0);
-    built_write_text("sheet.mtl", "newmtl left\nmap_Kd no such image.png\nnewmtl right\nmap_Kd -clamp on textures\\other.ktx2\n"
-                                  "newmtl plain\nKd 1 0 0\n");
+    built_write_text("sheet.mtl",
+                     "newmtl left\nmap_Kd no such image.png\nnewmtl right\nmap_Kd -clamp on textures\\other.ktx2\n"
+                     "newmtl plain\nKd 1 0 0\n");
 }
 
 typedef struct warnings {
@@ -73,8 +76,13 @@ static void take_warning(void *context, const char *sentence)
 static strl_build_result build_sheet(const char *output, unsigned jobs, warnings *told)
 {
     const char *input = built_path("sheet.obj");
-    const strl_build_desc desc = {.inputs = &input, .input_count = 1, .output = output, .memory_bytes = 256u << 20,
-                                  .jobs = jobs, .warn = take_warning, .context = told};
+    const strl_build_desc desc = {.inputs = &input,
+                                  .input_count = 1,
+                                  .output = output,
+                                  .memory_bytes = 256u << 20,
+                                  .jobs = jobs,
+                                  .warn = take_warning,
+                                  .context = told};
     strl_build_result result;
     strl_error err = {0};
     if (strl_build_clusters(&desc, &result, &err) != STRL_OK)
@@ -91,13 +99,15 @@ static void check_images(strl_container *container, strl_material_image images[3
     assert_int_equal(strl_container_get_info(container)->material_count, 3);
     for (uint32_t i = 0; i < 3; i++) {
         char reference[64];
-        assert_int_equal(strl_container_material_image(container, i, reference, sizeof reference, &images[i], &err), STRL_OK);
+        assert_int_equal(strl_container_material_image(container, i, reference, sizeof reference, &images[i], &err),
+                         STRL_OK);
         assert_int_equal(images[i].reference != NULL, expected[i] != NULL);
         assert_string_equal(reference, expected[i] ? expected[i] : "");
         assert_int_equal(images[i].wrap[0], wraps[i]);
         assert_int_equal(images[i].wrap[1], wraps[i]);
     }
-    assert_true(fabsf(images[0].texcoord_min[0] - 0.25f) < 1e-6f && fabsf(images[0].texcoord_extent[0] - 0.25f) < 1e-6f);
+    assert_true(fabsf(images[0].texcoord_min[0] - 0.25f) < 1e-6f &&
+                fabsf(images[0].texcoord_extent[0] - 0.25f) < 1e-6f);
     assert_true(fabsf(images[1].texcoord_min[1] - 0.2f) < 1e-5f && fabsf(images[1].texcoord_extent[1] - 2.2f) < 1e-5f);
     char cut[8];
     strl_material_image image;
@@ -115,8 +125,10 @@ static void check_vertices(built_model *model, const strl_material_image images[
         strl_error err = {0};
         uint32_t *materials = malloc(mesh->vertex_count * sizeof *materials);
         uint16_t(*codes)[2] = malloc(mesh->vertex_count * sizeof *codes);
-        assert_int_equal(strl_container_vertex_texcoords(model->container, 0, n, mesh->vertex_count, codes, &err), STRL_OK);
-        assert_int_equal(strl_container_vertex_parts(model->container, 0, n, mesh->vertex_count, NULL, materials, &err), STRL_OK);
+        assert_int_equal(strl_container_vertex_texcoords(model->container, 0, n, mesh->vertex_count, codes, &err),
+                         STRL_OK);
+        assert_int_equal(strl_container_vertex_parts(model->container, 0, n, mesh->vertex_count, NULL, materials, &err),
+                         STRL_OK);
         for (uint32_t v = 0; v < mesh->vertex_count; v++) {
             int64_t lattice[3];
             double uv[2], at[2];
@@ -132,7 +144,8 @@ static void check_vertices(built_model *model, const strl_material_image images[
             for (int k = 0; k < 2; k++) {
                 double got = (double)image->texcoord_min[k] +
                              codes[v][k] * (double)image->texcoord_extent[k] / STRL_TEXCOORD_MOST;
-                assert_true(fabs(got - uv[k]) < (double)image->texcoord_extent[k] / STRL_TEXCOORD_MOST * 0.6 + 1e-3 * model->tree.step + 2e-5);
+                assert_true(fabs(got - uv[k]) < (double)image->texcoord_extent[k] / STRL_TEXCOORD_MOST * 0.6 +
+                                                    1e-3 * model->tree.step + 2e-5);
             }
             looked_at++;
         }
@@ -201,8 +214,15 @@ static strl_status build_in_two(bool resume, unsigned after, unsigned *calls, st
 {
     const char *input = built_path("sheet.obj");
     stop s = {.after = after};
-    const strl_build_desc desc = {.inputs = &input, .input_count = 1, .output = built_path("two.stroll"), .memory_bytes = 256u << 20,
-                                  .jobs = 2, .keep = true, .keep_triangles = 1, .resume = resume, .progress = say_no,
+    const strl_build_desc desc = {.inputs = &input,
+                                  .input_count = 1,
+                                  .output = built_path("two.stroll"),
+                                  .memory_bytes = 256u << 20,
+                                  .jobs = 2,
+                                  .keep = true,
+                                  .keep_triangles = 1,
+                                  .resume = resume,
+                                  .progress = say_no,
                                   .context = &s};
     strl_error err = {0};
     strl_status status = strl_build_clusters(&desc, result, &err);
@@ -249,8 +269,13 @@ static void the_container_is_good(void **state)
     snprintf(model, sizeof model, "%s", built_path("sheet.stroll"));
     snprintf(input, sizeof input, "%s", built_path("sheet.obj"));
     build_sheet(model, 2, &told);
-    const strl_verify_desc desc = {.model = model, .inputs = inputs, .input_count = 1, .scratch_dir = folder,
-                                   .memory_bytes = 256u << 20, .jobs = 2, .cuts = 20};
+    const strl_verify_desc desc = {.model = model,
+                                   .inputs = inputs,
+                                   .input_count = 1,
+                                   .scratch_dir = folder,
+                                   .memory_bytes = 256u << 20,
+                                   .jobs = 2,
+                                   .cuts = 20};
     if (strl_verify_run(&desc, &report, &err) != STRL_OK)
         fail_msg("%s", err.message);
     for (unsigned kind = 0; kind < STRL_VERIFY_KINDS; kind++)
@@ -274,8 +299,12 @@ static void a_walk_gives_them_with_the_labels(void **state)
     built_open(&model, built_path("sheet.stroll"));
     assert_int_equal(strl_source_open_file(built_path("sheet.stroll"), 0, &source, &err), STRL_OK);
     assert_int_equal(strl_walk_open(source, &(strl_walk_desc){.labels = true}, &walk, &err), STRL_OK);
-    const strl_camera camera = {.eye = {SIDE / 2., -SIDE, SIDE}, .target = {SIDE / 2., SIDE / 2., 0}, .up = {0, 0, 1},
-                                .fov_y_deg = 60, .width = 640, .height = 480};
+    const strl_camera camera = {.eye = {SIDE / 2., -SIDE, SIDE},
+                                .target = {SIDE / 2., SIDE / 2., 0},
+                                .up = {0, 0, 1},
+                                .fov_y_deg = 60,
+                                .width = 640,
+                                .height = 480};
     do {
         assert_int_equal(strl_walk_frame(walk, &camera, &list, &err), STRL_OK);
         strl_walk_pump(walk, 1000000000);

@@ -37,7 +37,7 @@ static double distance_of_point(const strl_facet *facet, uint32_t count, const d
 {
     double least = INFINITY;
     for (uint32_t i = 0; i < count; i++)
-        least = fmin(least, surface_distance_slow(1, (const double(*)[3][3])&facet[i].corner, p) + facet[i].claim);
+        least = fmin(least, surface_distance_slow(1, (const double(*)[3][3]) & facet[i].corner, p) + facet[i].claim);
     return least;
 }
 
@@ -68,8 +68,8 @@ static void no_point_of_a_triangle_is_farther_than_the_bound(void **state)
             random_facet(&random, 1 + mesh_below(&random, 200), &by[i]);
         double along[3] = {mesh_below(&random, 9) - 4., mesh_below(&random, 9) - 4., mesh_below(&random, 9) - 4.};
         double true_least = sampled_distance(&triangle, by, count);
-        strl_cover cover = {.by = by, .count = count, .along = round & 1 ? along : NULL,
-                            .enough = round % 3 ? 0 : 2 * true_least};
+        strl_cover cover = {
+            .by = by, .count = count, .along = round & 1 ? along : NULL, .enough = round % 3 ? 0 : 2 * true_least};
         double bound = strl_cover_bound(&triangle, &cover);
         if (bound < true_least - 1e-9)
             fail_msg("round %d: the bound is %g, a point is %g away", round, bound, true_least);
@@ -93,7 +93,8 @@ static void a_triangle_over_a_plane_in_pieces_is_measured_to_a_twentieth(void **
         by[i].claim = 0;
     const double flat[3][3] = {{0.5, 0.2, 0.3}, {3.5, 0.2, 0.3}, {2, 3.8, 0.3}};
     strl_facet_set(&triangle, flat[0], flat[1], flat[2]);
-    double most = sampled_distance(&triangle, by, count), bound = strl_cover_bound(&triangle, &(strl_cover){.by = by, .count = count});
+    double most = sampled_distance(&triangle, by, count),
+           bound = strl_cover_bound(&triangle, &(strl_cover){.by = by, .count = count});
     assert_true(bound >= most - 1e-12 && bound <= most * 1.06 + 1e-9);
 }
 
@@ -121,7 +122,8 @@ static void the_tree_finds_what_a_look_at_every_facet_finds(void **state)
         for (int i = 0; i < 300; i++) {
             bool does = true;
             for (int k = 0; k < 3; k++)
-                does = does && facet[i].least[k] <= facet[0].most[k] + reach && facet[i].most[k] >= facet[0].least[k] - reach;
+                does = does && facet[i].least[k] <= facet[0].most[k] + reach &&
+                       facet[i].most[k] >= facet[0].least[k] - reach;
             meets += does;
         }
         assert_int_equal(strl_near_list(&tree, &facet[0], reach, found, 300), meets);
@@ -136,7 +138,8 @@ static strl_piece *pieces_of(const strl_mesh *mesh, float claim)
     assert_non_null(piece);
     for (uint32_t t = 0; t < mesh->triangle_count; t++) {
         for (int c = 0; c < 3; c++)
-            memcpy(piece[t].corner[c], mesh->position[mesh->wedge[mesh->triangle[t][c]].point], sizeof piece[t].corner[c]);
+            memcpy(piece[t].corner[c], mesh->position[mesh->wedge[mesh->triangle[t][c]].point],
+                   sizeof piece[t].corner[c]);
         piece[t].claim = claim;
     }
     return piece;
@@ -146,7 +149,8 @@ static strl_certificate certify(run *r, const strl_piece *piece, uint32_t count)
 {
     strl_certificate certificate;
     strl_error err = {0};
-    if (strl_certify(&r->mesh, &r->result, &(strl_older){.piece = piece, .own = count, .count = count}, &r->arena, &certificate, &err) != STRL_OK)
+    if (strl_certify(&r->mesh, &r->result, &(strl_older){.piece = piece, .own = count, .count = count}, &r->arena,
+                     &certificate, &err) != STRL_OK)
         fail_msg("%s", err.message);
     for (uint32_t i = 1; i <= r->result.collapse_count; i++)
         assert_true(certificate.down[i] >= certificate.down[i - 1] && certificate.up[i] >= certificate.up[i - 1]);

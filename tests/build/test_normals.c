@@ -53,7 +53,8 @@ static void expect_normal(uint32_t count, uint32_t t, int c, uint16_t normal[2])
     face_normal(&mesh[t], axis);
     for (uint32_t other = 0; other < 3 * count && seen < MOST_FACES; other++) {
         float n[3];
-        if (memcmp(mesh[other / 3].corner[other % 3].position, mesh[t].corner[c].position, sizeof mesh->corner->position))
+        if (memcmp(mesh[other / 3].corner[other % 3].position, mesh[t].corner[c].position,
+                   sizeof mesh->corner->position))
             continue;
         seen++;
         face_normal(&mesh[other / 3], n);

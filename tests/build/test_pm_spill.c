@@ -1,4 +1,5 @@
-/* Progressive meshes come back from scratch as they went there; damaged bytes give a failure or a mesh that keeps every invariant. */
+/* Progressive meshes come back from scratch as they went there; damaged bytes give a failure or a mesh that keeps every
+ * invariant. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -61,11 +62,11 @@ static strl_pm make(bool coloured, bool apart, strl_arena *arena)
     return pm;
 }
 
-#define assert_same(a, b, member, count)                                                                                     \
-    do {                                                                                                                     \
-        assert_int_equal((a)->member != NULL, (b)->member != NULL);                                                          \
-        if ((a)->member)                                                                                                     \
-            assert_memory_equal((a)->member, (b)->member, (count) * sizeof *(a)->member);                                    \
+#define assert_same(a, b, member, count)                                                                               \
+    do {                                                                                                               \
+        assert_int_equal((a)->member != NULL, (b)->member != NULL);                                                    \
+        if ((a)->member)                                                                                               \
+            assert_memory_equal((a)->member, (b)->member, (count) * sizeof *(a)->member);                              \
     } while (0)
 
 static void assert_same_mesh(const strl_pm *a, const strl_pm *b)

@@ -1,4 +1,5 @@
-/* Sample trees hold every triangle of the model exactly once, whatever the model is; their bytes do not depend on threads. */
+/* Sample trees hold every triangle of the model exactly once, whatever the model is; their bytes do not depend on
+ * threads. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -177,8 +178,9 @@ static void several_pieces_share_a_spot(void **state)
     }
     mesh_file_write_ply(&mesh, built_path("spot.ply"));
     for (unsigned jobs = 1; jobs < 4; jobs += 2) {
-        strl_build_result result = sample_tree_build("spot.ply", jobs > 1 ? "more.stroll" : "one.stroll",
-                                                     (strl_build_desc){.jobs = jobs, .memory_bytes = STRL_BUILD_LEAST_MEMORY});
+        strl_build_result result =
+            sample_tree_build("spot.ply", jobs > 1 ? "more.stroll" : "one.stroll",
+                              (strl_build_desc){.jobs = jobs, .memory_bytes = STRL_BUILD_LEAST_MEMORY});
         assert_int_equal(result.triangles_leaf, mesh.face_count);
     }
     assert_same_bytes("one.stroll", "more.stroll");
@@ -217,7 +219,8 @@ static void a_model_in_one_line_is_kept(void **state)
     mesh_file mesh = {0};
     for (uint32_t i = 0; i < 20000 / SMALLER; i++) {
         double t = i * 1e-3;
-        uint32_t a = mesh_file_add_vertex(&mesh, t, t, t), b = mesh_file_add_vertex(&mesh, t + 1e-3, t + 1e-3, t + 1e-3);
+        uint32_t a = mesh_file_add_vertex(&mesh, t, t, t),
+                 b = mesh_file_add_vertex(&mesh, t + 1e-3, t + 1e-3, t + 1e-3);
         mesh_file_add_face(&mesh, a, b, mesh_file_add_vertex(&mesh, t + 5e-4, t + 5e-4, t + 5.2e-4));
     }
     sample_tree_prove(&mesh);
@@ -308,28 +311,36 @@ static void write_patches(void)
     assert_non_null(file);
     fprintf(file, "mtllib patches.mtl\n");
     for (unsigned patch = 0; patch < PATCHES; patch++) {
-        fprintf(file, "o %s\nusemtl %s\n", patch_name(patch), patch % 3 == 0 ? "plain" : patch % 3 == 1 ? "image" : "red");
+        fprintf(file, "o %s\nusemtl %s\n", patch_name(patch),
+                patch % 3 == 0   ? "plain"
+                : patch % 3 == 1 ? "image"
+                                 : "red");
         for (unsigned i = 0; i < (PATCH_SIDE + 1) * (PATCH_SIDE + 1); i++) {
             unsigned x = i % (PATCH_SIDE + 1), y = i / (PATCH_SIDE + 1);
-            fprintf(file, "v %u %u %u\nvt %.9g %.9g\n", 100 * patch + x, y, (x * y) % 5, (double)x / PATCH_SIDE, 1 - (double)y / PATCH_SIDE);
+            fprintf(file, "v %u %u %u\nvt %.9g %.9g\n", 100 * patch + x, y, (x * y) % 5, (double)x / PATCH_SIDE,
+                    1 - (double)y / PATCH_SIDE);
         }
         for (unsigned y = 0; y < PATCH_SIDE; y++)
             for (unsigned x = 0; x < PATCH_SIDE; x++) {
-                unsigned a = patch * (PATCH_SIDE + 1) * (PATCH_SIDE + 1) + y * (PATCH_SIDE + 1) + x + 1, d = a + PATCH_SIDE + 1;
-                fprintf(file, "f %u/%u %u/%u %u/%u\nf %u/%u %u/%u %u/%u\n", a, a, a + 1, a + 1, d + 1, d + 1, a, a, d + 1, d + 1, d, d);
+                unsigned a = patch * (PATCH_SIDE + 1) * (PATCH_SIDE + 1) + y * (PATCH_SIDE + 1) + x + 1,
+                         d = a + PATCH_SIDE + 1;
+                fprintf(file, "f %u/%u %u/%u %u/%u\nf %u/%u %u/%u %u/%u\n", a, a, a + 1, a + 1, d + 1, d + 1, a, a,
+                        d + 1, d + 1, d, d);
             }
     }
     assert_int_equal(fclose(file), 0);
     built_write_text("patches.mtl", "newmtl plain\nnewmtl image\nmap_Kd picture.png\nnewmtl red\nKd 1 0 0\n");
 }
 
-static void check_vertex(const built_model *model, uint32_t node, uint32_t vertex, uint32_t part, uint32_t material, const uint16_t code[2])
+static void check_vertex(const built_model *model, uint32_t node, uint32_t vertex, uint32_t part, uint32_t material,
+                         const uint16_t code[2])
 {
     char name[64];
     int64_t cell[3];
     strl_error err = {0};
     built_position(model, node, vertex, cell);
-    double x = model->tree.origin[0] + model->tree.step * (double)cell[0], y = model->tree.origin[1] + model->tree.step * (double)cell[1];
+    double x = model->tree.origin[0] + model->tree.step * (double)cell[0],
+           y = model->tree.origin[1] + model->tree.step * (double)cell[1];
     unsigned patch = (unsigned)(x / 100);
     assert_int_equal(strl_container_part(model->container, part, name, sizeof name, &err), STRL_OK);
     assert_string_equal(name, patch_name(patch));
@@ -382,9 +393,11 @@ static void the_bytes_do_not_depend_on_the_threads(void **state)
     add_soup(&mesh, 60000 / SMALLER, (const double[3]){0, 0, 0}, 1, 0.01);
     add_soup(&mesh, 6000 / SMALLER, (const double[3]){0, 0, 0}, 1, 0.3);
     mesh_file_write_ply(&mesh, built_path("threads.ply"));
-    sample_tree_build("threads.ply", "one.stroll", (strl_build_desc){.jobs = 1, .memory_bytes = STRL_BUILD_LEAST_MEMORY});
+    sample_tree_build("threads.ply", "one.stroll",
+                      (strl_build_desc){.jobs = 1, .memory_bytes = STRL_BUILD_LEAST_MEMORY});
     for (size_t i = 0; i < sizeof jobs / sizeof *jobs; i++) {
-        sample_tree_build("threads.ply", "more.stroll", (strl_build_desc){.jobs = jobs[i], .memory_bytes = STRL_BUILD_LEAST_MEMORY});
+        sample_tree_build("threads.ply", "more.stroll",
+                          (strl_build_desc){.jobs = jobs[i], .memory_bytes = STRL_BUILD_LEAST_MEMORY});
         assert_same_bytes("one.stroll", "more.stroll");
     }
     sample_tree_check("one.stroll");
@@ -405,7 +418,8 @@ static void nothing_becomes_a_tree_of_nothing(void **state)
     strl_error err = {0};
     const char *inputs[1] = {built_path("nothing.obj")};
     strl_build_desc desc = {.inputs = inputs, .input_count = 1, .output = built_path("nothing.stroll"), .jobs = 2};
-    strl_status clusters = strl_build_clusters(&desc, &result, &err), samples = strl_build_samples(&desc, &result, &err);
+    strl_status clusters = strl_build_clusters(&desc, &result, &err),
+                samples = strl_build_samples(&desc, &result, &err);
     assert_int_equal(samples, clusters);
     assert_int_equal(samples, STRL_OK);
     assert_int_equal(result.triangles_leaf, 0);
@@ -442,7 +456,8 @@ static void what_samples_cannot_be_asked_for_is_refused(void **state)
     assert_refused((strl_build_desc){.probability = -0.5}, "probability");
     assert_refused((strl_build_desc){.probability = NAN}, "probability");
     assert_refused((strl_build_desc){.memory_bytes = STRL_BUILD_LEAST_MEMORY - 1}, "memory");
-    strl_build_result kept = sample_tree_build("asked.ply", "asked.stroll", (strl_build_desc){.keep = true, .probability = 0.5});
+    strl_build_result kept =
+        sample_tree_build("asked.ply", "asked.stroll", (strl_build_desc){.keep = true, .probability = 0.5});
     assert_int_equal(kept.triangles_leaf, 12);
     assert_false(kept.scratch_kept);
 }
@@ -457,7 +472,8 @@ static void a_higher_probability_stores_more_above(void **state)
     add_soup(&mesh, 40000, (const double[3]){0, 0, 0}, 1, 0.05);
     mesh_file_write_ply(&mesh, built_path("asked.ply"));
     for (size_t i = 0; i < sizeof probabilities / sizeof *probabilities; i++) {
-        strl_build_result result = sample_tree_build("asked.ply", "asked.stroll", (strl_build_desc){.probability = probabilities[i]});
+        strl_build_result result =
+            sample_tree_build("asked.ply", "asked.stroll", (strl_build_desc){.probability = probabilities[i]});
         assert_true(result.root_triangles > before);
         before = result.root_triangles;
         sample_tree_compare("asked.stroll", &mesh);

@@ -1,6 +1,6 @@
-/* How much of its cell's side a splat hides, by the text of docs/algorithms/samples.md ("Bricks"): found again for every splat of every
- * brick from all triangles that the container stores, which is what the text speaks of, whatever was drawn to where. Then by what is
- * seen: rays through the cells. */
+/* How much of its cell's side a splat hides, by the text of docs/algorithms/samples.md ("Bricks"): found again for
+ * every splat of every brick from all triangles that the container stores, which is what the text speaks of, whatever
+ * was drawn to where. Then by what is seen: rays through the cells. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -23,9 +23,9 @@
 #define PI 3.14159265358979323846
 
 typedef struct splat_found {
-    double side;    /* of the cell, lattice units */
+    double side; /* of the cell, lattice units */
     int64_t cell[3];
-    double walls;   /* area of all that lies in the cell over that of its side */
+    double walls; /* area of all that lies in the cell over that of its side */
     uint8_t coverage, parallel;
 } splat_found;
 
@@ -54,7 +54,8 @@ static bool is_of_cell(const int64_t corner[3][4], const splat_found *splat)
 {
     double away[3] = {0};
     for (int k = 0; k < 3; k++) {
-        double least = (double)splat->cell[k] * splat->side, centroid = (double)((corner[0][k] + corner[1][k] + corner[2][k]) / 3);
+        double least = (double)splat->cell[k] * splat->side,
+               centroid = (double)((corner[0][k] + corner[1][k] + corner[2][k]) / 3);
         if (centroid < least || centroid >= least + splat->side)
             return false;
         for (int c = 0; c < 3; c++) {
@@ -136,14 +137,16 @@ static void check_all(const looked_at *model)
         const splat_found *splat = &model->splat[i];
         double low = INFINITY, high = -INFINITY;
         for (int turn = -1; turn <= 1; turn++) { /* of its last bit */
-            double covered = 255 * expected_coverage(splat->walls, fmin(fmax(splat->parallel + turn / 2., 0), 255) / 255);
+            double covered =
+                255 * expected_coverage(splat->walls, fmin(fmax(splat->parallel + turn / 2., 0), 255) / 255);
             low = fmin(low, covered);
             high = fmax(high, covered);
         }
         if (splat->coverage < low - MOST_OFF || splat->coverage > high + MOST_OFF)
-            fail_msg("a cell of %g at %lld %lld %lld has walls of %g sides, parallel %u: coverage %u, expected %g to %g", splat->side,
-                     (long long)splat->cell[0], (long long)splat->cell[1], (long long)splat->cell[2], splat->walls, splat->parallel,
-                     splat->coverage, low, high);
+            fail_msg(
+                "a cell of %g at %lld %lld %lld has walls of %g sides, parallel %u: coverage %u, expected %g to %g",
+                splat->side, (long long)splat->cell[0], (long long)splat->cell[1], (long long)splat->cell[2],
+                splat->walls, splat->parallel, splat->coverage, low, high);
     }
 }
 
@@ -211,8 +214,8 @@ static void check_sheet(const looked_at *model, double walls, double coverage, d
             continue;
         filled++;
         if (fabs(splat->coverage / 255. - coverage) > 0.008 || fabs(splat->parallel / 255. - parallel) > 0.004)
-            fail_msg("walls of %g sides: coverage %u, parallel %u, expected %g, %g", splat->walls, splat->coverage, splat->parallel,
-                     255 * coverage, 255 * parallel);
+            fail_msg("walls of %g sides: coverage %u, parallel %u, expected %g, %g", splat->walls, splat->coverage,
+                     splat->parallel, 255 * coverage, 255 * parallel);
     }
     if (filled < model->splat_count / 2)
         fail_msg("%u of %u cells have walls of %g sides", filled, model->splat_count, walls);
@@ -241,7 +244,8 @@ static void a_part_of_a_sheet_covers_that_part(void **state)
     }
 }
 
-/* Parallel faces lie beside each other: two halves of a sheet are a wall, though one lies over the other. Two walls are one. */
+/* Parallel faces lie beside each other: two halves of a sheet are a wall, though one lies over the other. Two walls are
+ * one. */
 static void parallel_sheets_lie_beside_each_other(void **state)
 {
     (void)state;
@@ -255,8 +259,8 @@ static void parallel_sheets_lie_beside_each_other(void **state)
     }
 }
 
-/* Roofs of 30 degrees: all faces to one side, their sum is cos 30 degrees as long as they are, so that 2 cos 30 - 1 of them counts as
- * parallel. */
+/* Roofs of 30 degrees: all faces to one side, their sum is cos 30 degrees as long as they are, so that 2 cos 30 - 1 of
+ * them counts as parallel. */
 static void slopes_lie_between_sheets_and_scattered_faces(void **state)
 {
     (void)state;
@@ -313,7 +317,8 @@ static void add_scattered(mesh_file *mesh, uint32_t count, double edge, uint64_t
     }
 }
 
-/* Of cells that have many and lie within the cube: (1 - exp(-w / 2)) and nothing else, and no more parallel than half. */
+/* Of cells that have many and lie within the cube: (1 - exp(-w / 2)) and nothing else, and no more parallel than half.
+ */
 static void scattered_faces_hide_each_other(void **state)
 {
     (void)state;
@@ -364,12 +369,14 @@ static bool is_hit(const int64_t corner[3][4], int axis, const double at[2])
     int a = (axis + 1) % 3, b = (axis + 2) % 3;
     for (int c = 0; c < 3; c++) {
         const int64_t *from = corner[c], *to = corner[(c + 1) % 3];
-        sign[c] = (double)(to[a] - from[a]) * (at[1] - (double)from[b]) - (double)(to[b] - from[b]) * (at[0] - (double)from[a]);
+        sign[c] = (double)(to[a] - from[a]) * (at[1] - (double)from[b]) -
+                  (double)(to[b] - from[b]) * (at[0] - (double)from[a]);
     }
     return (sign[0] >= 0 && sign[1] >= 0 && sign[2] >= 0) || (sign[0] <= 0 && sign[1] <= 0 && sign[2] <= 0);
 }
 
-/* Rays along an axis past all that is of the cell, a margin round it included: the area of what is hit over that of the side. */
+/* Rays along an axis past all that is of the cell, a margin round it included: the area of what is hit over that of the
+ * side. */
 static double seen_share(const looked_at *model, const splat_found *splat, int axis)
 {
     static bool hit[2 * RAYS][2 * RAYS];
@@ -384,7 +391,8 @@ static double seen_share(const looked_at *model, const splat_found *splat, int a
         for (uint32_t y = 0; y < 2 * RAYS; y++)
             for (uint32_t x = 0; x < 2 * RAYS; x++)
                 if (!hit[y][x])
-                    hit[y][x] = is_hit(model->triangle[t], axis, (const double[2]){least[0] + (x + 0.5) * step, least[1] + (y + 0.5) * step});
+                    hit[y][x] = is_hit(model->triangle[t], axis,
+                                       (const double[2]){least[0] + (x + 0.5) * step, least[1] + (y + 0.5) * step});
     }
     for (uint32_t i = 0; i < 4 * RAYS * RAYS; i++)
         hits += hit[i / (2 * RAYS)][i % (2 * RAYS)];
@@ -407,8 +415,8 @@ static bool is_inside(const looked_at *model, const splat_found *splat)
     return true;
 }
 
-/* The mean over cells and axes: single ones differ by what happens to lie in them. A few hundred faces are by chance a little parallel, so
- * that somewhat more is told. */
+/* The mean over cells and axes: single ones differ by what happens to lie in them. A few hundred faces are by chance a
+ * little parallel, so that somewhat more is told. */
 static void scattered_faces_are_seen_as_told(void **state)
 {
     (void)state;
@@ -431,7 +439,8 @@ static void scattered_faces_are_seen_as_told(void **state)
         }
         assert_true(looks >= 24);
         if (fabs(seen / due - 1) > 0.04 || fabs(seen / told - 1) > 0.1)
-            fail_msg("%u faces: %g of a cell's side is seen, %g is due, %g is told", counts[i], seen / looks, due / looks, told / looks);
+            fail_msg("%u faces: %g of a cell's side is seen, %g is due, %g is told", counts[i], seen / looks,
+                     due / looks, told / looks);
         forget(&model);
     }
 }

@@ -1,5 +1,5 @@
-/* Samples are drawn in proportion to area, at every height and not twice so; of the size that Theorem 1 of Klein et al. (2005) asks
- * for; and a triangle lies in the smallest cell that holds it. */
+/* Samples are drawn in proportion to area, at every height and not twice so; of the size that Theorem 1 of Klein et al.
+ * (2005) asks for; and a triangle lies in the smallest cell that holds it. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -15,9 +15,9 @@
 
 #define CLASSES 3u
 #define HEIGHTS 4u
-#define DEEPEST 3u /* of the cells that are sampled from leaves */
-#define CELLS 512u /* 8^DEEPEST */
-#define SHIFT 9u   /* lattice coordinates: 30 bits */
+#define DEEPEST 3u                 /* of the cells that are sampled from leaves */
+#define CELLS 512u                 /* 8^DEEPEST */
+#define SHIFT 9u                   /* lattice coordinates: 30 bits */
 #define COUPONS 13.815510557964274 /* of a probability of 1 - 1e-6: -ln(-ln P) */
 #define ROUNDS 6u
 
@@ -37,10 +37,10 @@ static double random_unit(uint64_t *state)
 /* ---- foliage: few large leaves, many small ones, anywhere in 8^3 cells */
 
 typedef struct foliage {
-    uint32_t each[CLASSES];  /* triangles of a class in one cell */
-    double edge[CLASSES];    /* shares of the cell's side */
+    uint32_t each[CLASSES]; /* triangles of a class in one cell */
+    double edge[CLASSES];   /* shares of the cell's side */
     uint32_t count;
-    uint8_t *kind;           /* [count] in the order of the octree */
+    uint8_t *kind; /* [count] in the order of the octree */
     strl_octree octree;
     uint32_t root;
 } foliage;
@@ -136,10 +136,10 @@ static void fell(foliage *self)
 /* ---- sums over all cells of one depth */
 
 typedef struct tally {
-    double draws;              /* that the cells of the depth should make */
-    double drawn[CLASSES];     /* times that a triangle of the class was drawn */
-    double stored[CLASSES];    /* triangles in the samples: stored there or above */
-    double expected[CLASSES];  /* of drawn: draws by share of area */
+    double draws;             /* that the cells of the depth should make */
+    double drawn[CLASSES];    /* times that a triangle of the class was drawn */
+    double stored[CLASSES];   /* triangles in the samples: stored there or above */
+    double expected[CLASSES]; /* of drawn: draws by share of area */
 } tally;
 
 /* As the text has it: q ln q + c q, q rounded up. */
@@ -206,8 +206,8 @@ static void tally_foliage(foliage *self, bool dense, tally t[HEIGHTS])
     }
 }
 
-/* Draws of one depth come from those of the next, so what they deviate by adds up: the variance of a share p is p (1 - p) times the sum of
- * 1 / draws over the depths. Five deviations: one false alarm in some million. */
+/* Draws of one depth come from those of the next, so what they deviate by adds up: the variance of a share p is p (1 -
+ * p) times the sum of 1 / draws over the depths. Five deviations: one false alarm in some million. */
 static double five_deviations(const tally *t, uint32_t depth, double share)
 {
     double sum = 0;
@@ -216,8 +216,8 @@ static double five_deviations(const tally *t, uint32_t depth, double share)
     return 5 * sqrt(share * (1 - share) * sum);
 }
 
-/* Areas are as 1 to 9 to 81, numbers as 27 to 9 to 1: of what is drawn a fifth, a fifth and three fifths are due. Were area counted once more
- * on the way up, small ones would be gone at the root. */
+/* Areas are as 1 to 9 to 81, numbers as 27 to 9 to 1: of what is drawn a fifth, a fifth and three fifths are due. Were
+ * area counted once more on the way up, small ones would be gone at the root. */
 static void triangles_are_drawn_by_area_at_every_height(void **state)
 {
     (void)state;
@@ -231,14 +231,16 @@ static void triangles_are_drawn_by_area_at_every_height(void **state)
             for (uint32_t k = 0; k < CLASSES; k++) {
                 double found = t[depth].drawn[k] / drawn, wanted = t[depth].expected[k] / t[depth].draws;
                 if (!(fabs(found - wanted) <= five_deviations(t, depth, wanted)))
-                    fail_msg("depth %u: class %u has %.4f of %.0f draws, expected %.4f", depth, k, found, drawn, wanted);
+                    fail_msg("depth %u: class %u has %.4f of %.0f draws, expected %.4f", depth, k, found, drawn,
+                             wanted);
             }
         }
     }
 }
 
-/* What is stored in a cell or above it, of those below it: with so many triangles that one is hardly ever drawn twice by one cell,
- * frequencies are as areas. Draws from the same few draws of a child fall together now and then, whatever the area: 14 of 112. */
+/* What is stored in a cell or above it, of those below it: with so many triangles that one is hardly ever drawn twice
+ * by one cell, frequencies are as areas. Draws from the same few draws of a child fall together now and then, whatever
+ * the area: 14 of 112. */
 static void frequencies_of_being_stored_are_as_areas(void **state)
 {
     (void)state;
@@ -283,8 +285,8 @@ static void children_get_their_share_of_the_draws(void **state)
         }
         fell(&self);
     }
-    assert_true(square < 90);  /* chi square of 7 * 6 degrees of freedom: above with a chance of 3e-5 */
-    assert_true(square > 15);  /* below with one of 5e-5: they are drawn, not shared out */
+    assert_true(square < 90); /* chi square of 7 * 6 degrees of freedom: above with a chance of 3e-5 */
+    assert_true(square > 15); /* below with one of 5e-5: they are drawn, not shared out */
 }
 
 /* ---- sums */
@@ -304,20 +306,25 @@ static void sums_of_a_cell_are_those_of_its_triangles(void **state)
             continue;
         for (uint32_t i = 0; i < self.count; i++) {
             const strl_soup_triangle *triangle = &self.octree.triangle[i];
-            if (self.octree.key[i] >> 3 * (STRL_OCTREE_DEPTH - octant->depth) != octant->prefix || self.octree.limit[i] < octant->depth)
+            if (self.octree.key[i] >> 3 * (STRL_OCTREE_DEPTH - octant->depth) != octant->prefix ||
+                self.octree.limit[i] < octant->depth)
                 continue;
             double own = area_of(triangle);
             area += own;
             count++;
             for (int k = 0; k < 3; k++)
-                centre[k] += own * ((double)triangle->corner[0].position[k] + triangle->corner[1].position[k] + triangle->corner[2].position[k]) / 3;
+                centre[k] += own *
+                             ((double)triangle->corner[0].position[k] + triangle->corner[1].position[k] +
+                              triangle->corner[2].position[k]) /
+                             3;
         }
         seen++;
         assert_int_equal(octant->total, count);
         assert_true(fabs(octant->sums.area - area) <= 1e-9 * area);
         for (int k = 0; k < 3; k++)
             assert_true(fabs(octant->sums.centre[k] - centre[k]) <= 1e-9 * centre[k]);
-        assert_true(fabs(octant->sums.linear[0] - area) <= 1e-5 * area && fabs(octant->sums.linear[3] - area) <= 1e-5 * area);
+        assert_true(fabs(octant->sums.linear[0] - area) <= 1e-5 * area &&
+                    fabs(octant->sums.linear[3] - area) <= 1e-5 * area);
     }
     assert_true(seen > 64);
     fell(&self);
@@ -328,7 +335,8 @@ static void sums_of_a_cell_are_those_of_its_triangles(void **state)
 static void samples_are_as_large_as_the_theorem_says(void **state)
 {
     (void)state;
-    const double probabilities[] = {0.5, 0.9, 0.99, 1 - 1e-6, 1 - 1e-12}, squares[] = {1e-6, 0.3, 0.999, 1, 1.001, 2, 3.7, 10, 100, 200};
+    const double probabilities[] = {0.5, 0.9, 0.99, 1 - 1e-6, 1 - 1e-12},
+                 squares[] = {1e-6, 0.3, 0.999, 1, 1.001, 2, 3.7, 10, 100, 200};
     strl_ingest ingest = make_ingest();
     for (size_t p = 0; p < sizeof probabilities / sizeof *probabilities; p++) {
         strl_octree octree = {.ingest = &ingest, .coupons = -log(-log(probabilities[p]))};
@@ -338,7 +346,8 @@ static void samples_are_as_large_as_the_theorem_says(void **state)
                 double wanted = q * log(q) + octree.coupons * q;
                 uint32_t found = strl_octree_draws(&octree, depth, squares[s] * side * side);
                 if (!(found >= wanted - 1e-6 && found < wanted + 2))
-                    fail_msg("%g squares, probability %g: %u draws, expected %g", squares[s], probabilities[p], found, wanted);
+                    fail_msg("%g squares, probability %g: %u draws, expected %g", squares[s], probabilities[p], found,
+                             wanted);
             }
     }
 }
@@ -414,7 +423,8 @@ static strl_soup_triangle triangle_at(const double centre[3], double size, uint6
     const double most = ldexp(1, (int)(SHIFT + STRL_OCTREE_DEPTH)) - 1;
     for (int c = 0; c < 3; c++)
         for (int k = 0; k < 3; k++)
-            triangle.corner[c].position[k] = (uint32_t)fmin(fmax(centre[k] + size * (random_unit(random) - 0.5), 0), most);
+            triangle.corner[c].position[k] =
+                (uint32_t)fmin(fmax(centre[k] + size * (random_unit(random) - 0.5), 0), most);
     return triangle;
 }
 
@@ -444,7 +454,8 @@ static void small_triangles_on_borders_do_not_rise(void **state)
     for (uint32_t i = 0; i < 20000; i++) {
         double centre[3], cells = ldexp(1, 1 + (int)(i % 6)), size = all * exp2(-6 - 12 * random_unit(&random));
         for (int k = 0; k < 3; k++)
-            centre[k] = i & 64u << k ? all * random_unit(&random) : all / cells * ceil((cells - 1) * random_unit(&random));
+            centre[k] =
+                i & 64u << k ? all * random_unit(&random) : all / cells * ceil((cells - 1) * random_unit(&random));
         strl_soup_triangle triangle = triangle_at(centre, size, &random);
         if (longest_edge(&triangle) == 0)
             continue;

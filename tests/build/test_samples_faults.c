@@ -1,5 +1,5 @@
-/* A build of samples that cannot go on fails with one sentence and leaves its folder as it was: whatever allocation, read or write
- * it is, and whoever says no. */
+/* A build of samples that cannot go on fails with one sentence and leaves its folder as it was: whatever allocation,
+ * read or write it is, and whoever says no. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -56,7 +56,8 @@ static void assert_failed_cleanly(const strl_error *err, strl_status status, str
         err->message[strlen(err->message) - 1] == '.')
         fail_msg("failure %llu: %s (%s)", (unsigned long long)number, err->message, strl_status_name(status));
     if (built_files_left() != 2)
-        fail_msg("failure %llu (%s) left %u files, not 2", (unsigned long long)number, err->message, built_files_left());
+        fail_msg("failure %llu (%s) left %u files, not 2", (unsigned long long)number, err->message,
+                 built_files_left());
     size_t size;
     uint8_t *bytes = built_read_file(built_path("out.stroll"), &size);
     assert_int_equal(size, sizeof OLDER - 1);
@@ -64,7 +65,8 @@ static void assert_failed_cleanly(const strl_error *err, strl_status status, str
     free(bytes);
 }
 
-/* A surface and some triangles that are too large for its pieces; and an older output: two files before, two after each failure. */
+/* A surface and some triangles that are too large for its pieces; and an older output: two files before, two after each
+ * failure. */
 static void make_input(mesh_file *mesh)
 {
     *mesh = (mesh_file){0};

@@ -146,7 +146,8 @@ static void seams_have_parents_of_their_own_palette(void **state)
             }
 }
 
-/* The new surface and the start lie in one box, so no claim needs to pass its diagonal; and what is claimed there is true. */
+/* The new surface and the start lie in one box, so no claim needs to pass its diagonal; and what is claimed there is
+ * true. */
 static void no_claim_passes_the_diagonal_that_is_given(void **state)
 {
     (void)state;
@@ -165,7 +166,8 @@ static void no_claim_passes_the_diagonal_that_is_given(void **state)
         }
         r.mesh.most_error = nextafterf((float)sqrt(squared), INFINITY);
         run_simplify(&r);
-        assert_true(r.result.geometric <= r.mesh.most_error * 1.00001f && r.result.appearance <= r.mesh.most_error * 1.00001f);
+        assert_true(r.result.geometric <= r.mesh.most_error * 1.00001f &&
+                    r.result.appearance <= r.mesh.most_error * 1.00001f);
         stopped += r.result.geometric >= r.mesh.most_error || r.result.appearance >= r.mesh.most_error;
         run_check_order(&r);
         run_measure(&r);
@@ -183,7 +185,8 @@ static void the_limits_that_are_asked_for_hold(void **state)
         r.desc.target_triangles = r.mesh.triangle_count / 2;
         run_simplify(&r);
         assert_true(r.result.triangles_left <= r.desc.target_triangles);
-        if (r.result.collapse_count > 1 && r.result.geometric > 0) /* and no farther than that, but for what costs nothing */
+        /* and no farther than that, but for what costs nothing */
+        if (r.result.collapse_count > 1 && r.result.geometric > 0)
             assert_true(r.result.collapses[r.result.collapse_count - 2].triangles_left > r.desc.target_triangles);
         run_end(&r);
         run_begin(&r, kind, 6, STRL_SIMPLIFY_CLUSTERING);

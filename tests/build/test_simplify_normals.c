@@ -394,7 +394,8 @@ static void add_plate_quad(strl_mesh *mesh, int direction, uint32_t a, uint32_t 
                              (float)((direction == 5) - (direction == 4))};
     for (int i = 0; i < 6; i++) {
         uint32_t w = 0;
-        while (w < mesh->wedge_count && (mesh->wedge[w].point != corner[i] || mesh->wedge[w].palette != (uint32_t)direction))
+        while (w < mesh->wedge_count &&
+               (mesh->wedge[w].point != corner[i] || mesh->wedge[w].palette != (uint32_t)direction))
             w++;
         if (w == mesh->wedge_count) {
             mesh->wedge[w] = (strl_wedge){.point = corner[i], .colour = 0xffffffffu, .palette = (uint32_t)direction};
@@ -409,7 +410,8 @@ static void add_plate_quad(strl_mesh *mesh, int direction, uint32_t a, uint32_t 
 static void make_plate(strl_mesh *mesh, uint64_t seed, strl_arena *arena)
 {
     const int n = PLATE_CELLS;
-    uint32_t points = 2 * (PLATE_CELLS + 1) * (PLATE_CELLS + 1), triangles = 4 * PLATE_CELLS * PLATE_CELLS + 8 * PLATE_CELLS;
+    uint32_t points = 2 * (PLATE_CELLS + 1) * (PLATE_CELLS + 1),
+             triangles = 4 * PLATE_CELLS * PLATE_CELLS + 8 * PLATE_CELLS;
     (void)seed;
     assert_true(strl_mesh_create(mesh, points, 3 * triangles, triangles, arena));
     mesh->wedge_count = mesh->triangle_count = 0;
@@ -421,13 +423,19 @@ static void make_plate(strl_mesh *mesh, uint64_t seed, strl_arena *arena)
             }
     for (int i = 0; i < n; i++) {
         for (int j = 0; j < n; j++) {
-            add_plate_quad(mesh, 5, plate_point(i, j, 1), plate_point(i + 1, j, 1), plate_point(i + 1, j + 1, 1), plate_point(i, j + 1, 1));
-            add_plate_quad(mesh, 4, plate_point(i, j, 0), plate_point(i, j + 1, 0), plate_point(i + 1, j + 1, 0), plate_point(i + 1, j, 0));
+            add_plate_quad(mesh, 5, plate_point(i, j, 1), plate_point(i + 1, j, 1), plate_point(i + 1, j + 1, 1),
+                           plate_point(i, j + 1, 1));
+            add_plate_quad(mesh, 4, plate_point(i, j, 0), plate_point(i, j + 1, 0), plate_point(i + 1, j + 1, 0),
+                           plate_point(i + 1, j, 0));
         }
-        add_plate_quad(mesh, 2, plate_point(i, 0, 0), plate_point(i + 1, 0, 0), plate_point(i + 1, 0, 1), plate_point(i, 0, 1));
-        add_plate_quad(mesh, 3, plate_point(i, n, 0), plate_point(i, n, 1), plate_point(i + 1, n, 1), plate_point(i + 1, n, 0));
-        add_plate_quad(mesh, 0, plate_point(0, i, 0), plate_point(0, i, 1), plate_point(0, i + 1, 1), plate_point(0, i + 1, 0));
-        add_plate_quad(mesh, 1, plate_point(n, i, 0), plate_point(n, i + 1, 0), plate_point(n, i + 1, 1), plate_point(n, i, 1));
+        add_plate_quad(mesh, 2, plate_point(i, 0, 0), plate_point(i + 1, 0, 0), plate_point(i + 1, 0, 1),
+                       plate_point(i, 0, 1));
+        add_plate_quad(mesh, 3, plate_point(i, n, 0), plate_point(i, n, 1), plate_point(i + 1, n, 1),
+                       plate_point(i + 1, n, 0));
+        add_plate_quad(mesh, 0, plate_point(0, i, 0), plate_point(0, i, 1), plate_point(0, i + 1, 1),
+                       plate_point(0, i + 1, 0));
+        add_plate_quad(mesh, 1, plate_point(n, i, 0), plate_point(n, i + 1, 0), plate_point(n, i + 1, 1),
+                       plate_point(n, i, 1));
     }
     for (uint32_t w = 0; w < mesh->wedge_count; w++)
         mesh->wedge[w].palette = 0;
@@ -475,7 +483,7 @@ static void a_plate_that_gets_thin_is_shaded_as_it_lies(void **state)
         run_simplify(&r);
         run_check_order(&r);
         run_check_wedges(&r);
-        assert_true(r.result.triangles_left < 12);               /* not even a box is left: the strips have gone, */
+        assert_true(r.result.triangles_left < 12);              /* not even a box is left: the strips have gone, */
         assert_true(r.result.wedge_count > r.mesh.wedge_count); /* and what they joined did not become one */
         for (uint32_t i = 0; i <= 64; i++)
             assert_true(check_faces(&r, (uint32_t)((uint64_t)r.result.collapse_count * i / 64)) >= 4);

@@ -189,7 +189,8 @@ static inline strl_tree fixture_tree(uint32_t node_count)
 /* Copy i of the tree: here and there, turned and mirrored. */
 static inline strl_placement fixture_copy(uint32_t i)
 {
-    return (strl_placement){.transform = {i % 2 ? 1 : -1, 0, 0, 5 + 100. * (i % 16), 0, 0, -1, 0.5 * i, 0, 1 + i % 3, 0, i}};
+    return (strl_placement){
+        .transform = {i % 2 ? 1 : -1, 0, 0, 5 + 100. * (i % 16), 0, 0, -1, 0.5 * i, 0, 1 + i % 3, 0, i}};
 }
 
 /* The mesh of node 0 as a reader will have it, by which others are told. */
@@ -325,12 +326,15 @@ static inline strl_status fixture_read_runs(strl_container *container, uint64_t 
              status == STRL_OK && i < info->placement_count && i / STRL_RUN_PLACEMENTS == run; i++) {
             strl_placement placement;
             status = strl_run_placement(container, i, page, &placement, err);
-            *digest = strl__mix64(*digest ^ strl__checksum(placement.transform, sizeof placement.transform) ^ placement.tree);
+            *digest =
+                strl__mix64(*digest ^ strl__checksum(placement.transform, sizeof placement.transform) ^ placement.tree);
         }
         free(page);
-        *digest = strl__mix64(*digest ^ strl__checksum(facts.box_min, sizeof facts.box_min) ^ facts.far.rgba ^ facts.far.normal[0]);
+        *digest = strl__mix64(*digest ^ strl__checksum(facts.box_min, sizeof facts.box_min) ^ facts.far.rgba ^
+                              facts.far.normal[0]);
         *digest = strl__mix64(*digest ^ facts.far.spread);
-        *digest = strl__mix64(*digest ^ strl__checksum(facts.box_max, sizeof facts.box_max) ^ (uint64_t)(facts.far.area * 4));
+        *digest =
+            strl__mix64(*digest ^ strl__checksum(facts.box_max, sizeof facts.box_max) ^ (uint64_t)(facts.far.area * 4));
     }
     return status;
 }

@@ -1,5 +1,5 @@
-/* Makes a damaged container's checksums right again, from the leaves up to the header, so that tests and fuzzers reach the
- * checks behind the checksums. Walks hostile bytes itself: every range is checked, and the work is bounded. */
+/* Makes a damaged container's checksums right again, from the leaves up to the header, so that tests and fuzzers reach
+ * the checks behind the checksums. Walks hostile bytes itself: every range is checked, and the work is bounded. */
 #ifndef STRL_TESTS_CONTAINER_RESEAL_H
 #define STRL_TESTS_CONTAINER_RESEAL_H
 

@@ -421,7 +421,8 @@ static void a_million_names_take_no_memory(void **state)
     }
     for (uint32_t i = 0; i < FIXTURE_PARTS; i++)
         assert_ok(strl_container_part(container, i, name, sizeof name, &err), &err);
-    for (uint32_t i = 0, at = 1; i < 300; i++, at = at * 1664525u + 1013904223u) { /* in any order, though each is told by others */
+    /* in any order, though each is told by others */
+    for (uint32_t i = 0, at = 1; i < 300; i++, at = at * 1664525u + 1013904223u) {
         uint32_t part = FIXTURE_PARTS + at % (1000000 - FIXTURE_PARTS);
         snprintf(expected, sizeof expected, "assembly/bolt number %u", part);
         assert_ok(strl_container_part(container, part, name, sizeof name, &err), &err);

@@ -142,10 +142,12 @@ static void images_come_back_as_they_were_written(void **state)
     fixture self;
     strl_error err = {0};
     char reference[40], sentence[480];
-    const strl_material_image images[FIXTURE_MATERIALS] = {
-        {.reference = "textures/wall \xc3\xa4.png", .wrap = {STRL_WRAP_CLAMP, STRL_WRAP_MIRROR}, .texcoord_min = {-2, 0.5f}, .texcoord_extent = {7, 0}},
-        {.reference = NULL},
-        {.reference = "", .texcoord_extent = {1e6f, 1}}};
+    const strl_material_image images[FIXTURE_MATERIALS] = {{.reference = "textures/wall \xc3\xa4.png",
+                                                            .wrap = {STRL_WRAP_CLAMP, STRL_WRAP_MIRROR},
+                                                            .texcoord_min = {-2, 0.5f},
+                                                            .texcoord_extent = {7, 0}},
+                                                           {.reference = NULL},
+                                                           {.reference = "", .texcoord_extent = {1e6f, 1}}};
     fixture_setup(&self, 3, 2);
     assert_int_equal(write_images(&self, images, FIXTURE_MATERIALS, &err), STRL_OK);
     verify_tables(&self, sentence);
@@ -154,12 +156,14 @@ static void images_come_back_as_they_were_written(void **state)
     assert_true(strl_container_get_info(container)->has_images);
     for (uint32_t i = 0; i < FIXTURE_MATERIALS; i++) {
         strl_material_image image;
-        assert_int_equal(strl_container_material_image(container, i, reference, sizeof reference, &image, &err), STRL_OK);
+        assert_int_equal(strl_container_material_image(container, i, reference, sizeof reference, &image, &err),
+                         STRL_OK);
         assert_int_equal(image.reference != NULL, images[i].reference != NULL);
         assert_string_equal(reference, images[i].reference ? images[i].reference : "");
         for (int k = 0; k < 2; k++) {
             assert_int_equal(image.wrap[k], images[i].wrap[k]);
-            assert_true(image.texcoord_min[k] == images[i].texcoord_min[k] && image.texcoord_extent[k] == images[i].texcoord_extent[k]);
+            assert_true(image.texcoord_min[k] == images[i].texcoord_min[k] &&
+                        image.texcoord_extent[k] == images[i].texcoord_extent[k]);
         }
     }
     strl_container_close(container);
@@ -182,8 +186,10 @@ static void images_that_the_format_forbids_are_refused_by_both_readers(void **st
         fixture_setup(&self, 2, 2);
         assert_int_equal(write_images(&self, images, FIXTURE_MATERIALS, &err), STRL_OK);
         strl_container *container = must_open(&self);
-        assert_int_equal(strl_container_material_image(container, 0, reference, sizeof reference, &image, &err), STRL_OK);
-        assert_int_equal(strl_container_material_image(container, 1, reference, sizeof reference, &image, &err), STRL_ERR_FORMAT);
+        assert_int_equal(strl_container_material_image(container, 0, reference, sizeof reference, &image, &err),
+                         STRL_OK);
+        assert_int_equal(strl_container_material_image(container, 1, reference, sizeof reference, &image, &err),
+                         STRL_ERR_FORMAT);
         assert_null(image.reference);
         assert_non_null(strstr(err.message, "images"));
         verify_tables(&self, sentence);

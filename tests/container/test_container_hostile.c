@@ -1,6 +1,6 @@
-/* Containers that are cut, damaged or lie: each is refused with a sentence, none makes the reader crash, hang or take memory
- * that the file does not pay for. The committed files are in golden/; STRL_UPDATE_GOLDEN=1 writes them anew, which only a change
- * of the format justifies: look at what has changed before committing it. */
+/* Containers that are cut, damaged or lie: each is refused with a sentence, none makes the reader crash, hang or take
+ * memory that the file does not pay for. The committed files are in golden/; STRL_UPDATE_GOLDEN=1 writes them anew,
+ * which only a change of the format justifies: look at what has changed before committing it. */
 #include "fixture.h"
 
 #include <inttypes.h>
@@ -238,8 +238,8 @@ static const damage damages[] = {
 };
 #define DAMAGES (sizeof damages / sizeof *damages)
 
-/* The same of v1-runs.stroll; these are made when they are needed. RUNS: the table's leaf, of two items that end at 8 and lie from 12
- * on; RUN_PAGE: the first page of placements, of 512 items that lie from 2052 on. */
+/* The same of v1-runs.stroll; these are made when they are needed. RUNS: the table's leaf, of two items that end at 8
+ * and lie from 12 on; RUN_PAGE: the first page of placements, of 512 items that lie from 2052 on. */
 static const damage run_damages[] = {
     {"runs of too few placements", HEADER, STRL__AT_SECTIONS + STRL__SECTION_BYTES + 8, 8, 512},
     {"runs too few", HEADER, STRL__AT_SECTIONS + 4 * STRL__SECTION_BYTES + 8, 8, 1},

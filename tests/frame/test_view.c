@@ -17,7 +17,8 @@ static double uniform(uint64_t *seed)
 
 static strl_camera a_camera(void)
 {
-    strl_camera camera = {.eye = {0, 0, 0}, .target = {0, 0, -1}, .up = {0, 1, 0}, .fov_y_deg = 60, .width = 1280, .height = 720};
+    strl_camera camera = {
+        .eye = {0, 0, 0}, .target = {0, 0, -1}, .up = {0, 1, 0}, .fov_y_deg = 60, .width = 1280, .height = 720};
     return camera;
 }
 
@@ -140,7 +141,8 @@ static void no_displacement_by_the_error_moves_a_point_further_than_the_bound(vo
         if (!strl_view_init(&view, &camera))
             continue;
         double at[3], moved[3], way[3], px[2], moved_px[2], z, length, norm = 0;
-        double x = (2 * uniform(&seed) - 1) * view.tan_x, y = (2 * uniform(&seed) - 1) * view.tan_y, distance = 1 + uniform(&seed);
+        double x = (2 * uniform(&seed) - 1) * view.tan_x, y = (2 * uniform(&seed) - 1) * view.tan_y,
+               distance = 1 + uniform(&seed);
         double error = 0.3 * uniform(&seed);
         for (int i = 0; i < 3; i++)
             way[i] = uniform(&seed) - 0.5, norm += way[i] * way[i];
@@ -231,7 +233,8 @@ static void a_box_round_the_eye_is_infinite_and_one_outside_the_image_is_zero(vo
     assert_true(strl_view_init(&view, &camera));
     const double half[3] = {1, 1, 1};
     strl_box around = box_round((const double[3]){0, 0, 0}, half), behind = box_round((const double[3]){0, 0, 5}, half);
-    strl_box beside = box_round((const double[3]){100, 0, -5}, half), near = box_round((const double[3]){0, 0, -2}, half);
+    strl_box beside = box_round((const double[3]){100, 0, -5}, half),
+             near = box_round((const double[3]){0, 0, -2}, half);
     assert_true(strl_view_error_px(&view, &around, 1e-6) == INFINITY);
     assert_true(strl_view_error_px(&view, &behind, 1) == 0 && !strl_view_sees(&view, &behind));
     assert_true(strl_view_error_px(&view, &beside, 1) == 0 && !strl_view_sees(&view, &beside));
@@ -261,7 +264,8 @@ static void an_orthographic_error_does_not_depend_on_the_distance(void **state)
     strl_view view;
     assert_true(strl_view_init(&view, &camera));
     const double half[3] = {1, 1, 1};
-    strl_box box = box_round((const double[3]){0, 0, -50}, half), outside = box_round((const double[3]){0, 7, -50}, half);
+    strl_box box = box_round((const double[3]){0, 0, -50}, half),
+             outside = box_round((const double[3]){0, 7, -50}, half);
     assert_true(fabs(strl_view_error_px(&view, &box, 0.25) - 0.25 * 72) < 1e-9);
     assert_true(strl_view_error_px(&view, &outside, 0.25) == 0);
     double least, largest;

@@ -79,7 +79,8 @@ static void a_cone_holds_what_it_is_made_of(void **state)
         double least = asin(fmin(1, 2 / sqrt(3) * sin(fmin(widest, M_PI) / 2)));
         if (cone.cosine > 0) {
             if (!(half_angle(&cone) <= 0.01 + 1.1 * least))
-                fail_msg("%zu normals up to %g apart have a cone of %g, %g is possible", count, widest, half_angle(&cone), least);
+                fail_msg("%zu normals up to %g apart have a cone of %g, %g is possible", count, widest,
+                         half_angle(&cone), least);
             cones++;
         } else {
             assert_true(widest > M_PI / 2);
@@ -117,7 +118,8 @@ static void joined_cones_hold_both(void **state)
         nested += both.cosine == part[0].cosine || both.cosine == part[1].cosine;
         /* Any direction of either, not only those it was made of. */
         for (int p = 0; p < 2; p++) {
-            double of[3] = {part[p].axis[0], part[p].axis[1], part[p].axis[2]}, length = sqrt(of[0] * of[0] + of[1] * of[1] + of[2] * of[2]);
+            double of[3] = {part[p].axis[0], part[p].axis[1], part[p].axis[2]},
+                   length = sqrt(of[0] * of[0] + of[1] * of[1] + of[2] * of[2]);
             for (int k = 0; k < 3; k++)
                 of[k] /= length;
             for (int i = 0; i < 64; i++) {

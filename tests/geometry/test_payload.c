@@ -401,7 +401,8 @@ static strl_payload_reference reference_for(const strl_pm *pm, int32_t shift, st
     memcpy(mesh.normal, pm->normal, last * sizeof *mesh.normal);
     for (uint32_t v = 0; v < mesh.vertex_count; v++)
         for (int32_t k = 0; k < 3; k++)
-            mesh.position[v][k] = (int32_t)((v < last ? (uint32_t)pm->position[v][k] : v * 7u + (uint32_t)k * v) - (uint32_t)shift);
+            mesh.position[v][k] =
+                (int32_t)((v < last ? (uint32_t)pm->position[v][k] : v * 7u + (uint32_t)k * v) - (uint32_t)shift);
     mesh.triangle[mesh.triangle_count][0] = (uint16_t)last;
     mesh.triangle[mesh.triangle_count][1] = (uint16_t)(last + 1);
     mesh.triangle[mesh.triangle_count++][2] = (uint16_t)(last + 2);
@@ -439,7 +440,8 @@ static void what_another_mesh_has_is_copied_from_it(void **state)
             strl_writer alone = {0}, told = {0};
             strl_arena_init(&arena, 0);
             struct test_mesh mesh = meshes[m].make(&arena);
-            struct test_pm_desc desc = {.seed = 5 * m + round, .keep = mesh.vertex_count / 2, .virtual_percent = round * 20};
+            struct test_pm_desc desc = {
+                .seed = 5 * m + round, .keep = mesh.vertex_count / 2, .virtual_percent = round * 20};
             test_pm_make(&mesh, &desc, &arena, &pm);
             for (uint32_t v = 0; v < pm.vertex_count && round; v++) /* as few bits as they may have */
                 for (unsigned k = 0; k < 2; k++)
@@ -450,7 +452,8 @@ static void what_another_mesh_has_is_copied_from_it(void **state)
             encode(&pm, &alone);
             assert_int_equal(strl_payload_encode(&pm, &reference, &arena, &told, &order, &err), STRL_OK);
             assert_true(m != 0 || told.size < alone.size * 3 / 4);
-            if (strl_payload_decode(told.data, told.size, &reference, &arena, &decoded, &err) || strl_pm_check(&decoded, &err))
+            if (strl_payload_decode(told.data, told.size, &reference, &arena, &decoded, &err) ||
+                strl_pm_check(&decoded, &err))
                 fail_msg("%s: %s", meshes[m].name, err.message);
             assert_same_states(&pm, &decoded);
             assert_order(&pm, &decoded, &order);
@@ -573,9 +576,13 @@ static void random_streams_are_refused_or_give_a_sound_mesh(void **state)
         strl_writer_u32(&writer, base_triangles);
         for (unsigned id = 0; id < STRL__STREAM_COUNT; id++)
             for (unsigned i = 0; i < 100; i++)
-                strl__push(&out, id, test_below(&random, 1 + test_below(&random, id < 6 ? 6 : id >= STRL__STREAM_SELECT ? 3 : 12)));
+                strl__push(&out, id,
+                           test_below(&random, 1 + test_below(&random, id < 6                      ? 6
+                                                                       : id >= STRL__STREAM_SELECT ? 3
+                                                                                                   : 12)));
         strl_error err = {0};
-        assert_int_equal(strl__streams_write(&out, strl__stream_count(false), 0, vertices + triangles + 1, &writer, &err), STRL_OK);
+        assert_int_equal(
+            strl__streams_write(&out, strl__stream_count(false), 0, vertices + triangles + 1, &writer, &err), STRL_OK);
         decode_and_check(writer.data, writer.size, round % 2 ? &reference : NULL);
         strl__streams_deinit(&out);
         strl__free(writer.data);

@@ -142,7 +142,8 @@ static void a_file_size_limit_of_the_system_is_a_failure(void **state)
     static const char block[8192];
     strl_file *file = must_create("limited");
     setrlimit(RLIMIT_FSIZE, &tight);
-    strl_status status = strl_file_write(file, 0, block, sizeof block, NULL); /* half of it fits: a short write first */
+    /* half of it fits: a short write first */
+    strl_status status = strl_file_write(file, 0, block, sizeof block, NULL);
     setrlimit(RLIMIT_FSIZE, &before);
     assert_int_equal(status, STRL_ERR_LIMIT);
     assert_int_equal(strl_file_bytes(file), 4096);

@@ -54,9 +54,9 @@ static strl_folder *make_tree(bool watched)
 
 static void remove_tree(strl_folder *folder)
 {
-    static const char *const names[] = {"served/a", "served/sub/b", "outside/secret", "served/inner", "served/sub/up",
-                                        "served/way", "served/leak", "served/door", "served/absolute", "served/magic",
-                                        "served/loop", "served/pipe"};
+    static const char *const names[] = {"served/a",        "served/sub/b", "outside/secret", "served/inner",
+                                        "served/sub/up",   "served/way",   "served/leak",    "served/door",
+                                        "served/absolute", "served/magic", "served/loop",    "served/pipe"};
     strl_folder_close(folder);
     for (size_t i = 0; i < sizeof names / sizeof *names; i++)
         unlink(strl_test_path(names[i]));
@@ -89,8 +89,28 @@ static void expect(strl_folder *folder, const char *name, const char *content)
 static void expect_all(strl_folder *folder, bool links)
 {
     static const char *const refused[] = {
-        "", ".", "..", "/", "/etc/passwd", "../outside/secret", "sub/../a", "sub/../../outside/secret", "./a", "sub/./b",
-        "sub//b", "a/", "sub/", "sub", "missing", "a/b", "leak", "door/secret", "absolute", "magic", "loop", "pipe",
+        "",
+        ".",
+        "..",
+        "/",
+        "/etc/passwd",
+        "../outside/secret",
+        "sub/../a",
+        "sub/../../outside/secret",
+        "./a",
+        "sub/./b",
+        "sub//b",
+        "a/",
+        "sub/",
+        "sub",
+        "missing",
+        "a/b",
+        "leak",
+        "door/secret",
+        "absolute",
+        "magic",
+        "loop",
+        "pipe",
         "sub/up/../../outside/secret",
     };
     char *long_name = calloc(5001, 1);
@@ -113,7 +133,8 @@ static void no_name_leads_out_where_the_kernel_watches(void **state)
     strl_folder *folder = make_tree(true);
     strl_error err;
     strl_file *file;
-    bool links = strl_folder_open_file(folder, "inner", &file, &err) == STRL_FOUND; /* Linux before 5.6 has no such call */
+    /* Linux before 5.6 has no such call */
+    bool links = strl_folder_open_file(folder, "inner", &file, &err) == STRL_FOUND;
     strl_file_close(file, NULL);
     expect_all(folder, links);
     remove_tree(folder);

@@ -5,8 +5,8 @@
  *                                                              filtered, then packed as attributes
  *   pack_mesh draco edgebreaker|sequential FACES COLOURS [EXTRA]   corners: 3 floats of position, 3 of normal, and with
  *                                                              COLOURS = 1 four bytes of colour; the number of points
- *                                                              goes to standard error. EXTRA attributes of 16 shorts, all 0, are
- *                                                              added */
+ *                                                              goes to standard error. EXTRA attributes of 16 shorts,
+ * all 0, are added */
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>

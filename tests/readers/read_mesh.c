@@ -39,9 +39,9 @@ static json_t *show(const strl_triangle *t)
         json_array_append_new(colours, json_integer(t->colour[i]));
     for (unsigned i = 0; i < 6 && t->flags & STRL_TRIANGLE_HAS_TEXCOORD; i++)
         json_array_append_new(texcoords, json_real((double)t->texcoord[i / 2][i % 2]));
-    return json_pack("{s:o,s:o,s:o,s:o,s:I,s:I,s:I}", "positions", positions, "normals", normals,
-                     "colours", colours, "texcoords", texcoords, "part", (json_int_t)t->part, "material",
-                     (json_int_t)t->material, "flags", (json_int_t)t->flags);
+    return json_pack("{s:o,s:o,s:o,s:o,s:I,s:I,s:I}", "positions", positions, "normals", normals, "colours", colours,
+                     "texcoords", texcoords, "part", (json_int_t)t->part, "material", (json_int_t)t->material, "flags",
+                     (json_int_t)t->flags);
 }
 
 static strl_status read_pass(strl_reader *reader, pass_result *pass, strl_error *err)
@@ -81,10 +81,11 @@ static strl_status add_pieces(strl_reader *reader, json_t *result, strl_error *e
         if (!status)
             status = read_pass(reader, &pass, err);
         snprintf(hash, sizeof hash, "%016" PRIx64, pass.hash);
-        json_array_append_new(pieces, json_pack("{s:I,s:I,s:b,s:I,s:s,s:I,s:I}", "announced", (json_int_t)facts.triangles, "placements",
-                                                (json_int_t)facts.placements, "empty", (int)facts.is_empty, "count",
-                                                (json_int_t)pass.count, "hash", hash, "lines", (json_int_t)pass.drops.lines, "points",
-                                                (json_int_t)pass.drops.points));
+        json_array_append_new(pieces,
+                              json_pack("{s:I,s:I,s:b,s:I,s:s,s:I,s:I}", "announced", (json_int_t)facts.triangles,
+                                        "placements", (json_int_t)facts.placements, "empty", (int)facts.is_empty,
+                                        "count", (json_int_t)pass.count, "hash", hash, "lines",
+                                        (json_int_t)pass.drops.lines, "points", (json_int_t)pass.drops.points));
     }
     if (!status)
         status = strl_reader_begin_placements(reader, err);
@@ -121,17 +122,15 @@ static json_t *describe(const strl_reader *reader, const pass_result *pass)
         json_array_append_new(materials, json_pack("[s,I]", name, (json_int_t)rgba));
     }
     snprintf(hash, sizeof hash, "%016" PRIx64, pass->hash);
-    return json_pack("{s:s,s:s,s:i,s:I,s:b,s:I,s:I,s:I,s:I,s:s,s:I,s:I,s:I,s:I,s:o,s:o,s:O,s:I,s:s}",
-                     "format", info.format, "unit", info.default_unit ? info.default_unit : "",
-                     "up", (int)info.default_up, "hint", (json_int_t)info.triangles_hint, "exact",
-                     (int)info.hint_is_exact, "bytes", (json_int_t)info.file_bytes, "bytes_done",
-                     (json_int_t)strl_reader_bytes_done(reader), "vertices",
-                     (json_int_t)strl_reader_vertex_count(reader), "count", (json_int_t)pass->count,
-                     "hash", hash, "nonfinite", (json_int_t)pass->drops.nonfinite, "degenerate",
-                     (json_int_t)pass->drops.degenerate_faces, "lines",
-                     (json_int_t)pass->drops.lines, "points", (json_int_t)pass->drops.points,
-                     "parts", parts, "materials", materials, "triangles", pass->triangles,
-                     "missing_images", (json_int_t)strl_reader_missing_image_count(reader),
+    return json_pack("{s:s,s:s,s:i,s:I,s:b,s:I,s:I,s:I,s:I,s:s,s:I,s:I,s:I,s:I,s:o,s:o,s:O,s:I,s:s}", "format",
+                     info.format, "unit", info.default_unit ? info.default_unit : "", "up", (int)info.default_up,
+                     "hint", (json_int_t)info.triangles_hint, "exact", (int)info.hint_is_exact, "bytes",
+                     (json_int_t)info.file_bytes, "bytes_done", (json_int_t)strl_reader_bytes_done(reader), "vertices",
+                     (json_int_t)strl_reader_vertex_count(reader), "count", (json_int_t)pass->count, "hash", hash,
+                     "nonfinite", (json_int_t)pass->drops.nonfinite, "degenerate",
+                     (json_int_t)pass->drops.degenerate_faces, "lines", (json_int_t)pass->drops.lines, "points",
+                     (json_int_t)pass->drops.points, "parts", parts, "materials", materials, "triangles",
+                     pass->triangles, "missing_images", (json_int_t)strl_reader_missing_image_count(reader),
                      "missing_image", strl_reader_missing_image(reader));
 }
 

@@ -84,8 +84,7 @@ static inline void read_pass(strl_reader *reader, read_result *result)
         for (size_t i = 0; i < count && result->kept < TRIANGLES_KEPT; i++)
             result->triangles[result->kept++] = chunk[i];
         result->count += count;
-        result->checksum =
-            strl__mix64(result->checksum ^ strl__checksum(chunk, count * sizeof *chunk));
+        result->checksum = strl__mix64(result->checksum ^ strl__checksum(chunk, count * sizeof *chunk));
     }
     strl_reader_drops_get(reader, &result->drops);
 }
@@ -96,11 +95,9 @@ static inline void free_result(read_result *result)
     *result = (read_result){0};
 }
 
-static inline strl_status open_test_file(const char *name, uint64_t memory_bytes,
-                                         strl_reader **reader, strl_error *err)
+static inline strl_status open_test_file(const char *name, uint64_t memory_bytes, strl_reader **reader, strl_error *err)
 {
-    strl_reader_desc desc = {
-        .path = test_path(name), .scratch_dir = test_folder, .memory_bytes = memory_bytes};
+    strl_reader_desc desc = {.path = test_path(name), .scratch_dir = test_folder, .memory_bytes = memory_bytes};
     return strl_reader_open(&desc, reader, err);
 }
 
@@ -132,8 +129,7 @@ static inline void assert_refused(const char *name, const char *part_of_sentence
     free_result(&result);
 }
 
-static inline void assert_text_refused(const char *name, const char *text,
-                                       const char *part_of_sentence)
+static inline void assert_text_refused(const char *name, const char *text, const char *part_of_sentence)
 {
     write_test_text(name, text);
     assert_refused(name, part_of_sentence);
@@ -143,8 +139,7 @@ static inline void assert_positions(const strl_triangle *triangle, const double 
 {
     for (unsigned i = 0; i < 9; i++)
         if (triangle->position[i / 3][i % 3] != expected[i])
-            fail_msg("coordinate %u is %.17g, expected %.17g", i, triangle->position[i / 3][i % 3],
-                     expected[i]);
+            fail_msg("coordinate %u is %.17g, expected %.17g", i, triangle->position[i / 3][i % 3], expected[i]);
 }
 
 /* Every proper beginning of the file is refused or gives a beginning of its triangles. Returns how
@@ -209,8 +204,7 @@ static inline void assert_rewinds(const char *name, uint64_t memory_bytes)
     assert_int_equal(strl_reader_next(reader, &triangle, 1, &count, &err), STRL_OK);
     assert_int_equal(strl_reader_rewind(reader, &err), STRL_OK);
     read_pass(reader, &second);
-    assert_true(first.count > 0 && first.count == second.count &&
-                first.checksum == second.checksum);
+    assert_true(first.count > 0 && first.count == second.count && first.checksum == second.checksum);
     assert_memory_equal(&first.drops, &second.drops, sizeof first.drops);
     strl_reader_close(reader);
     free_result(&first);

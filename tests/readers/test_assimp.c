@@ -1,5 +1,5 @@
-/* Foreign formats: what the importer gives arrives, and whatever becomes of it is one sentence that names the file, soon,
- * with nothing left running and nothing left in scratch. The importers that misbehave are scripts. */
+/* Foreign formats: what the importer gives arrives, and whatever becomes of it is one sentence that names the file,
+ * soon, with nothing left running and nothing left in scratch. The importers that misbehave are scripts. */
 #include <dirent.h>
 #include <errno.h>
 #include <math.h>
@@ -41,8 +41,11 @@ static strl_status open_foreign(const char *name, strl_reader **reader, strl_err
     char scratch[128];
     make_scratch(scratch, sizeof scratch);
     child.importer = importer[0] ? importer : NULL;
-    strl_reader_desc desc = {
-        .path = test_path(name), .scratch_dir = scratch, .memory_bytes = MEMORY_LEAST, .whole_bytes = whole_bytes, .child = child};
+    strl_reader_desc desc = {.path = test_path(name),
+                             .scratch_dir = scratch,
+                             .memory_bytes = MEMORY_LEAST,
+                             .whole_bytes = whole_bytes,
+                             .child = child};
     return strl_reader_open(&desc, reader, err);
 }
 
@@ -122,7 +125,8 @@ static void death_is_one_sentence(void **state)
     assert_import_fails("cat stream; kill -SEGV $$", STRL_ERR_FORMAT, "was ended by signal 11");
     assert_import_fails("exit 3", STRL_ERR_FORMAT, "the program that imports it ended with status 3");
     assert_import_fails("cat stream; echo 'it has died' >&2; exit 9", STRL_ERR_FORMAT, "with status 9: it has died");
-    assert_import_fails("kill -KILL $$", STRL_ERR_MEMORY, "was ended by signal 9 (Killed): the machine's memory may have run out");
+    assert_import_fails("kill -KILL $$", STRL_ERR_MEMORY,
+                        "was ended by signal 9 (Killed): the machine's memory may have run out");
     assert_import_fails("echo terminate after throwing std::bad_alloc >&2; kill -ABRT $$", STRL_ERR_MEMORY,
                         "may be broken: convert it to PLY");
     whole_bytes = 1u << 30;
@@ -140,7 +144,8 @@ static void hanging_is_one_sentence(void **state)
     assert_import_fails("head -c 30 stream; exec >&-; exec sleep 1000", STRL_ERR_LIMIT,
                         "has closed its output but did not end within 10 s, and was stopped");
     assert_import_fails("sleep 1000 & kill -9 $$", STRL_ERR_LIMIT, "takes more than"); /* the pipe stays open */
-    /* Of processor time, unless others have so much of it that the clock comes first; test_process has that limit alone. */
+    /* Of processor time, unless others have so much of it that the clock comes first; test_process has that limit
+     * alone. */
     assert_import_fails("while :; do :; done", STRL_ERR_LIMIT, "and was stopped");
     child = (strl_reader_child){0};
     assert_true(strl_clock_ns() - start < 60000000000u);
@@ -382,7 +387,8 @@ static void collada_arrives(void **state)
     assert_true(has_part(reader, "house/a") && has_part(reader, "house/b"));
     const double moved[9] = {10, 0, 0, 11, 0, 0, 10, 1, 0}, mirrored[9] = {0, 0, 0, 0, 1, 0, -2, 0, 0};
     assert_positions(&result.triangles[0], moved);
-    assert_positions(&result.triangles[1], mirrored); /* turned over, so that it is seen from where its normal points */
+    /* turned over, so that it is seen from where its normal points */
+    assert_positions(&result.triangles[1], mirrored);
     for (int t = 0; t < 2; t++) {
         assert_int_equal(result.triangles[t].flags, STRL_TRIANGLE_HAS_NORMAL);
         assert_true(result.triangles[t].normal[1][2] == 1);
@@ -468,7 +474,8 @@ static void other_formats_arrive(void **state)
     assert_nothing_left();
 }
 
-/* One triangle from 1 2 3, which the formats take for a point of a model with z up or y up, in some unit; the last is glTF 1. */
+/* One triangle from 1 2 3, which the formats take for a point of a model with z up or y up, in some unit; the last is
+ * glTF 1. */
 static void directions_are_those_of_what_arrives(void **state)
 {
     (void)state;
@@ -478,34 +485,36 @@ static void directions_are_those_of_what_arrives(void **state)
         const char *unit;
         double first[3];
     } files[] = {
-        {"up.off",
-         "OFF\n3 1 0\n1 2 3\n2 2 3\n1 4 8\n3 0 1 2\n",
-         STRL_AXIS_Z, NULL, {1, 2, 3}},
-        {"up.raw",
-         "1 2 3 2 2 3 1 4 8\n",
-         STRL_AXIS_Z, NULL, {1, 2, 3}},
-        {"up.nff",
-         "p 3\n1 2 3\n2 2 3\n1 4 8\n",
-         STRL_AXIS_Z, NULL, {1, 4, 8}} /* from behind */,
+        {"up.off", "OFF\n3 1 0\n1 2 3\n2 2 3\n1 4 8\n3 0 1 2\n", STRL_AXIS_Z, NULL, {1, 2, 3}},
+        {"up.raw", "1 2 3 2 2 3 1 4 8\n", STRL_AXIS_Z, NULL, {1, 2, 3}},
+        {"up.nff", "p 3\n1 2 3\n2 2 3\n1 4 8\n", STRL_AXIS_Z, NULL, {1, 4, 8}} /* from behind */,
         {"up.smd",
          "version 1\nnodes\n0 \"a\" -1\nend\nskeleton\ntime 0\n0 0 0 0 0 0 0\nend\ntriangles\nm\n0 1 2 3 0 0 1"
          " 0 0\n0 2 2 3 0 0 1 0 0\n0 1 4 8 0 0 1 0 0\nend\n",
-         STRL_AXIS_Z, NULL, {1, 2, 3}},
+         STRL_AXIS_Z,
+         NULL,
+         {1, 2, 3}},
         {"up.amf",
          "<?xml version=\"1.0\"?><amf unit=\"inch\"><object id=\"1\"><mesh><vertices><vertex><coordinates><x>1"
          "</x><y>2</y><z>3</z></coordinates></vertex><vertex><coordinates><x>2</x><y>2</y><z>3</z></coordinate"
          "s></vertex><vertex><coordinates><x>1</x><y>4</y><z>8</z></coordinates></vertex></vertices><volume><t"
          "riangle><v1>0</v1><v2>1</v2><v3>2</v3></triangle></volume></mesh></object></amf>",
-         STRL_AXIS_Z, NULL, {1, 2, 3}},
+         STRL_AXIS_Z,
+         NULL,
+         {1, 2, 3}},
         {"up.ac",
          "AC3Db\nMATERIAL \"m\" rgb 1 1 1 amb 0 0 0 emis 0 0 0 spec 0 0 0 shi 0 trans 0\nOBJECT world\nkids 1"
          "\nOBJECT poly\nname \"a\"\nnumvert 3\n1 2 3\n2 2 3\n1 4 8\nnumsurf 1\nSURF 0x20\nmat 0\nrefs 3\n0 0 "
          "0\n1 0 0\n2 0 0\nkids 0\n",
-         STRL_AXIS_Y, NULL, {1, 2, 3}},
+         STRL_AXIS_Y,
+         NULL,
+         {1, 2, 3}},
         {"up.dxf",
          "0\nSECTION\n2\nENTITIES\n0\n3DFACE\n8\n0\n 10\n1\n 20\n2\n 30\n3\n 11\n2\n 21\n2\n 31\n3\n 12\n1\n 2"
          "2\n4\n 32\n8\n 13\n1\n 23\n4\n 33\n8\n0\nENDSEC\n0\nEOF\n",
-         STRL_AXIS_Y, NULL, {1, 3, -2}},
+         STRL_AXIS_Y,
+         NULL,
+         {1, 3, -2}},
         {"up.dae",
          "<?xml version=\"1.0\"?><COLLADA xmlns=\"http://www.collada.org/2005/11/COLLADASchema\" version=\"1.4"
          ".1\"><asset><unit name=\"inch\" meter=\"0.0254\"/><up_axis>Z_UP</up_axis></asset><library_geometries"
@@ -517,7 +526,9 @@ static void directions_are_those_of_what_arrives(void **state)
          "></geometry></library_geometries><library_visual_scenes><visual_scene id=\"s\"><node id=\"a\"><insta"
          "nce_geometry url=\"#g\"/></node></visual_scene></library_visual_scenes><scene><instance_visual_scene"
          " url=\"#s\"/></scene></COLLADA>",
-         STRL_AXIS_Y, "m", {0.0254, 3 * 0.0254, -2 * 0.0254}},
+         STRL_AXIS_Y,
+         "m",
+         {0.0254, 3 * 0.0254, -2 * 0.0254}},
         {"up.gltf",
          "{\"asset\":{\"version\":\"1.0\"},\"scene\":\"s\",\"scenes\":{\"s\":{\"nodes\":[\"n\"]}},\"nodes\":{"
          "\"n\":{\"meshes\":[\"m\"]}},\"meshes\":{\"m\":{\"primitives\":[{\"attributes\":{\"POSITION\":\"a\"},"
@@ -528,7 +539,9 @@ static void directions_are_those_of_what_arrives(void **state)
          ",\"byteOffset\":36,\"byteLength\":6,\"target\":34963}},\"buffers\":{\"b\":{\"byteLength\":42,\"type"
          "\":\"arraybuffer\",\"uri\":\"data:application/octet-stream;base64,AACAPwAAAEAAAEBAAAAAQAAAAEAAAEBAAA"
          "CAPwAAgEAAAABBAAABAAIA\"}}}",
-         STRL_AXIS_Y, "m", {1, 2, 3}},
+         STRL_AXIS_Y,
+         "m",
+         {1, 2, 3}},
     };
     if (!find_real_importer())
         skip();

@@ -37,8 +37,7 @@ static void write_sheet(const char *model, const char *buffer)
              "\"bufferView\":1,\"componentType\":5123,\"count\":%u,\"type\":\"SCALAR\"}],"
              "\"bufferViews\":[{\"buffer\":0,\"byteLength\":%u},{\"buffer\":0,\"byteOffset\":%u,"
              "\"byteLength\":%u}],\"buffers\":[{\"uri\":\"%s\",\"byteLength\":%u}]}",
-             vertices, indices, 12 * vertices, 12 * vertices, 2 * indices, buffer,
-             12 * vertices + 2 * indices);
+             vertices, indices, 12 * vertices, 12 * vertices, 2 * indices, buffer, 12 * vertices + 2 * indices);
     write_test_text(model, text);
     write_buffer(buffer);
 }
@@ -99,7 +98,8 @@ static void copy_image(const char *name)
 {
     char path[512];
     static uint8_t bytes[65536];
-    snprintf(path, sizeof path, "%s/fuzz/corpus/image/%s", getenv("STRL_TEST_ROOT") ? getenv("STRL_TEST_ROOT") : ".", name);
+    snprintf(path, sizeof path, "%s/fuzz/corpus/image/%s", getenv("STRL_TEST_ROOT") ? getenv("STRL_TEST_ROOT") : ".",
+             name);
     FILE *file = fopen(path, "rb");
     assert_non_null(file);
     write_test_file(name, bytes, fread(bytes, 1, sizeof bytes, file));
@@ -145,8 +145,9 @@ static void a_failed_allocation_under_an_image_is_an_error(void **state)
         read_through_faults("painted.gltf", strl__alloc_fail_after);
         snprintf(text, sizeof text, "newmtl m\nmap_Kd %s\n", images[i]);
         write_test_text("painted.mtl", text);
-        write_test_text("painted.obj", "mtllib painted.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.1 0.1\nvt 0.9 0.3\nvt 0 1\n"
-                                       "f 1/1 2/2 3/3\n");
+        write_test_text("painted.obj",
+                        "mtllib painted.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.1 0.1\nvt 0.9 0.3\nvt 0 1\n"
+                        "f 1/1 2/2 3/3\n");
         read_through_faults("painted.obj", strl__alloc_fail_after);
         assert_int_equal(open_test_file("painted.gltf", MEMORY_LEAST, &reader, &err), STRL_OK);
         read_pass(reader, &result);

@@ -75,12 +75,10 @@ static void random_doubles_survive_all_usual_notations(void **state)
     static const char *const formats[] = {"%.17g", "%.9g", "%.6f", "%e", "%.15g", "%g", "%.12f"};
     char text[512];
     for (uint64_t i = 1; i < 30000; i++) {
-        double value =
-            (double)(int64_t)strl__mix64(i) * ldexp(1, (int)(strl__mix64(~i) % 160) - 140);
+        double value = (double)(int64_t)strl__mix64(i) * ldexp(1, (int)(strl__mix64(~i) % 160) - 140);
         snprintf(text, sizeof text, formats[i % 7], value);
         assert_like_strtod(text);
-        snprintf(text, sizeof text, "%llu.%llue%d",
-                 (unsigned long long)(strl__mix64(3 * i) >> (i % 64)),
+        snprintf(text, sizeof text, "%llu.%llue%d", (unsigned long long)(strl__mix64(3 * i) >> (i % 64)),
                  (unsigned long long)(strl__mix64(5 * i) >> (i % 61)), (int)(i % 60) - 30);
         assert_like_strtod(text);
     }
@@ -95,8 +93,7 @@ static void the_locale_does_not_matter(void **state)
         found = setlocale(LC_NUMERIC, names[i]) != NULL;
     double short_road, long_road;
     const char *after_short = strl__number_parse("1.5", &short_road);
-    const char *after_long =
-        strl__number_parse("1.50000000000000000000000000000000000e0", &long_road);
+    const char *after_long = strl__number_parse("1.50000000000000000000000000000000000e0", &long_road);
     setlocale(LC_NUMERIC, "C");
     assert_true(*after_short == 0 && *after_long == 0);
     assert_true(short_road == 1.5 && long_road == 1.5);
@@ -117,8 +114,7 @@ static void words_for_what_is_not_finite_are_read(void **state)
     }
     for (size_t i = 0; i < sizeof infinities / sizeof *infinities; i++) {
         const char *after = strl__number_parse(infinities[i], &value);
-        assert_true(after && *after == 0 && isinf(value) &&
-                    (value < 0) == (infinities[i][0] == '-'));
+        assert_true(after && *after == 0 && isinf(value) && (value < 0) == (infinities[i][0] == '-'));
     }
 }
 
@@ -145,8 +141,7 @@ static void integers_are_read_up_to_eighteen_digits(void **state)
     assert_true(*strl__integer_parse("+7 ", &value) == ' ' && value == 7);
     assert_true(*strl__integer_parse("0000000000000000000000000001", &value) == 0 && value == 1);
     assert_true(*strl__integer_parse("0", &value) == 0 && value == 0);
-    assert_true(*strl__integer_parse("999999999999999999", &value) == 0 &&
-                value == 999999999999999999);
+    assert_true(*strl__integer_parse("999999999999999999", &value) == 0 && value == 999999999999999999);
     assert_null(strl__integer_parse("1000000000000000000", &value));
     assert_null(strl__integer_parse("", &value));
     assert_null(strl__integer_parse("-", &value));
@@ -155,12 +150,9 @@ static void integers_are_read_up_to_eighteen_digits(void **state)
 int main(void)
 {
     const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_form_is_read_like_strtod),
-        cmocka_unit_test(random_doubles_survive_all_usual_notations),
-        cmocka_unit_test(the_locale_does_not_matter),
-        cmocka_unit_test(words_for_what_is_not_finite_are_read),
-        cmocka_unit_test(what_is_no_number_is_refused),
-        cmocka_unit_test(integers_are_read_up_to_eighteen_digits),
+        cmocka_unit_test(every_form_is_read_like_strtod), cmocka_unit_test(random_doubles_survive_all_usual_notations),
+        cmocka_unit_test(the_locale_does_not_matter),     cmocka_unit_test(words_for_what_is_not_finite_are_read),
+        cmocka_unit_test(what_is_no_number_is_refused),   cmocka_unit_test(integers_are_read_up_to_eighteen_digits),
     };
     return cmocka_run_group_tests(tests, NULL, NULL);
 }

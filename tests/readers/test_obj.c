@@ -30,8 +30,7 @@ static void all_forms_of_an_index_name_the_same_corner(void **state)
         read_text("form.obj", text, &result);
         assert_int_equal(result.count, 1);
         assert_positions(&result.triangles[0], (double[]){0, 0, 0, 4, 0, 0, 4, 4, 0});
-        bool has_normal =
-            strstr(faces[i], "//1 ") || strstr(faces[i], "//-1 ") || strstr(faces[i], "/1/1 ");
+        bool has_normal = strstr(faces[i], "//1 ") || strstr(faces[i], "//-1 ") || strstr(faces[i], "/1/1 ");
         assert_int_equal(result.triangles[0].flags, has_normal ? STRL_TRIANGLE_HAS_NORMAL : 0);
         assert_true(result.triangles[0].normal[1][2] == (has_normal ? 2 : 0));
         free_result(&result);
@@ -72,11 +71,10 @@ static void objects_and_groups_are_parts(void **state)
     strl_error err;
     read_result result;
     char text[512];
-    snprintf(
-        text, sizeof text,
-        "%sf 1 2 3\ng left\nf 1 2 3\no house\nf 1 2 3\ng roof tiles  \nf 1 2 3\ng unused\no\ng left\n"
-        "f 1 2 3\no b\xe4r \xc3\xa4\x01\nf 1 2 3\n",
-        corners);
+    snprintf(text, sizeof text,
+             "%sf 1 2 3\ng left\nf 1 2 3\no house\nf 1 2 3\ng roof tiles  \nf 1 2 3\ng unused\no\ng left\n"
+             "f 1 2 3\no b\xe4r \xc3\xa4\x01\nf 1 2 3\n",
+             corners);
     write_test_text("parts.obj", text);
     assert_int_equal(open_test_file("parts.obj", 0, &reader, &err), STRL_OK);
     for (unsigned pass = 0; pass < 2; pass++) {
@@ -123,9 +121,8 @@ static void materials_take_their_colours_from_the_libraries(void **state)
     static const struct {
         const char *name;
         uint32_t rgba;
-    } expected[] = {{"", 0xffffffffu},     {"glass", 0x40ff8000u},   {"red", 0xff0000ffu},
-                    {"fog", 0x40333333u},  {"nowhere", 0xffffffffu}, {"halo", 0x80ffffffu},
-                    {"wild", 0xffff00ffu}, {"second", 0xff00ff00u}};
+    } expected[] = {{"", 0xffffffffu},        {"glass", 0x40ff8000u}, {"red", 0xff0000ffu},  {"fog", 0x40333333u},
+                    {"nowhere", 0xffffffffu}, {"halo", 0x80ffffffu},  {"wild", 0xffff00ffu}, {"second", 0xff00ff00u}};
     assert_int_equal(strl_reader_material_count(reader), 8);
     for (uint32_t i = 0; i < 8; i++) {
         assert_int_equal(result.triangles[i].material, i);
@@ -206,8 +203,7 @@ static void colours_of_vertices_are_read_and_weights_are_not(void **state)
 {
     (void)state;
     read_result result;
-    read_text("colour.obj", "v 0 0 0 1 0.5 0\nv 1 0 0 nan 0 2\nv 0 1 0 # white\nf 1 2 3\n",
-              &result);
+    read_text("colour.obj", "v 0 0 0 1 0.5 0\nv 1 0 0 nan 0 2\nv 0 1 0 # white\nf 1 2 3\n", &result);
     assert_int_equal(result.triangles[0].flags, STRL_TRIANGLE_HAS_COLOUR);
     assert_int_equal(result.triangles[0].colour[0], 0xff0080ffu);
     assert_int_equal(result.triangles[0].colour[1], 0xffff00ffu);
@@ -223,11 +219,10 @@ static void what_cannot_be_a_triangle_is_counted(void **state)
     (void)state;
     read_result result;
     char text[512];
-    snprintf(
-        text, sizeof text,
-        "%sv nan 0 0\nv 0 inf 0\nf 1 2 3 4\nf 1 2\nf\nf 3\nl 1 2 3\nl 1 \\\n2\np 1 2\nf 1 2 5\nf 1 2 3 6\n"
-        "curv2 1 2\nvp 1 2\n",
-        corners);
+    snprintf(text, sizeof text,
+             "%sv nan 0 0\nv 0 inf 0\nf 1 2 3 4\nf 1 2\nf\nf 3\nl 1 2 3\nl 1 \\\n2\np 1 2\nf 1 2 5\nf 1 2 3 6\n"
+             "curv2 1 2\nvp 1 2\n",
+             corners);
     read_text("drops.obj", text, &result);
     assert_int_equal(result.count, 2);
     assert_int_equal(result.drops.degenerate_faces, 3);
@@ -250,12 +245,9 @@ static void bad_files_are_refused_with_a_line(void **state)
         {"vn 0 0\n", "line 1: expected a number"},
         {"v 0 0 0\n\nf 1 1 2\n", "line 3: expected the index of one of 1 vertices, found 2"},
         {"v 0 0 0\nf 0 1 1\n", "found 0"},
-        {"v 0 0 0\nf -2 1 1\nv 0 0 0\n",
-         "line 2: expected the index of one of 2 vertices, found -2"},
-        {"v 0 0 0\nvn 0 0 1\nf 1//2 1//1 1//1\n",
-         "expected the index of one of 1 normals, found 2"},
-        {"v 0 0 0\nf 1 one 1\n",
-         "line 2: expected a corner such as 1, 1/2, 1//3 or 1/2/3, found 'one'"},
+        {"v 0 0 0\nf -2 1 1\nv 0 0 0\n", "line 2: expected the index of one of 2 vertices, found -2"},
+        {"v 0 0 0\nvn 0 0 1\nf 1//2 1//1 1//1\n", "expected the index of one of 1 normals, found 2"},
+        {"v 0 0 0\nf 1 one 1\n", "line 2: expected a corner such as 1, 1/2, 1//3 or 1/2/3, found 'one'"},
         {"v 0 0 0\nf 1/1/1/1 1 1\n", "found '1/1/1/1'"},
         {"v 0 0 0\nf 1.0 1 1\n", "found '1.0'"},
         {"v 0 0 0\nf 99999999999999999999 1 1\n", "found '99999999999999999999'"},
@@ -343,8 +335,7 @@ static void long_lines_are_read_and_longer_polygons_refused(void **state)
         fprintf(file, "\n# %0300000d\nf 1 2 3", 0);
         fclose(file);
         if (extra) {
-            assert_refused("long.obj",
-                           "line 16386: expected at most 16384 corners in a face, found 16385");
+            assert_refused("long.obj", "line 16386: expected at most 16384 corners in a face, found 16385");
             continue;
         }
         read_test_file("long.obj", MEMORY_LEAST, &result);
@@ -362,13 +353,12 @@ static void a_tiny_budget_gives_the_same_triangles(void **state)
     FILE *file = fopen(test_path("big.obj"), "wb");
     assert_non_null(file);
     for (uint64_t i = 0; i < count; i++)
-        fprintf(file, "v %d.5 %d -%de-2\nvn %d 1 %d\n", (int)(i % 1009), (int)(i / 1009),
-                (int)(i % 97), (int)(i % 5), (int)(i % 3));
+        fprintf(file, "v %d.5 %d -%de-2\nvn %d 1 %d\n", (int)(i % 1009), (int)(i / 1009), (int)(i % 97), (int)(i % 5),
+                (int)(i % 3));
     for (uint64_t i = 0; i < count; i++) {
         uint64_t corner = strl__mix64(i);
-        fprintf(file, "f %d//%d %d %d//%d\n", (int)(corner % count) + 1,
-                (int)(corner / 7 % count) + 1, (int)(i + 1), (int)(corner / 99 % count) + 1,
-                (int)(corner / 77 % count) + 1);
+        fprintf(file, "f %d//%d %d %d//%d\n", (int)(corner % count) + 1, (int)(corner / 7 % count) + 1, (int)(i + 1),
+                (int)(corner / 99 % count) + 1, (int)(corner / 77 % count) + 1);
         if (i % 3 == 0)
             fprintf(file, "f %d//%d %d//%d %d//%d\n", (int)i + 1, (int)(corner / 3 % count) + 1,
                     (int)(corner % count) + 1, (int)i + 1, (int)(corner / 5 % count) + 1,

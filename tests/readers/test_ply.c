@@ -68,13 +68,11 @@ static const double square[4][3] = {{0, 0, 0.5}, {4, 0, 0.25}, {4, 3, -0.5}, {0,
  * elements that must be passed over, before, between and behind. */
 static void write_odd_square(ply_writer *ply, bool faces_first)
 {
-    const char *vertex =
-        "element vertex 4\nproperty uchar red\nproperty double z\nproperty list uchar short tags\n"
-        "property short x\nproperty ushort nx\nproperty int y\nproperty uchar green\n"
-        "property float ny\nproperty uchar blue\nproperty double nz\nproperty uchar alpha\n";
-    const char *face =
-        "element face 2\nproperty uchar quality\nproperty list ushort uint vertex_indices\n"
-        "property list int float texcoord\n";
+    const char *vertex = "element vertex 4\nproperty uchar red\nproperty double z\nproperty list uchar short tags\n"
+                         "property short x\nproperty ushort nx\nproperty int y\nproperty uchar green\n"
+                         "property float ny\nproperty uchar blue\nproperty double nz\nproperty uchar alpha\n";
+    const char *face = "element face 2\nproperty uchar quality\nproperty list ushort uint vertex_indices\n"
+                       "property list int float texcoord\n";
     char header[1024];
     snprintf(header, sizeof header,
              "comment odd\nelement camera 1\nproperty float fov\nproperty list uchar int ids\n%s%s"
@@ -129,8 +127,7 @@ static void assert_odd_square(const char *name)
     assert_int_equal(result.count, 3);
     assert_positions(&result.triangles[0], (double[]){0, 3, 8, 4, 3, -0.5, 4, 0, 0.25});
     for (unsigned i = 0; i < 3; i++)
-        assert_int_equal(result.triangles[i].flags,
-                         STRL_TRIANGLE_HAS_COLOUR | STRL_TRIANGLE_HAS_NORMAL);
+        assert_int_equal(result.triangles[i].flags, STRL_TRIANGLE_HAS_COLOUR | STRL_TRIANGLE_HAS_NORMAL);
     assert_int_equal(result.triangles[0].colour[0], 0x80000000u | 90u << 16 | 60u << 8 | 30u);
     assert_true(result.triangles[0].normal[0][0] == 1 && result.triangles[0].normal[0][1] == -2 &&
                 result.triangles[0].normal[0][2] == 3);
@@ -167,10 +164,8 @@ static void strips_become_triangles_of_one_orientation(void **state)
     (void)state;
     for (encoding e = ASCII; e <= BIG; e++) {
         ply_writer ply = {.encoding = e};
-        put_header(
-            &ply,
-            "element vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
-            "element tristrips 2\nproperty list int int vertex_indices\nproperty uchar tag\n");
+        put_header(&ply, "element vertex 5\nproperty float x\nproperty float y\nproperty float z\n"
+                         "element tristrips 2\nproperty list int int vertex_indices\nproperty uchar tag\n");
         for (unsigned i = 0; i < 5; i++) {
             put(&ply, STRL__F32, i / 2);
             put(&ply, STRL__F32, i % 2);
@@ -207,21 +202,17 @@ static void real_colours_and_colours_of_faces_are_read(void **state)
 {
     (void)state;
     read_result result;
-    write_test_text(
-        "real.ply",
-        "ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE
-        "property float red\nproperty float green\nproperty float blue\nelement face 1\n" FACE
-        "0 0 0 0 0.5 1\n1 0 0 -1 2 nan\n0 1 0 0 0.5 1\n3 0 1 2\n");
+    write_test_text("real.ply", "ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE
+                                "property float red\nproperty float green\nproperty float blue\nelement face 1\n" FACE
+                                "0 0 0 0 0.5 1\n1 0 0 -1 2 nan\n0 1 0 0 0.5 1\n3 0 1 2\n");
     read_test_file("real.ply", 0, &result);
     assert_int_equal(result.status, STRL_OK);
     assert_int_equal(result.triangles[0].colour[0], 0xffff8000u);
     assert_int_equal(result.triangles[0].colour[1], 0xffffff00u);
     free_result(&result);
-    write_test_text(
-        "faces.ply",
-        "ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE
-        "element face 2\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n" FACE
-        "0 0 0\n1 0 0\n0 1 0\n1 2 3 3 0 1 2\n4 5 6 3 2 1 0\n");
+    write_test_text("faces.ply", "ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE
+                                 "element face 2\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n" FACE
+                                 "0 0 0\n1 0 0\n0 1 0\n1 2 3 3 0 1 2\n4 5 6 3 2 1 0\n");
     read_test_file("faces.ply", 0, &result);
     assert_int_equal(result.status, STRL_OK);
     assert_int_equal(result.triangles[0].colour[2], 0xff030201u);
@@ -255,11 +246,10 @@ static void what_cannot_be_a_triangle_is_counted(void **state)
 {
     (void)state;
     read_result result;
-    write_test_text(
-        "drops.ply",
-        "ply\nformat ascii 1.0\nelement vertex 5\n" TRIANGLE "element edge 2\n"
-        "property int vertex1\nproperty int vertex2\nelement face 5\n" FACE
-        "0 0 0\n1 0 0\n0 1 0\nnan 0 0\n0 -inf 0\n0 1\n1 2\n3 0 1 2\n2 0 1\n0\n3 0 1 3\n4 0 1 2 4\n");
+    write_test_text("drops.ply",
+                    "ply\nformat ascii 1.0\nelement vertex 5\n" TRIANGLE "element edge 2\n"
+                    "property int vertex1\nproperty int vertex2\nelement face 5\n" FACE
+                    "0 0 0\n1 0 0\n0 1 0\nnan 0 0\n0 -inf 0\n0 1\n1 2\n3 0 1 2\n2 0 1\n0\n3 0 1 3\n4 0 1 2 4\n");
     read_test_file("drops.ply", 0, &result);
     assert_int_equal(result.status, STRL_OK);
     assert_int_equal(result.count, 1);
@@ -328,11 +318,10 @@ static void the_byte_after_the_header_is_data(void **state)
     static const char *const ends[] = {"\n", "\r\n", "\r"};
     for (unsigned e = 0; e < 3; e++) {
         ply_writer ply = {.encoding = LITTLE};
-        for (
-            const char *c =
-                "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uchar uchar vertex_indices"
-                "\nelement vertex 10\nproperty uchar x\nproperty char y\nproperty uchar z\nend_header\n";
-            *c; c++)
+        for (const char *c =
+                 "ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list uchar uchar vertex_indices"
+                 "\nelement vertex 10\nproperty uchar x\nproperty char y\nproperty uchar z\nend_header\n";
+             *c; c++)
             put_text(&ply, *c == '\n' ? ends[e] : (char[]){*c, 0});
         put(&ply, STRL__U8, '\n');
         for (unsigned i = 0; i < 10; i++)
@@ -356,39 +345,29 @@ static void bad_files_are_refused_with_a_place(void **state)
         {"ply\nend_header\n", "line 2: expected a line 'format'"},
         {"ply\nformat ascii 2.0\n", "line 2: expected version '1.0', found '2.0'"},
         {"ply\nformat binary_middle_endian 1.0\n", "found 'binary_middle_endian'"},
-        {"ply\nformat ascii 1.0\nproperty float x\n",
-         "line 3: expected an element before its properties"},
-        {"ply\nformat ascii 1.0\nelement vertex -3\n",
-         "line 3: expected a count of records, found '-3'"},
-        {"ply\nformat ascii 1.0\nelement vertex 99999999999999999999\n",
-         "expected a count of records"},
+        {"ply\nformat ascii 1.0\nproperty float x\n", "line 3: expected an element before its properties"},
+        {"ply\nformat ascii 1.0\nelement vertex -3\n", "line 3: expected a count of records, found '-3'"},
+        {"ply\nformat ascii 1.0\nelement vertex 99999999999999999999\n", "expected a count of records"},
         {"ply\nformat ascii 1.0\nelement vertex 1\nproperty quad x\n", "line 4: expected a type"},
-        {"ply\nformat ascii 1.0\nelement vertex 1\nproperty list float int x\n",
-         "expected an integer type"},
-        {"ply\nformat ascii 1.0\nelement vertex 0\nelement vertex 0\n",
-         "one element 'vertex' only"},
+        {"ply\nformat ascii 1.0\nelement vertex 1\nproperty list float int x\n", "expected an integer type"},
+        {"ply\nformat ascii 1.0\nelement vertex 0\nelement vertex 0\n", "one element 'vertex' only"},
         {"ply\nsurprise\nformat ascii 1.0\n", "line 2: expected 'element'"},
         {"ply\nformat ascii 1.0\nelement vertex 0\nsurprise\n", "line 4: expected 'element'"},
         {"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n",
          "expected properties x, y and z"},
         {"ply\nformat ascii 1.0\nelement face 1\nproperty int a\nend_header\n1\n",
          "expected a list property vertex_indices"},
-        {"ply\nformat ascii 1.0\nelement face 1\n" FACE "3 0 1 2\n",
-         "expected an element 'vertex'"},
-        {"ply\nformat ascii 1.0\nelement vertex 999999999999999999\n" TRIANGLE
-         "end_header\n1 2 3\n",
+        {"ply\nformat ascii 1.0\nelement face 1\n" FACE "3 0 1 2\n", "expected an element 'vertex'"},
+        {"ply\nformat ascii 1.0\nelement vertex 999999999999999999\n" TRIANGLE "end_header\n1 2 3\n",
          "announces 999999999999999999"},
-        {"ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE "element face 1\n" FACE
-         "0 0 0\n0 0\n0 0 0\n3 0 1 2\n",
+        {"ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE "element face 1\n" FACE "0 0 0\n0 0\n0 0 0\n3 0 1 2\n",
          "line 11: expected a number, found the end of the line"},
         {"ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE "element face 1\n" FACE
          "0 0 0\n0 zero 0\n0 0 0\n3 0 1 2\n",
          "line 11: expected a number, found 'zero'"},
-        {"ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE "element face 1\n" FACE
-         "0 0 0\n0 0 0\n0 0 0\n3 0 1 3\n",
+        {"ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE "element face 1\n" FACE "0 0 0\n0 0 0\n0 0 0\n3 0 1 3\n",
          "line 13: expected a vertex index below 3, found 3"},
-        {"ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE "element face 1\n" FACE
-         "0 0 0\n0 0 0\n0 0 0\n3 0 1 -1\n",
+        {"ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE "element face 1\n" FACE "0 0 0\n0 0 0\n0 0 0\n3 0 1 -1\n",
          "found -1"},
         {"ply\nformat ascii 1.0\nelement vertex 3\n" TRIANGLE "element face 1\n" FACE
          "0 0 0\n0 0 0\n0 0 0\n200 0 1 2\n",
@@ -408,15 +387,15 @@ static void lying_binary_counts_are_refused_without_work(void **state)
     for (unsigned i = 0; i < 2; i++) {
         ply_writer ply = {.encoding = LITTLE};
         char header[256];
-        snprintf(header, sizeof header,
-                 "%s" TRIANGLE "element face 1\nproperty list uint int vertex_indices\n", sizes[i]);
+        snprintf(header, sizeof header, "%s" TRIANGLE "element face 1\nproperty list uint int vertex_indices\n",
+                 sizes[i]);
         put_header(&ply, header);
         for (unsigned k = 0; k < 12; k++)
             put(&ply, STRL__F32, k);
         put(&ply, STRL__U32, 4000000000.0);
         save(&ply, "lie.ply");
-        assert_refused("lie.ply", i ? "expected the length of a list below 1, found 4000000000"
-                                    : "announces 1000000000000");
+        assert_refused("lie.ply",
+                       i ? "expected the length of a list below 1, found 4000000000" : "announces 1000000000000");
     }
 }
 
@@ -424,8 +403,7 @@ static void a_face_of_too_many_corners_is_refused(void **state)
 {
     (void)state;
     ply_writer ply = {.encoding = LITTLE};
-    put_header(&ply, "element vertex 3\n" TRIANGLE
-                     "element face 1\nproperty list uint uchar vertex_indices\n");
+    put_header(&ply, "element vertex 3\n" TRIANGLE "element face 1\nproperty list uint uchar vertex_indices\n");
     for (unsigned k = 0; k < 9; k++)
         put(&ply, STRL__F32, k);
     put(&ply, STRL__U32, STRL__POLYGON_CORNERS_MAX + 1);
@@ -448,8 +426,7 @@ static void write_scattered_grid(encoding e, const char *name)
              "property float nz\nelement face %u\nproperty list uchar int vertex_indices\n",
              SIDE * SIDE, (SIDE - 1) * (SIDE - 1));
     put_header(&ply, header);
-    const uint64_t step =
-        233323; /* a prime that does not divide SIDE^2: a walk over all vertices */
+    const uint64_t step = 233323; /* a prime that does not divide SIDE^2: a walk over all vertices */
     for (uint64_t i = 0; i < SIDE * SIDE; i++) {
         uint64_t cell = i * step % (SIDE * SIDE);
         put(&ply, STRL__F32, (double)(cell % SIDE));
@@ -573,8 +550,7 @@ static void facts_are_known_at_opening(void **state)
     assert_int_equal(rgba, 0xffffffffu);
     strl_reader_close(reader);
     strl_reader_close(NULL);
-    assert_int_equal(open_test_file("named.stl", MEMORY_LEAST - 1, &reader, &err),
-                     STRL_ERR_ARGUMENT);
+    assert_int_equal(open_test_file("named.stl", MEMORY_LEAST - 1, &reader, &err), STRL_ERR_ARGUMENT);
     assert_null(reader);
     assert_int_equal(open_test_file("missing.ply", 0, &reader, &err), STRL_ERR_IO);
     write_test_text("what.txt", "once upon a time\n");

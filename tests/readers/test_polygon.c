@@ -57,8 +57,7 @@ static void assert_covers_any_way(const double (*points)[3], uint32_t count)
     for (uint32_t first = 0; first < count; first++)
         for (unsigned reversed = 0; reversed < 2; reversed++) {
             for (uint32_t i = 0; i < count; i++)
-                memcpy(turned[reversed ? count - 1 - i : i], points[(first + i) % count],
-                       sizeof *turned);
+                memcpy(turned[reversed ? count - 1 - i : i], points[(first + i) % count], sizeof *turned);
             assert_covers((const double(*)[3])turned, count);
         }
     free(turned);
@@ -69,12 +68,10 @@ static void convex_and_concave_polygons_are_covered_once(void **state)
     (void)state;
     static const double square[4][3] = {{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}};
     static const double arrow[4][3] = {{0, 0, 0}, {4, 4, 0}, {8, 0, 0}, {4, 9, 1}};
-    static const double l_shape[6][3] = {{0, 0, 0}, {4, 0, 0}, {4, 1, 0},
-                                         {1, 1, 0}, {1, 4, 0}, {0, 4, 0}};
+    static const double l_shape[6][3] = {{0, 0, 0}, {4, 0, 0}, {4, 1, 0}, {1, 1, 0}, {1, 4, 0}, {0, 4, 0}};
     static const double star[8][3] = {{0, 9, 0},  {1, 1, 0},   {9, 0, 0},  {1, -1, 0},
                                       {0, -9, 0}, {-1, -1, 0}, {-9, 0, 0}, {-1, 1, 0}};
-    static const double collinear[7][3] = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {4, 0, 0},
-                                           {4, 4, 0}, {2, 4, 0}, {0, 4, 0}};
+    static const double collinear[7][3] = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {4, 0, 0}, {4, 4, 0}, {2, 4, 0}, {0, 4, 0}};
     assert_covers_any_way(square, 4);
     assert_covers_any_way(arrow, 4);
     assert_covers_any_way(l_shape, 6);
@@ -112,8 +109,7 @@ static void combs_and_spirals_of_many_corners_are_covered(void **state)
     double(*spiral)[3] = calloc(2 * ARMS, sizeof *spiral);
     for (unsigned arm = 0; arm < ARMS; arm++) {
         double reach = 4 * (arm / 4 + 1);
-        const double x[4] = {reach, reach, -reach, -reach},
-                     y[4] = {-reach + 4, reach, reach, -reach};
+        const double x[4] = {reach, reach, -reach, -reach}, y[4] = {-reach + 4, reach, reach, -reach};
         for (unsigned wall = 0; wall < 2; wall++) {
             double *point = spiral[wall ? 2 * ARMS - 1 - arm : arm];
             double inset = wall ? 1 : 0;
@@ -138,8 +134,7 @@ static void tilted_polygons_keep_their_orientation(void **state)
             u[axis] = (double)(int)(strl__mix64(++seed) % 21) - 10;
             v[axis] = (double)(int)(strl__mix64(++seed) % 21) - 10;
         }
-        double normal[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
-                            u[0] * v[1] - u[1] * v[0]};
+        double normal[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
         if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0)
             continue;
         for (unsigned i = 0; i < 12; i++) {
@@ -150,14 +145,12 @@ static void tilted_polygons_keep_their_orientation(void **state)
         strl__polygon polygon = {0};
         assert_true(strl__polygon_triangulate(&polygon, points[0], sizeof points[0], 12));
         for (unsigned i = 0; i < 10; i++) {
-            const double *a = points[polygon.triangles[3 * i]],
-                         *b = points[polygon.triangles[3 * i + 1]],
+            const double *a = points[polygon.triangles[3 * i]], *b = points[polygon.triangles[3 * i + 1]],
                          *c = points[polygon.triangles[3 * i + 2]];
             double along = 0;
             for (unsigned axis = 0; axis < 3; axis++) {
                 unsigned p = (axis + 1) % 3, q = (axis + 2) % 3;
-                along +=
-                    normal[axis] * ((b[p] - a[p]) * (c[q] - a[q]) - (b[q] - a[q]) * (c[p] - a[p]));
+                along += normal[axis] * ((b[p] - a[p]) * (c[q] - a[q]) - (b[q] - a[q]) * (c[p] - a[p]));
             }
             assert_true(along >= 0);
         }

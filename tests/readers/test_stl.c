@@ -45,9 +45,8 @@ static void a_binary_file_of_another_size_is_refused(void **state)
     FILE *file = fopen(test_path("long.stl"), "ab");
     fputc('\n', file);
     fclose(file);
-    assert_refused(
-        "long.stl",
-        "byte 80: announces 3 triangles, for which 234 bytes were expected, found a file of 235");
+    assert_refused("long.stl",
+                   "byte 80: announces 3 triangles, for which 234 bytes were expected, found a file of 235");
     stl.data[83] = 0xff;
     write_test_file("huge.stl", stl.data, stl.size);
     assert_refused("huge.stl", "announces 4278190083 triangles");
@@ -94,8 +93,7 @@ static void every_beginning_of_a_text_is_refused_or_read(void **state)
 {
     (void)state;
     size_t refused = read_every_beginning("cut.stl", two_solids, sizeof two_solids - 1);
-    assert_in_range(refused, sizeof two_solids - 80,
-                    sizeof two_solids - 1); /* readable only between solids */
+    assert_in_range(refused, sizeof two_solids - 80, sizeof two_solids - 1); /* readable only between solids */
 }
 
 static void bad_texts_are_refused_with_a_line(void **state)
@@ -114,8 +112,7 @@ static void bad_texts_are_refused_with_a_line(void **state)
     };
     for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
         assert_text_refused("bad.stl", cases[i][0], cases[i][1]);
-    assert_text_refused("words.stl", "nothing of the kind\n",
-                        "line 1: expected 'solid', found 'nothing'");
+    assert_text_refused("words.stl", "nothing of the kind\n", "line 1: expected 'solid', found 'nothing'");
 }
 
 /* More solids than the budget has room for names: refused, not swallowed. */

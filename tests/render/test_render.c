@@ -31,8 +31,8 @@ static strl_renderer *make(strl_renderer_desc desc)
     return renderer;
 }
 
-static void shoot(strl_renderer *renderer, const strl_camera *camera, const strl_draw_list *list, const strl_draw_options *options,
-                  picture *out)
+static void shoot(strl_renderer *renderer, const strl_camera *camera, const strl_draw_list *list,
+                  const strl_draw_options *options, picture *out)
 {
     strl_error err = {0};
     if (strl_renderer_draw(renderer, camera, list, options, &out->stats, &err) != STRL_OK ||
@@ -49,8 +49,8 @@ static void shoot_once(strl_renderer_desc desc, const strl_camera *camera, const
     strl_renderer_destroy(renderer);
 }
 
-/* Pixels whose colour differs by more than `steps` in some channel, or whose depth by more than a hundred-thousandth (linear
- * depth, of orthographic cameras: a ten-millionth of the range). */
+/* Pixels whose colour differs by more than `steps` in some channel, or whose depth by more than a hundred-thousandth
+ * (linear depth, of orthographic cameras: a ten-millionth of the range). */
 static int count_different(const picture *a, const picture *b, int steps)
 {
     int different = 0;
@@ -75,14 +75,16 @@ static int count_covered(const picture *a)
 static void every_backend_gives_the_same_picture(void **state)
 {
     (void)state;
-    static const strl_renderer_desc others[] = {
-        {.backend = STRL_BACKEND_GL3}, {.backend = STRL_BACKEND_GL3, .core_only = true},
-        {.backend = STRL_BACKEND_GL3, .gles = true}, {.backend = STRL_BACKEND_GL3, .gles = true, .core_only = true}};
+    static const strl_renderer_desc others[] = {{.backend = STRL_BACKEND_GL3},
+                                                {.backend = STRL_BACKEND_GL3, .core_only = true},
+                                                {.backend = STRL_BACKEND_GL3, .gles = true},
+                                                {.backend = STRL_BACKEND_GL3, .gles = true, .core_only = true}};
     static picture first, other;
     patches all;
     patches_init(&all, (patches_desc){.side = 4});
     for (int mode = 0; mode < 5; mode++) {
-        strl_draw_options options = {.flat = mode == 1, .debug = mode == 3 ? STRL_DEBUG_CLUSTER : STRL_DEBUG_NONE, .background = {30, 60, 90}};
+        strl_draw_options options = {
+            .flat = mode == 1, .debug = mode == 3 ? STRL_DEBUG_CLUSTER : STRL_DEBUG_NONE, .background = {30, 60, 90}};
         strl_camera camera = patches_camera(&all, WIDTH, HEIGHT, mode == 4 ? 0.9 : 0.25);
         if (mode == 2)
             camera.fov_y_deg = 0, camera.ortho_height = 60, camera.eye[2] += 40;
@@ -99,8 +101,8 @@ static void every_backend_gives_the_same_picture(void **state)
 static void wireframes_leave_holes_on_every_backend(void **state)
 {
     (void)state;
-    static const strl_renderer_desc descs[] = {{.backend = STRL_BACKEND_GL45}, {.backend = STRL_BACKEND_GL3},
-                                               {.backend = STRL_BACKEND_GL3, .gles = true}};
+    static const strl_renderer_desc descs[] = {
+        {.backend = STRL_BACKEND_GL45}, {.backend = STRL_BACKEND_GL3}, {.backend = STRL_BACKEND_GL3, .gles = true}};
     static picture lines, filled;
     patches all;
     patches_init(&all, (patches_desc){.side = 2});
@@ -116,13 +118,15 @@ static void wireframes_leave_holes_on_every_backend(void **state)
     patches_deinit(&all);
 }
 
-/* From above and from below; as it is, mirrored, turned over by mirroring twice; lit, thinned out, as a wireframe; with splats, which have no
- * back. */
+/* From above and from below; as it is, mirrored, turned over by mirroring twice; lit, thinned out, as a wireframe; with
+ * splats, which have no back. */
 static void backs_are_not_drawn_where_the_list_says_so(void **state)
 {
     (void)state;
-    static const strl_renderer_desc descs[] = {{.backend = STRL_BACKEND_GL45}, {.backend = STRL_BACKEND_GL3},
-                                               {.backend = STRL_BACKEND_GL3, .core_only = true}, {.backend = STRL_BACKEND_GL3, .gles = true}};
+    static const strl_renderer_desc descs[] = {{.backend = STRL_BACKEND_GL45},
+                                               {.backend = STRL_BACKEND_GL3},
+                                               {.backend = STRL_BACKEND_GL3, .core_only = true},
+                                               {.backend = STRL_BACKEND_GL3, .gles = true}};
     static const double scales[3][3] = {{1, 1, 1}, {-1, 1, 1}, {-1, 1, -1}};
     static picture culled, both;
     for (size_t d = 0; d < sizeof descs / sizeof *descs; d++)
@@ -180,7 +184,8 @@ static void mirrored_and_plain_placements_cull_in_one_list(void **state)
         shoot_once((strl_renderer_desc){.backend = backend}, &camera, &all.list, NULL, &both);
         all.list.cull = STRL_CULL_BACK;
         shoot_once((strl_renderer_desc){.backend = backend}, &camera, &all.list, NULL, &culled);
-        assert_in_range(count_covered(&culled), count_covered(&both) / 3, count_covered(&both) * 2 / 3); /* the mirrored ones look down */
+        /* the mirrored ones look down */
+        assert_in_range(count_covered(&culled), count_covered(&both) / 3, count_covered(&both) * 2 / 3);
     }
     patches_deinit(&all);
 }
@@ -197,8 +202,11 @@ static void assert_no_crack(patches_desc desc, strl_backend backend)
     for (int view = 0; view < 6; view++) {
         double extent = 6 * PATCH_SIDE * 1000 * 0x1p-10;
         double height = extent * 0.1 * pow(0.2, view);
-        strl_camera camera = {.eye = {extent * (0.5 + 0.01 * view), extent * 0.47, height}, .up = {0.3 * view, 1, 0}, .fov_y_deg = 60,
-                              .width = WIDTH, .height = HEIGHT};
+        strl_camera camera = {.eye = {extent * (0.5 + 0.01 * view), extent * 0.47, height},
+                              .up = {0.3 * view, 1, 0},
+                              .fov_y_deg = 60,
+                              .width = WIDTH,
+                              .height = HEIGHT};
         camera.target[0] = camera.eye[0] + 0.2 * height, camera.target[1] = camera.eye[1] - 0.3 * height;
         all.list.near_distance = camera.eye[2] * 0.01;
         shoot(renderer, &camera, &all.list, NULL, &shot);
@@ -356,10 +364,16 @@ static void depth_is_the_distance_along_the_view(void **state)
     patches all;
     patches_init(&all, (patches_desc){.side = 6, .flat = true});
     double extent = 6 * PATCH_SIDE * 1000 * 0x1p-10;
-    strl_camera camera = {.eye = {extent / 2, extent / 2, 33.25}, .target = {extent / 2, extent / 2, 0}, .up = {0, 1, 0}, .fov_y_deg = 60,
-                          .width = WIDTH, .height = HEIGHT};
-    static const strl_renderer_desc descs[] = {{.backend = STRL_BACKEND_GL45}, {.backend = STRL_BACKEND_GL3, .core_only = true},
-                                               {.backend = STRL_BACKEND_GL3, .gles = true}, {.backend = STRL_BACKEND_GL45, .supersample = 3}};
+    strl_camera camera = {.eye = {extent / 2, extent / 2, 33.25},
+                          .target = {extent / 2, extent / 2, 0},
+                          .up = {0, 1, 0},
+                          .fov_y_deg = 60,
+                          .width = WIDTH,
+                          .height = HEIGHT};
+    static const strl_renderer_desc descs[] = {{.backend = STRL_BACKEND_GL45},
+                                               {.backend = STRL_BACKEND_GL3, .core_only = true},
+                                               {.backend = STRL_BACKEND_GL3, .gles = true},
+                                               {.backend = STRL_BACKEND_GL45, .supersample = 3}};
     for (int d = 0; d < 8; d++) {
         camera.fov_y_deg = d < 4 ? 60 : 0;
         camera.ortho_height = 40;
@@ -375,13 +389,18 @@ static void a_section_cuts_what_lies_before_it(void **state)
 {
     (void)state;
     static picture whole, cut, other;
-    static const strl_renderer_desc others[] = {{.backend = STRL_BACKEND_GL3}, {.backend = STRL_BACKEND_GL3, .core_only = true},
+    static const strl_renderer_desc others[] = {{.backend = STRL_BACKEND_GL3},
+                                                {.backend = STRL_BACKEND_GL3, .core_only = true},
                                                 {.backend = STRL_BACKEND_GL3, .gles = true}};
     patches all;
     patches_init(&all, (patches_desc){.side = 6, .flat = true});
     double extent = 6 * PATCH_SIDE * 1000 * 0x1p-10;
-    strl_camera camera = {.eye = {extent / 2, extent / 2, 33}, .target = {extent / 2, extent / 2, 0}, .up = {0, 1, 0}, .fov_y_deg = 60,
-                          .width = WIDTH, .height = HEIGHT};
+    strl_camera camera = {.eye = {extent / 2, extent / 2, 33},
+                          .target = {extent / 2, extent / 2, 0},
+                          .up = {0, 1, 0},
+                          .fov_y_deg = 60,
+                          .width = WIDTH,
+                          .height = HEIGHT};
     strl_draw_options options = {.section = {1, 0, 0, extent / 2}};
     for (int orthographic = 0; orthographic < 2; orthographic++) {
         camera.fov_y_deg = orthographic ? 0 : 60, camera.ortho_height = 40;
@@ -413,8 +432,8 @@ static void hidden_and_marked_parts_are_drawn_so_and_back(void **state)
     (void)state;
     static picture plain, styled, again;
     static strl_vertex_label labels[3][PATCH_VERTICES];
-    static const strl_renderer_desc descs[] = {{.backend = STRL_BACKEND_GL45}, {.backend = STRL_BACKEND_GL3},
-                                               {.backend = STRL_BACKEND_GL3, .gles = true}};
+    static const strl_renderer_desc descs[] = {
+        {.backend = STRL_BACKEND_GL45}, {.backend = STRL_BACKEND_GL3}, {.backend = STRL_BACKEND_GL3, .gles = true}};
     const uint8_t styles[] = {STRL_PART_HIDDEN, STRL_PART_MARKED};
     patches all;
     patches_init(&all, (patches_desc){.side = 3, .flat = true});
@@ -457,8 +476,8 @@ static void placements_are_parts_as_a_whole(void **state)
     (void)state;
     static picture by_label, by_placement;
     static strl_vertex_label labels[3][PATCH_VERTICES];
-    static const strl_renderer_desc descs[] = {{.backend = STRL_BACKEND_GL45}, {.backend = STRL_BACKEND_GL3},
-                                               {.backend = STRL_BACKEND_GL3, .gles = true}};
+    static const strl_renderer_desc descs[] = {
+        {.backend = STRL_BACKEND_GL45}, {.backend = STRL_BACKEND_GL3}, {.backend = STRL_BACKEND_GL3, .gles = true}};
     const uint8_t styles[] = {STRL_PART_HIDDEN, STRL_PART_MARKED};
     const strl_draw_options options = {.part_styles = styles, .part_count = 2};
     patches all;
@@ -503,7 +522,8 @@ static void supersampling_is_the_mean_of_the_larger_image_in_linear_light(void *
         strl_camera camera = patches_camera(&all, WIDTH, HEIGHT, 0.9);
         shoot_once((strl_renderer_desc){.backend = backend, .supersample = K}, &camera, &all.list, &options, &small);
         camera.width *= K, camera.height *= K;
-        strl_renderer *renderer = make((strl_renderer_desc){.backend = backend, .width = WIDTH * K, .height = HEIGHT * K});
+        strl_renderer *renderer =
+            make((strl_renderer_desc){.backend = backend, .width = WIDTH * K, .height = HEIGHT * K});
         assert_int_equal(strl_renderer_draw(renderer, &camera, &all.list, &options, NULL, NULL), STRL_OK);
         assert_int_equal(strl_renderer_read_colour(renderer, large[0], NULL), STRL_OK);
         strl_renderer_destroy(renderer);
@@ -546,7 +566,8 @@ static void float_positions_draw_like_lattice_positions(void **state)
     patches_deinit(&all);
 }
 
-/* A model that is turned and scaled by its placement, seen by a camera that is turned and scaled with it, looks the same. */
+/* A model that is turned and scaled by its placement, seen by a camera that is turned and scaled with it, looks the
+ * same. */
 static void a_placement_moves_the_model_and_not_its_look(void **state)
 {
     (void)state;
@@ -607,7 +628,8 @@ static void a_renderer_draws_with_the_context_its_caller_made_and_resizes(void *
     patches all;
     patches_init(&all, (patches_desc){.side = 3});
     strl_camera camera = patches_camera(&all, WIDTH, HEIGHT, 0.25), small = patches_camera(&all, 40, 30, 0.25);
-    const strl_gl_context_desc wanted[] = {{.major = 4, .minor = 5}, {.major = 3, .minor = 3}, {.gles = true, .major = 3}};
+    const strl_gl_context_desc wanted[] = {
+        {.major = 4, .minor = 5}, {.major = 3, .minor = 3}, {.gles = true, .major = 3}};
     const strl_backend backends[] = {STRL_BACKEND_GL45, STRL_BACKEND_GL3, STRL_BACKEND_GL3};
     shoot_once((strl_renderer_desc){.backend = STRL_BACKEND_GL45}, &camera, &all.list, NULL, &own);
     for (int c = 0; c < 3; c++) {

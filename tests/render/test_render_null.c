@@ -20,7 +20,8 @@ typedef struct fixture {
 static int setup(void **state)
 {
     fixture *f = calloc(1, sizeof *f);
-    const strl_renderer_desc desc = {.backend = STRL_BACKEND_NULL, .width = 64, .height = 48, .gpu_memory_bytes = 4 << 20};
+    const strl_renderer_desc desc = {
+        .backend = STRL_BACKEND_NULL, .width = 64, .height = 48, .gpu_memory_bytes = 4 << 20};
     patches_init(&f->all, (patches_desc){.side = 2});
     f->camera = patches_camera(&f->all, 64, 48, 0.3);
     *state = f;

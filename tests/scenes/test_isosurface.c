@@ -316,7 +316,8 @@ static void the_bytes_do_not_depend_on_the_memory(void **state)
     assert_true(file_hash(path) == hash);
 }
 
-/* Golden: another compiler, flag or processor must not change a byte. A deliberate change of the scene changes these. */
+/* Golden: another compiler, flag or processor must not change a byte. A deliberate change of the scene changes these.
+ */
 static void the_seed_fixes_every_byte(void **state)
 {
     (void)state;

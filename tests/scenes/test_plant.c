@@ -1,4 +1,5 @@
-/* The scene of parts: its counts, its files, and what is left of a failure. test_plant_files.py reads what is inside. */
+/* The scene of parts: its counts, its files, and what is left of a failure. test_plant_files.py reads what is inside.
+ */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

@@ -41,7 +41,7 @@ static void an_address_has_its_rate_and_no_other_pays_for_it(void **state)
     assert_int_equal(allowed(&rates, &one, 100, 2 * SECOND), 5);
     assert_int_equal(allowed(&rates, &one, 100, 1000 * SECOND), 10);
     assert_int_equal(allowed(&rates, &one, 100, 999 * SECOND), 0); /* a clock that goes back gives nothing */
-    one.port = 7; /* another connection of the same address */
+    one.port = 7;                                                  /* another connection of the same address */
     assert_int_equal(allowed(&rates, &one, 100, 1000 * SECOND), 0);
     strl__rates_deinit(&rates);
 }
@@ -196,7 +196,9 @@ static void text_is_escaped_for_where_it_goes(void **state)
     assert_put(strl__put_log, "GET\r\nX \"\\\x1b\xff", "GET\\x0d\\x0aX\\x20\\x22\\x5c\\x1b\\xff");
     assert_put(strl__put_log, "", "-");
     char line[16];
-    strl__log_text("ab\ncd\x1b" "efghijk", line, sizeof line);
+    strl__log_text("ab\ncd\x1b"
+                   "efghijk",
+                   line, sizeof line);
     assert_string_equal(line, "ab\\x0acd\\x1b"); /* cut, but not within an escape */
 }
 

@@ -1,5 +1,5 @@
-/* Queries against containers that lie: what they claim costs no memory, what contradicts itself is refused, and what is found
- * out is not forgotten where a query may read no more. */
+/* Queries against containers that lie: what they claim costs no memory, what contradicts itself is refused, and what is
+ * found out is not forgotten where a query may read no more. */
 #include "container/fixture.h"
 
 #include "container/reseal.h"
@@ -71,8 +71,8 @@ static strl__query *query_of(uint32_t node, uint32_t depth)
 }
 
 /* In one go; where no more may be read what is there is all. */
-static strl_status select_all(strl_container *container, const strl__query *query, uint64_t most_bytes, strl__selection *selection,
-                              strl_error *err)
+static strl_status select_all(strl_container *container, const strl__query *query, uint64_t most_bytes,
+                              strl__selection *selection, strl_error *err)
 {
     strl__selecting *selecting;
     bool is_done;
@@ -220,8 +220,10 @@ static void a_query_that_may_read_no_more_is_cut(void **state)
     drop_served(self);
 }
 
-/* In steps of so many nodes, each of which may read little; others are at work in between. Returns how many there were. */
-static unsigned select_in_steps(served *self, const strl__query *query, uint64_t most_bytes, uint32_t step, strl__selection *selection)
+/* In steps of so many nodes, each of which may read little; others are at work in between. Returns how many there were.
+ */
+static unsigned select_in_steps(served *self, const strl__query *query, uint64_t most_bytes, uint32_t step,
+                                strl__selection *selection)
 {
     strl__selecting *selecting = NULL;
     strl_error err = {0};
@@ -304,7 +306,8 @@ static void a_container_at_work_keeps_nobody_waiting(void **state)
     strl__selection selection;
     strl_error err = {0};
     assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &model, NULL, &err), STRL_OK);
-    assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &other, NULL, &err), STRL_ERR_CANCELLED);
+    assert_int_equal(strl__models_borrow(&self->models, self->file, &self->info, &other, NULL, &err),
+                     STRL_ERR_CANCELLED);
     assert_null(other);
     assert_int_equal(model->users, 1);
     strl__models_return(&self->models, model);

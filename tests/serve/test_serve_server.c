@@ -189,7 +189,7 @@ static void answers_under_way_hold_no_more_memory_than_they_may(void **state)
     unsigned taken = 0, refused = 0;
     for (unsigned i = 0; i < CLIENTS; i++)
         clients[i] = ask(strl_server_port(server), "/?format=json");
-    strl_sleep_ns(300 * MS); /* the head of an answer costs no bandwidth, that of a small body does */
+    strl_sleep_ns(300 * MS);      /* the head of an answer costs no bandwidth, that of a small body does */
     strl_server_close(server, 0); /* what waits is let go */
     for (unsigned i = 0; i < CLIENTS; i++) {
         int status = status_of(clients[i]);
@@ -332,7 +332,8 @@ static uint64_t time_of(const long_work *work)
     return least_ns;
 }
 
-/* One turn is a hundredth of it. Where the machine does something else for long the turn may be late, but not each time. */
+/* One turn is a hundredth of it. Where the machine does something else for long the turn may be late, but not each
+ * time. */
 static void a_query_at_work_is_not_idle(void **state)
 {
     (void)state;
@@ -410,7 +411,8 @@ static void between_two_turns_others_of_the_thread_are_served(void **state)
         wait_for_change(&server->site.metrics.query_turns, before);
         say(client[1], "GET /model.stroll HTTP/1.1\r\nHost: x\r\nRange: bytes=0-99\r\n\r\n");
         assert_int_equal(take_answer(client[1]), 206);
-        is_between = atomic_load(&server->site.queries) == 1; /* where the machine was slow it may have ended already */
+        /* where the machine was slow it may have ended already */
+        is_between = atomic_load(&server->site.queries) == 1;
         assert_int_equal(take_answer(client[0]), 200);
     }
     assert_true(is_between);

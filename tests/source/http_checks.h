@@ -1,4 +1,5 @@
-/* What the tests of a file behind an address share: the file, rules for its server, reads, and checks of what they give. */
+/* What the tests of a file behind an address share: the file, rules for its server, reads, and checks of what they
+ * give. */
 #ifndef HTTP_CHECKS_H
 #define HTTP_CHECKS_H
 

@@ -1,5 +1,5 @@
-/* A file behind an address: reads merged, ordered, cancelled and given up, its addresses, and no memory. Times are as short
- * as they can be, and nothing depends on how fast the machine is. */
+/* A file behind an address: reads merged, ordered, cancelled and given up, its addresses, and no memory. Times are as
+ * short as they can be, and nothing depends on how fast the machine is. */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -89,7 +89,8 @@ static void a_waiting_read_that_comes_back_finds_what_was_near(void **state)
     fault_server_destroy(server);
 }
 
-enum { MANY = 60, MANY_BYTES = 3000, FAR = 17000, NEAR = 5000 }; /* so near that on any link one request brings several */
+/* so near that on any link one request brings several */
+enum { MANY = 60, MANY_BYTES = 3000, FAR = 17000, NEAR = 5000 };
 
 static strl_source_span known_span(uint64_t offset, size_t size, void *data)
 {
@@ -117,7 +118,8 @@ static void reads_together_give_what_each_would_alone(void **state)
     for (size_t i = 0; i < MANY; i++)
         assert_memory_equal(data + i * MANY_BYTES, content + spans[i].offset, spans[i].size);
     unsigned requests = fault_server_asked(server, asked, MANY);
-    /* Six or more in each, as long as nothing lies between two that are on their way: 21 at most; the head, and what was cut off. */
+    /* Six or more in each, as long as nothing lies between two that are on their way: 21 at most; the head, and what
+     * was cut off. */
     assert_true(requests <= MANY / 2);
     spans[20].offset = BYTES - 10;
     assert_int_equal(strl_source_read_many(source, spans, MANY, &err), STRL_ERR_FORMAT);
@@ -161,7 +163,8 @@ static void bytes_that_are_always_wrong_are_asked_for_some_times(void **state)
     strl_source *source = must_open_memory();
     strl_source_span span = known_span(500000, sizeof data, data);
     span.checksum++;
-    assert_int_equal(strl_source_read_known(source, &span, NULL), STRL_OK); /* nobody is asked twice for what is in memory */
+    /* nobody is asked twice for what is in memory */
+    assert_int_equal(strl_source_read_known(source, &span, NULL), STRL_OK);
     strl_source_close(source);
     const fault_rule wrong = {.wrong_bytes = true};
     fault_server *server = fault_server_create(&good, by_number, LISTED(well, wrong));

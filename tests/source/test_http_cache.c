@@ -1,4 +1,5 @@
-/* A file behind an address, read with a cache: what a later run finds there, damage, doubts, and none that can be used. */
+/* A file behind an address, read with a cache: what a later run finds there, damage, doubts, and none that can be used.
+ */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>

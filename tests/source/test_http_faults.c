@@ -238,8 +238,8 @@ static void an_outage_is_one_attempt_however_many_requests_it_ends(void **state)
     enum { READS = 12, UNDER_WAY = 6 };
     const strl_http_desc desc = {.connections = UNDER_WAY, .backoff_ms = 500, .stall_ms = 60000};
     const fault_rule silent = {.delay_ms = 60000}; /* nothing comes, so that nobody was reached */
-    fault_server *server = fault_server_create(
-        &good, by_number, LISTED(well, silent, silent, silent, silent, silent, silent, well));
+    fault_server *server =
+        fault_server_create(&good, by_number, LISTED(well, silent, silent, silent, silent, silent, silent, well));
     strl_source *source = must_open(fault_server_url(server, "/model"), &desc);
     for (uint64_t i = 0; i < READS; i++)
         submit(source, i, 50000 + 80000 * i, 20000, 0);

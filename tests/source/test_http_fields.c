@@ -198,8 +198,7 @@ static void the_first_answer_may_be_shorter_but_must_say_what_it_is(void **state
 {
     (void)state;
     const strl__http_asked opening = {.first = 0, .last = 4095, .opening = true};
-    strl__http_fields answer = {
-        .status = 206, .range_known = true, .first = 0, .last = 99, .identity = {.total = 100}};
+    strl__http_fields answer = {.status = 206, .range_known = true, .first = 0, .last = 99, .identity = {.total = 100}};
     check(&opening, &answer, STRL__HTTP_GOOD, "");
     answer.identity.total = 101;
     check(&opening, &answer, STRL__HTTP_AGAIN, "bytes 0 to 99, expected 0 to 100");

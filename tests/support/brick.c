@@ -75,7 +75,8 @@ static void next_splat(test_stream *stream, test_brick_splat *splat)
 {
     next_byte(&stream[SIDE], &splat->side);
     for (unsigned k = 0; k < 3; k++)
-        splat->centre[k] = middle_of(units_of(splat->centre[k], splat->side) + next_residual(&stream[CENTRE]), splat->side);
+        splat->centre[k] =
+            middle_of(units_of(splat->centre[k], splat->side) + next_residual(&stream[CENTRE]), splat->side);
     splat->coverage = (uint8_t)(255 - test_stream_next(&stream[COVERAGE]));
     for (unsigned k = 0; k < 2; k++)
         next_byte(&stream[NORMAL], &splat->normal[k]);
@@ -109,7 +110,8 @@ void test_brick_read(test_brick *brick, const uint8_t *payload, size_t size)
     size_t at = 0;
     test_stream stream[TEST_BRICK_STREAMS];
     test_brick_splat splat = {.rgba = UINT32_MAX};
-    *brick = (test_brick){.level = room(MOST_LEVELS, sizeof *brick->level), .splat = room(MOST_SPLATS, sizeof *brick->splat)};
+    *brick = (test_brick){.level = room(MOST_LEVELS, sizeof *brick->level),
+                          .splat = room(MOST_SPLATS, sizeof *brick->splat)};
     brick->version = (uint8_t)take(payload, size, &at, 1);
     brick->level_count = (uint8_t)take(payload, size, &at, 1);
     size_t coded = take(payload, size, &at, 4);

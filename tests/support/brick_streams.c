@@ -82,7 +82,8 @@ static void read_stream(coded *from, test_stream *stream)
             test_stream_push(stream, next_bits(from, mode));
             continue;
         }
-        unsigned symbol = next_symbol(from, &from->state[stream->count % 4], frequency), raw = symbol < 16 ? 0 : (symbol - 16) / 2 + 3;
+        unsigned symbol = next_symbol(from, &from->state[stream->count % 4], frequency),
+                 raw = symbol < 16 ? 0 : (symbol - 16) / 2 + 3;
         test_stream_push(stream, raw ? ((2 + symbol % 2) << raw) + next_bits(from, raw) : symbol);
     }
 }

@@ -243,7 +243,8 @@ static bool answer(fault_server *server, int socket, fault_request *request)
     if (request->asked.redirected)
         return send_status(socket, 302, "Location: /model");
     if (strcmp(request->path, "/moved") == 0)
-        return send_text(socket, "HTTP/1.1 302 Told So\r\nLocation: http://127.0.0.1:%u/model\r\nContent-Length: 0\r\n\r\n",
+        return send_text(socket,
+                         "HTTP/1.1 302 Told So\r\nLocation: http://127.0.0.1:%u/model\r\nContent-Length: 0\r\n\r\n",
                          (unsigned)server->port);
     if (strcmp(request->path, "/loop") == 0)
         return send_status(socket, 302, "Location: /loop");

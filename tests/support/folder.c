@@ -17,7 +17,8 @@ int strl_test_folder_make(void **state)
 int strl_test_folder_remove(void **state)
 {
     (void)state;
-    return strl_path_remove_directory(strl_test_folder, NULL) == STRL_OK && !strl_path_exists(strl_test_folder) ? 0 : -1;
+    return strl_path_remove_directory(strl_test_folder, NULL) == STRL_OK && !strl_path_exists(strl_test_folder) ? 0
+                                                                                                                : -1;
 }
 
 const char *strl_test_path(const char *name)

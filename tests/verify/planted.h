@@ -117,7 +117,8 @@ static inline void model__place(const model *self, strl_container_writer *to)
     strl_error err = {0};
     for (uint32_t i = 0; i < self->copies; i++) {
         double turn = 0.1 * i, c = cos(turn), s = sin(turn), flip = i % 3 ? 1 : -2;
-        const strl_placement copy = {.transform = {c, -s, 0.01 * i, 20. * (i % 32), s, c, 0, 20. * (i / 32), 0, i % 5 * 0.3, flip, 0}};
+        const strl_placement copy = {
+            .transform = {c, -s, 0.01 * i, 20. * (i % 32), s, c, 0, 20. * (i / 32), 0, i % 5 * 0.3, flip, 0}};
         model__check(strl_container_writer_add_placement(to, &copy, &err), &err);
     }
 }

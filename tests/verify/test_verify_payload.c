@@ -59,8 +59,9 @@ static void paint(strl_pm *mesh, strl_arena *arena, uint32_t seed)
         mesh->colour[v] = (uint32_t)(mesh->position[v][0] >> 4) * 0x010203u ^
                           (v % 97 ? 0xff000000u : (uint32_t)strl__mix64(v + seed));
         if (mesh->texcoord)
-            mesh->texcoord[v] = v % 61 ? (uint32_t)(mesh->position[v][0] & 0xffff) | (uint32_t)mesh->position[v][1] << 16
-                                       : (uint32_t)strl__mix64(v);
+            mesh->texcoord[v] = v % 61
+                                    ? (uint32_t)(mesh->position[v][0] & 0xffff) | (uint32_t)mesh->position[v][1] << 16
+                                    : (uint32_t)strl__mix64(v);
         mesh->palette_index[v] = (uint16_t)(v % 50 ? 1 : v % 3);
     }
 }
@@ -117,7 +118,8 @@ static void visit(decode_tally *tally, uint32_t id, const told_by *parent, strl_
     strl_writer payload = {0};
     if (id % 2)
         paint(mesh, arena, id);
-    assert_int_equal(strl_payload_encode(mesh, parent ? &parent->reference : NULL, arena, &payload, NULL, NULL), STRL_OK);
+    assert_int_equal(strl_payload_encode(mesh, parent ? &parent->reference : NULL, arena, &payload, NULL, NULL),
+                     STRL_OK);
     uint32_t before = tally->accepted;
     compare_decoders(payload.data, payload.size, parent, tally);
     assert_int_equal(tally->accepted, before + 1);

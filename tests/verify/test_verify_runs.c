@@ -4,7 +4,7 @@
 #include "base/cursor.h"
 #include "container/reseal.h"
 
-#define COPIES 1200u /* three pages */
+#define COPIES 1200u      /* three pages */
 #define ITEMS (4 + 4 * 3) /* where the first run's item lies in the only leaf of their table */
 
 static model sheet;
@@ -48,7 +48,8 @@ static void copies_of_a_sound_tree_are_sound(void **state)
     model_plant(&sheet, no_fault, NULL);
     strl_verify_report report = check_file();
     for (unsigned kind = 0; kind < STRL_VERIFY_KINDS; kind++)
-        if (report.checks[kind].failures && kind != STRL_VERIFY_COUNTS) /* the tree's triangles were counted by nobody */
+        if (report.checks[kind].failures &&
+            kind != STRL_VERIFY_COUNTS) /* the tree's triangles were counted by nobody */
             fail_msg("%s: %s", strl_verify_name((strl_verify_kind)kind), report.checks[kind].first);
     assert_true(report.checks[STRL_VERIFY_TABLES].count > COPIES);
     strl_verify_report_deinit(&report);
@@ -133,7 +134,8 @@ static void each_lie_about_a_run_is_found(void **state)
 static void a_placement_outside_of_its_run_is_found(void **state)
 {
     (void)state;
-    const uint64_t runs = section_offset(4) + ITEMS, page = strl__load_le(good + runs + 64, 8), first = page + 4 + 4 * 512;
+    const uint64_t runs = section_offset(4) + ITEMS, page = strl__load_le(good + runs + 64, 8),
+                   first = page + 4 + 4 * 512;
     expect(first + 8 + 56, 8, bits_of(500), "of its box is");
     expect(first + 8 + 80, 8, bits_of(4), "");
 }

@@ -1,4 +1,5 @@
-/* A sample tree that lies is found by `verify` and refused by the readers with a sentence: each lie of a brick, of a record, of a triangle. */
+/* A sample tree that lies is found by `verify` and refused by the readers with a sentence: each lie of a brick, of a
+ * record, of a triangle. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -67,8 +68,13 @@ static int setup(void **state)
 static strl_verify_report look(const char *name, bool against)
 {
     const char *inputs[] = {built_path("in.ply")};
-    const strl_verify_desc desc = {.model = built_path(name), .inputs = inputs, .input_count = against, .scratch_dir = built_path(""),
-                                   .memory_bytes = 256u << 20, .jobs = 2, .cuts = 4};
+    const strl_verify_desc desc = {.model = built_path(name),
+                                   .inputs = inputs,
+                                   .input_count = against,
+                                   .scratch_dir = built_path(""),
+                                   .memory_bytes = 256u << 20,
+                                   .jobs = 2,
+                                   .cuts = 4};
     strl_verify_report report;
     strl_error err = {0};
     if (strl_verify_run(&desc, &report, &err) != STRL_OK)
@@ -109,7 +115,12 @@ static void assert_refused_by_readers(uint32_t node, const char *what)
 
 static strl_camera near_camera(void)
 {
-    return (strl_camera){.eye = {0.5, -0.2, 0.5}, .target = {0.5, 0.5, 0.5}, .up = {0, 0, 1}, .fov_y_deg = 70, .width = 800, .height = 600};
+    return (strl_camera){.eye = {0.5, -0.2, 0.5},
+                         .target = {0.5, 0.5, 0.5},
+                         .up = {0, 0, 1},
+                         .fov_y_deg = 70,
+                         .width = 800,
+                         .height = 600};
 }
 
 static void assert_refused_by_walk(const char *what)
@@ -396,7 +407,8 @@ static void a_head_that_says_more_than_follows_is_refused(void **state)
     strl_node record;
     uint64_t at = head_of_liar(&record);
     uint8_t *bytes = built_read_file(built_path(GOOD), &size);
-    const uint64_t said = strl__load_le(bytes + at + 2, 4), counts[] = {0xffffffffu, 0x80000000u, said + 1, said - 1, 19, 0};
+    const uint64_t said = strl__load_le(bytes + at + 2, 4),
+                   counts[] = {0xffffffffu, 0x80000000u, said + 1, said - 1, 19, 0};
     for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
         strl__store_le(bytes + at + 2, 4, counts[i]); /* bytes of streams */
         store_resealed(bytes, size);
@@ -495,7 +507,8 @@ static void a_lie_in_a_record_is_found(void **state)
         if (report.checks[lies[i].kind].failures == 0)
             for (unsigned k = 0; k < STRL_VERIFY_KINDS; k++)
                 if (report.checks[k].failures)
-                    print_message("%s: by %s: %s\n", lies[i].name, strl_verify_name((strl_verify_kind)k), report.checks[k].first);
+                    print_message("%s: by %s: %s\n", lies[i].name, strl_verify_name((strl_verify_kind)k),
+                                  report.checks[k].first);
         assert_true(report.checks[lies[i].kind].failures > 0);
         strl_verify_report_deinit(&report);
     }
@@ -541,7 +554,8 @@ static long least_cosine(const built_model *sphere, uint32_t id, const int16_t a
         double side[2][3], length = 0, along = 0;
         for (int s = 0; s < 2; s++)
             for (int k = 0; k < 3; k++)
-                side[s][k] = (double)mesh->position[mesh->triangle[t][s + 1]][k] - mesh->position[mesh->triangle[t][0]][k];
+                side[s][k] =
+                    (double)mesh->position[mesh->triangle[t][s + 1]][k] - mesh->position[mesh->triangle[t][0]][k];
         for (int k = 0; k < 3; k++) {
             double n = side[0][(k + 1) % 3] * side[1][(k + 2) % 3] - side[0][(k + 2) % 3] * side[1][(k + 1) % 3];
             length += n * n;

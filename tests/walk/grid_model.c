@@ -148,7 +148,8 @@ static piece take_piece(builder *b, uint32_t first, uint32_t end)
         for (unsigned i = 0; i < 3; i++)
             p.mesh.position[v][i] = (int32_t)position[i];
         p.mesh.flags[v] = STRL_POINT_KEPT;
-        p.mesh.wedge[v] = (strl_wedge){v, {512, 512}, 0xff000000u | (uint32_t)strl__mix64(p.vertex[v]) % 0xffffffu, 0, 0};
+        p.mesh.wedge[v] =
+            (strl_wedge){v, {512, 512}, 0xff000000u | (uint32_t)strl__mix64(p.vertex[v]) % 0xffffffu, 0, 0};
     }
     for (uint32_t i = 0; i < triangles; i++) {
         const triangle *t = &b->triangles[p.source[i]];

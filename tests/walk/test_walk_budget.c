@@ -35,8 +35,8 @@ static void resident_bytes_never_pass_the_budget(void **state)
         uint64_t memory = (uint64_t)600 << (10 + run);
         watched_source *source = watched_source_open(memory_source(model, model_bytes));
         source->hold_percent = 30;
-        strl_walk *walk = open_walk(
-            &source->base, &(strl_walk_desc){.memory_bytes = memory, .error_px = 0.5, .labels = run % 2 == 1});
+        strl_walk *walk = open_walk(&source->base,
+                                    &(strl_walk_desc){.memory_bytes = memory, .error_px = 0.5, .labels = run % 2 == 1});
         for (unsigned at = 0; at < 200; at++) {
             strl_camera camera = at % 4 ? flight_camera(11 * at) : random_camera(&random);
             strl_draw_list list = walk_frame(walk, &camera);
@@ -130,7 +130,8 @@ static void all_nodes_that_are_wanted_of_a_page_share_its_read(void **state)
 static void pages_that_are_kept_go_before_anything_else_and_are_few(void **state)
 {
     (void)state;
-    strl_walk *walk = open_walk(memory_source(model, model_bytes), &(strl_walk_desc){.memory_bytes = 40 << 20, .error_px = 0.25});
+    strl_walk *walk =
+        open_walk(memory_source(model, model_bytes), &(strl_walk_desc){.memory_bytes = 40 << 20, .error_px = 0.25});
     strl_camera camera = flight_camera(500);
     settle(walk, &camera, 1000);
     assert_true(walk->kept_bytes > 100 << 10 && walk->kept_bytes <= walk->memory_bytes / 32);

@@ -396,8 +396,7 @@ static int64_t (*drawn_triangles(const strl_draw_list *list, size_t *count))[3][
         for (uint32_t k = 0; k < item->draw_count; k++, corner++) {
             assert_true(indices[k] < item->vertex_count);
             for (int axis = 0; axis < 3; axis++)
-                triangle[corner / 3][corner % 3][axis] =
-                    item->anchor[axis] + item->vertices[indices[k]].position[axis];
+                triangle[corner / 3][corner % 3][axis] = item->anchor[axis] + item->vertices[indices[k]].position[axis];
         }
     }
     return triangle;

@@ -1,4 +1,5 @@
-/* A walk as another program embeds it: bytes by callbacks on the source's threads, decoding by an executor of its own. */
+/* A walk as another program embeds it: bytes by callbacks on the source's threads, decoding by an executor of its own.
+ */
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdatomic.h>

@@ -1,5 +1,6 @@
-/* Where backs are not drawn the walk leaves out what shows nothing else, and nothing that does: the test of cones against all placements
- * and cameras, and walks through a closed sample tree whose pictures with and without cones are the same. */
+/* Where backs are not drawn the walk leaves out what shows nothing else, and nothing that does: the test of cones
+ * against all placements and cameras, and walks through a closed sample tree whose pictures with and without cones are
+ * the same. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -65,7 +66,8 @@ static wide before(const strl_camera *camera, const double m[12], wide corner[3]
         side[0][k] = corner[1][k] - corner[0][k];
         side[1][k] = corner[2][k] - corner[0][k];
     }
-    wide volume = product(from[0], side[0], side[1]), size = length_of(from[0]) * length_of(side[0]) * length_of(side[1]);
+    wide volume = product(from[0], side[0], side[1]),
+         size = length_of(from[0]) * length_of(side[0]) * length_of(side[1]);
     return size == 0 ? 0 : (is_mirror(m) ? volume : -volume) / size;
 }
 
@@ -109,7 +111,8 @@ static situation any_situation(uint64_t *random)
     for (int k = 0; k < 3; k++) {
         s.tree.origin[k] = between(random, -1000, 1000);
         s.record.box_min[k] = (int64_t)between(random, -0x1p21, 0x1p21);
-        s.record.box_max[k] = s.record.box_min[k] + (int64_t)(next_random(random) < 0.1 ? 0 : pow(2, between(random, 0, 18)));
+        s.record.box_max[k] =
+            s.record.box_min[k] + (int64_t)(next_random(random) < 0.1 ? 0 : pow(2, between(random, 0, 18)));
         size = fmax(size, (double)(s.record.box_max[k] - s.record.box_min[k]));
     }
     for (int k = 0; k < 3; k++)
@@ -150,7 +153,9 @@ static wide look_at_any_face(uint64_t *random, const situation *s)
     any_normal(random, &s->record.cone, normal);
     for (int k = 0; k < 3; k++) {
         double share = next_random(random);
-        at[k] = (wide)s->record.box_min[k] + (share < 0.3 ? 0 : share > 0.7 ? 1 : (wide)(share - 0.3) / 0.4L) *
+        at[k] = (wide)s->record.box_min[k] + (share < 0.3   ? 0
+                                              : share > 0.7 ? 1
+                                                            : (wide)(share - 0.3) / 0.4L) *
                                                  (wide)(s->record.box_max[k] - s->record.box_min[k]);
         side[k] = between(random, -1, 1);
     }
@@ -198,8 +203,11 @@ static void nothing_that_faces_the_eye_is_left_out(void **state)
 static void without_a_cone_or_an_inverse_nothing_faces_away(void **state)
 {
     (void)state;
-    situation s = {.tree = {.step = 1}, .transform = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
-                   .camera = {.eye = {0.5, 0.5, -9}, .target = {0.5, 0.5, 0}, .up = {0, 1, 0}, .fov_y_deg = 60, .width = 9, .height = 9}};
+    situation s = {
+        .tree = {.step = 1},
+        .transform = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
+        .camera = {
+            .eye = {0.5, 0.5, -9}, .target = {0.5, 0.5, 0}, .up = {0, 1, 0}, .fov_y_deg = 60, .width = 9, .height = 9}};
     strl_view view;
     for (int k = 0; k < 3; k++)
         s.record.box_max[k] = 1;
@@ -224,7 +232,8 @@ static void without_a_cone_or_an_inverse_nothing_faces_away(void **state)
     assert_false(facing.known || strl__faces_away(&facing, &s.record));
 }
 
-/* ---- a closed model: a sphere of radius 1, in three places of which one mirrors and one is neither round nor upright */
+/* ---- a closed model: a sphere of radius 1, in three places of which one mirrors and one is neither round nor upright
+ */
 
 #define RINGS 240u
 #define CAMERAS 16u
@@ -248,7 +257,8 @@ static void write_placed(const char *name, bool with_cone)
     size_t size;
     uint64_t bytes;
     uint8_t *file = built_read_file(built_path("round.stroll"), &size);
-    const strl_container_writer_desc desc = {.path = built_path(name), .scratch_dir = built_path(""), .info = model.info};
+    const strl_container_writer_desc desc = {
+        .path = built_path(name), .scratch_dir = built_path(""), .info = model.info};
     strl_status status = strl_container_writer_create(&desc, &to, &err);
     if (status == STRL_OK)
         status = strl_container_writer_begin_tree(to, &model.tree, &err);
@@ -256,7 +266,8 @@ static void write_placed(const char *name, bool with_cone)
         strl_node record = model.node[id];
         if (!with_cone)
             record.cone = (strl_cone){0};
-        status = strl_container_writer_add_node(to, &record, file + record.page.offset + record.payload_offset, record.payload_bytes, &err);
+        status = strl_container_writer_add_node(to, &record, file + record.page.offset + record.payload_offset,
+                                                record.payload_bytes, &err);
     }
     if (status == STRL_OK)
         status = strl_container_writer_end_tree(to, &err);
@@ -350,7 +361,8 @@ static bool *listed_bricks(const strl_draw_list *list)
         }
     for (size_t p = 0; p < PLACES; p++) /* bricks add up: none is drawn without what is above it */
         for (uint32_t id = 1; id < model.tree.node_count; id++)
-            assert_true(!listed[p * model.tree.node_count + id] || listed[p * model.tree.node_count + model.node[id].parent]);
+            assert_true(!listed[p * model.tree.node_count + id] ||
+                        listed[p * model.tree.node_count + model.node[id].parent]);
     return listed;
 }
 
@@ -360,7 +372,8 @@ static void bricks_that_are_left_out_show_no_front(void **state)
     uint64_t random = 3, left_out = 0, drawn = 0, counted = 0;
     const double errors[] = {1e-9, 0.5, 4};
     for (size_t e = 0; e < sizeof errors / sizeof *errors; e++) {
-        strl_walk *walk = open_model(true, errors[e], STRL_CULL_BACK), *plain = open_model(false, errors[e], STRL_CULL_NONE);
+        strl_walk *walk = open_model(true, errors[e], STRL_CULL_BACK),
+                  *plain = open_model(false, errors[e], STRL_CULL_NONE);
         for (unsigned i = 0; i < CAMERAS; i++) {
             strl_camera camera = any_camera(&random);
             strl_draw_list list = settle(walk, &camera, 2000), all = settle(plain, &camera, 2000);
@@ -397,14 +410,17 @@ static void without_the_word_cones_do_nothing(void **state)
               *no_cones = open_model(false, 1, STRL_CULL_BACK);
     for (unsigned i = 0; i < CAMERAS; i++) {
         strl_camera camera = any_camera(&random);
-        strl_draw_list list = settle(walk, &camera, 2000), all = settle(plain, &camera, 2000), same = settle(no_cones, &camera, 2000);
+        strl_draw_list list = settle(walk, &camera, 2000), all = settle(plain, &camera, 2000),
+                       same = settle(no_cones, &camera, 2000);
         const strl_draw_list *lists[] = {&list, &same};
         for (int l = 0; l < 2; l++) {
             assert_int_equal(lists[l]->count, all.count);
             for (uint32_t k = 0; k < all.count; k++)
-                assert_true(lists[l]->items[k].node == all.items[k].node && lists[l]->items[k].draw_count == all.items[k].draw_count);
+                assert_true(lists[l]->items[k].node == all.items[k].node &&
+                            lists[l]->items[k].draw_count == all.items[k].draw_count);
         }
-        assert_int_equal(strl_walk_get_stats(walk)->nodes_backfacing + strl_walk_get_stats(no_cones)->nodes_backfacing, 0);
+        assert_int_equal(strl_walk_get_stats(walk)->nodes_backfacing + strl_walk_get_stats(no_cones)->nodes_backfacing,
+                         0);
     }
     strl_walk_close(walk);
     strl_walk_close(plain);
@@ -419,7 +435,8 @@ static void settled_lists_are_the_same_from_wherever_one_comes(void **state)
     for (unsigned i = 0; i < CAMERAS; i++) {
         strl_camera camera = any_camera(&random);
         for (unsigned frame = 0; frame < 2; frame++) { /* on the way */
-            walk_frame(walk, &(strl_camera){.eye = {4, 3, i}, .up = {0, 1, 0}, .fov_y_deg = 60, .width = WIDTH, .height = HEIGHT});
+            walk_frame(walk, &(strl_camera){
+                                 .eye = {4, 3, i}, .up = {0, 1, 0}, .fov_y_deg = 60, .width = WIDTH, .height = HEIGHT});
             strl_walk_pump(walk, 1);
         }
         strl_draw_list list = settle(walk, &camera, 2000);
@@ -427,7 +444,8 @@ static void settled_lists_are_the_same_from_wherever_one_comes(void **state)
         strl_draw_list expected = settle(fresh, &camera, 2000);
         assert_int_equal(list.count, expected.count);
         for (uint32_t k = 0; k < list.count; k++)
-            assert_true(list.items[k].node == expected.items[k].node && list.items[k].placement == expected.items[k].placement &&
+            assert_true(list.items[k].node == expected.items[k].node &&
+                        list.items[k].placement == expected.items[k].placement &&
                         list.items[k].draw_count == expected.items[k].draw_count);
         assert_int_equal(strl_walk_get_stats(walk)->nodes_backfacing, strl_walk_get_stats(fresh)->nodes_backfacing);
         strl_walk_close(fresh);
@@ -435,8 +453,8 @@ static void settled_lists_are_the_same_from_wherever_one_comes(void **state)
     strl_walk_close(walk);
 }
 
-/* What is left out is not waited for, and takes no memory that something else needs: a quarter of the bricks, so that nine tenths of the memory
- * do for one side, with room for one to be decoded, and not for both. */
+/* What is left out is not waited for, and takes no memory that something else needs: a quarter of the bricks, so that
+ * nine tenths of the memory do for one side, with room for one to be decoded, and not for both. */
 static void one_side_takes_less_memory(void **state)
 {
     (void)state;
@@ -449,8 +467,9 @@ static void one_side_takes_less_memory(void **state)
     uint32_t all = strl_walk_get_stats(plain)->nodes;
     strl_walk_close(plain);
     for (int cull = STRL_CULL_NONE; cull <= STRL_CULL_BACK; cull++) {
-        strl_walk *walk = open_walk(memory_source(bytes, size),
-                                    &(strl_walk_desc){.error_px = 0.5, .memory_bytes = needed * 92 / 100, .cull = (strl_cull)cull});
+        strl_walk *walk =
+            open_walk(memory_source(bytes, size),
+                      &(strl_walk_desc){.error_px = 0.5, .memory_bytes = needed * 92 / 100, .cull = (strl_cull)cull});
         settle(walk, &camera, 4000);
         const strl_walk_stats *stats = strl_walk_get_stats(walk);
         assert_true((stats->allowed_error_px == 0.5) == (cull == STRL_CULL_BACK));
@@ -466,7 +485,8 @@ static void late_or_without_memory_the_walk_goes_on(void **state)
     (void)state;
     uint64_t random = 7;
     watched_source *source = watched_source_open(memory_source(with_cones, size_with));
-    strl_walk *walk = open_walk(&source->base, &(strl_walk_desc){.error_px = 0.5, .requests_in_flight = 2, .cull = STRL_CULL_BACK});
+    strl_walk *walk =
+        open_walk(&source->base, &(strl_walk_desc){.error_px = 0.5, .requests_in_flight = 2, .cull = STRL_CULL_BACK});
     unsigned late = 0;
     source->walking = true;
     source->hold_percent = 80;
@@ -521,8 +541,8 @@ static void pictures_with_cones_are_those_without(void **state)
 {
     (void)state;
     static picture culled, plain, both_sides;
-    const strl_renderer_desc descs[] = {{.backend = STRL_BACKEND_GL45}, {.backend = STRL_BACKEND_GL3},
-                                        {.backend = STRL_BACKEND_GL3, .gles = true}};
+    const strl_renderer_desc descs[] = {
+        {.backend = STRL_BACKEND_GL45}, {.backend = STRL_BACKEND_GL3}, {.backend = STRL_BACKEND_GL3, .gles = true}};
     uint64_t triangles = 0, all_triangles = 0;
     unsigned outside = 0;
     for (size_t d = 0; d < sizeof descs / sizeof *descs; d++) {
@@ -538,7 +558,8 @@ static void pictures_with_cones_are_those_without(void **state)
         uint64_t random = 6;
         for (unsigned i = 0; i < CAMERAS; i++) {
             strl_camera camera = any_camera(&random);
-            strl_draw_list list = settle(walk, &camera, 2000), all = settle(without, &camera, 2000), sides = settle(closed, &camera, 2000);
+            strl_draw_list list = settle(walk, &camera, 2000), all = settle(without, &camera, 2000),
+                           sides = settle(closed, &camera, 2000);
             list.near_distance = all.near_distance; /* the depth's scale */
             list.far_distance = all.far_distance;
             shoot(renderer[0], &camera, &list, &culled);
@@ -547,7 +568,8 @@ static void pictures_with_cones_are_those_without(void **state)
             assert_int_equal(count_different(&culled, &plain), 0);
             triangles += culled.stats.triangles;
             all_triangles += plain.stats.triangles;
-            if (hypot(hypot(camera.eye[0], camera.eye[1]), camera.eye[2]) > 5.5) { /* outside of all: but for slivers of the rim */
+            /* outside of all: but for slivers of the rim */
+            if (hypot(hypot(camera.eye[0], camera.eye[1]), camera.eye[2]) > 5.5) {
                 assert_in_range(count_different(&culled, &both_sides), 0, WIDTH * HEIGHT / 200);
                 outside++;
             }

@@ -1,6 +1,6 @@
-/* Files that claim as many splats as the format allows, for cells as large as they like, seen by many placements of which nothing else
- * has arrived: a frame closes their holes with half a million points (docs/algorithms/samples.md, "Bricks"), begins with those that
- * come first, and succeeds. */
+/* Files that claim as many splats as the format allows, for cells as large as they like, seen by many placements of
+ * which nothing else has arrived: a frame closes their holes with half a million points (docs/algorithms/samples.md,
+ * "Bricks"), begins with those that come first, and succeeds. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -18,7 +18,7 @@
 #define ALONG 16u           /* of them lie in a row: 16 x 16 x 16 */
 #define GRID 20u            /* placements along x and along y */
 #define COPIES (GRID * GRID)
-#define MARKED 0xff0000ffu  /* red */
+#define MARKED 0xff0000ffu /* red */
 #define OTHERS 0xffffffffu
 #define GOOD "torus.stroll"
 #define BAD "claims.stroll"
@@ -60,7 +60,8 @@ static int64_t place_of(const strl_node *record, int axis, uint32_t part)
     return record->box_min[axis] + edge / 4 + edge * part / (2 * (int64_t)ALONG);
 }
 
-/* The root's finest splats are as many as can be, all of cells that a pixel never covers; what is below it is wanted in any case. */
+/* The root's finest splats are as many as can be, all of cells that a pixel never covers; what is below it is wanted in
+ * any case. */
 static bool claim_splats(void *context, uint32_t id, strl_node *record, test_brick *brick, strl_pm *mesh)
 {
     const claim *told = context;
@@ -69,10 +70,12 @@ static bool claim_splats(void *context, uint32_t id, strl_node *record, test_bri
         return false;
     for (uint32_t i = 0; i < SPLATS; i++) {
         test_brick_splat *splat = &brick->splat[i];
-        *splat = (test_brick_splat){.side = told->side, .coverage = 255, .parallel = 255, .rgba = i < told->marked ? MARKED : OTHERS};
+        *splat = (test_brick_splat){
+            .side = told->side, .coverage = 255, .parallel = 255, .rgba = i < told->marked ? MARKED : OTHERS};
         splat->normal[0] = splat->normal[1] = 128;
         for (int k = 0; k < 3; k++)
-            splat->centre[k] = (i < told->unseen ? record->box_min[k] : place_of(record, k, i >> 4 * (2 - k) & 15)) - record->anchor[k];
+            splat->centre[k] = (i < told->unseen ? record->box_min[k] : place_of(record, k, i >> 4 * (2 - k) & 15)) -
+                               record->anchor[k];
         splat->side = i < told->unseen ? 0 : told->side;
     }
     for (uint32_t i = 0; i < brick->level_count; i++)
@@ -135,15 +138,20 @@ static double width(int axis)
 
 static double middle(int axis)
 {
-    return model.tree.origin[axis] + model.tree.step * (double)(model.tree.box_max[axis] + model.tree.box_min[axis]) / 2;
+    return model.tree.origin[axis] +
+           model.tree.step * (double)(model.tree.box_max[axis] + model.tree.box_min[axis]) / 2;
 }
 
 /* From above: `wide` world units fill the height of the image. */
 static strl_camera above(double x, double y, double wide)
 {
     const double fov = 10, height = wide / 2 / tan(fov / 2 * M_PI / 180);
-    return (strl_camera){.eye = {x, y, middle(2) + height}, .target = {x, y, middle(2)}, .up = {0, 1, 0}, .fov_y_deg = fov,
-                         .width = 900, .height = 900};
+    return (strl_camera){.eye = {x, y, middle(2) + height},
+                         .target = {x, y, middle(2)},
+                         .up = {0, 1, 0},
+                         .fov_y_deg = fov,
+                         .width = 900,
+                         .height = 900};
 }
 
 /* ---- tests */
@@ -158,7 +166,8 @@ static void many_copies_share_the_work_of_a_frame(void **state)
     while (ldexp(model.tree.step, told.side + 1) < width(0) / ALONG)
         told.side++;
     for (uint32_t i = 0; i < COPIES; i++)
-        placement[i] = (strl_placement){.transform = {1, 0, 0, i % GRID * apart, 0, 1, 0, i / GRID * apart, 0, 0, 1, 0}};
+        placement[i] =
+            (strl_placement){.transform = {1, 0, 0, i % GRID * apart, 0, 1, 0, i / GRID * apart, 0, 0, 1, 0}};
     plant_placed_bricks(GOOD, BAD, claim_splats, &told, placement, COPIES);
     const strl_camera camera = above(middle(0) + centre, middle(1) + centre, 1.2 * GRID * apart);
     const counted found = see_first_frames(&camera);
@@ -198,7 +207,8 @@ static void the_work_ends_wherever_it_ends(void **state)
         plant_bricks(GOOD, BAD, claim_splats, &told);
         const counted found = see_first_frames(&camera);
         if (found.points > MOST_POINTS)
-            fail_msg("%llu points close the holes of a frame, %u splats being out of sight", (unsigned long long)found.points, told.unseen);
+            fail_msg("%llu points close the holes of a frame, %u splats being out of sight",
+                     (unsigned long long)found.points, told.unseen);
         assert_true(found.points > MOST_POINTS / 2);
     }
 }

@@ -1,5 +1,5 @@
-/* A walk through a sample tree of which little has arrived: what is not there yet leaves no hole. The model is a ball, so that which
- * pixels it covers is known without the library. */
+/* A walk through a sample tree of which little has arrived: what is not there yet leaves no hole. The model is a ball,
+ * so that which pixels it covers is known without the library. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -38,7 +38,8 @@ static int create_ball(void **state)
     for (uint32_t ring = 0; ring <= RINGS; ring++)
         for (uint32_t sector = 0; sector < SECTORS; sector++) {
             double across = PI * ring / RINGS, around = 2 * PI * sector / SECTORS;
-            mesh_file_add_vertex(&mesh, RADIUS * sin(across) * cos(around), RADIUS * sin(across) * sin(around), RADIUS * cos(across));
+            mesh_file_add_vertex(&mesh, RADIUS * sin(across) * cos(around), RADIUS * sin(across) * sin(around),
+                                 RADIUS * cos(across));
         }
     for (uint32_t ring = 0; ring < RINGS; ring++)
         for (uint32_t sector = 0; sector < SECTORS; sector++) {
@@ -134,7 +135,8 @@ static void cover_triangle(const strl_draw_item *item, const uint16_t *corner, d
 static double uncovered_share(const strl_draw_list *list, double distance)
 {
     uint32_t pixels = 0, open = 0;
-    double focal = HEIGHT / 2.0 / tan(FOV / 2 * PI / 180), outline = focal * RADIUS / sqrt(distance * distance - RADIUS * RADIUS) - 2;
+    double focal = HEIGHT / 2.0 / tan(FOV / 2 * PI / 180),
+           outline = focal * RADIUS / sqrt(distance * distance - RADIUS * RADIUS) - 2;
     memset(covered, 0, sizeof covered);
     for (uint32_t i = 0; i < list->count; i++) {
         const strl_draw_item *item = &list->items[i];
@@ -240,7 +242,8 @@ static uint64_t hash_of_list(const strl_draw_list *list)
             for (int axis = 0; axis < 3; axis++)
                 one = strl__mix64(one ^ (uint64_t)(item->anchor[axis] + vertex->position[axis]));
             sum += strl__mix64(one ^ (uint64_t)vertex->normal[0] << 48 ^ (uint64_t)vertex->normal[1] << 32 ^
-                               (uint64_t)(vertex->rgba[0] | vertex->rgba[1] << 8 | vertex->rgba[2] << 16) << 8 ^ vertex->rgba[3]);
+                               (uint64_t)(vertex->rgba[0] | vertex->rgba[1] << 8 | vertex->rgba[2] << 16) << 8 ^
+                               vertex->rgba[3]);
         }
     }
     return sum;
@@ -256,7 +259,8 @@ static strl_walk *settled_walk(double distance, uint64_t *triangles, uint64_t *h
     return walk;
 }
 
-/* Of a brick that is seen from afar only what it shows is held, and nothing else differs: nearer, more of it comes; back again, it is there. */
+/* Of a brick that is seen from afar only what it shows is held, and nothing else differs: nearer, more of it comes;
+ * back again, it is there. */
 static void of_what_is_far_little_is_held(void **state)
 {
     (void)state;
@@ -275,7 +279,8 @@ static void of_what_is_far_little_is_held(void **state)
         assert_int_equal(stats->missing_nodes, 0);
         most = stats->resident_bytes > most ? stats->resident_bytes : most;
         if (i + 1 == sizeof distances / sizeof *distances)
-            assert_true(fresh_bytes < before / 2 && stats->resident_bytes > fresh_bytes); /* it stays while there is room */
+            assert_true(fresh_bytes < before / 2 &&
+                        stats->resident_bytes > fresh_bytes); /* it stays while there is room */
         strl_walk_close(fresh);
     }
     strl_walk_close(walk);
@@ -287,7 +292,8 @@ static void it_settles_with_little_memory(void **state)
     (void)state;
     const double distances[] = {40, 20, 6, 30, 1.2, 40};
     for (uint64_t megabytes = 2; megabytes <= 16; megabytes *= 2) {
-        strl_walk *walk = open_walk(memory_source(bytes[0], size[0]), &(strl_walk_desc){.error_px = 0.5, .memory_bytes = megabytes << 20});
+        strl_walk *walk = open_walk(memory_source(bytes[0], size[0]),
+                                    &(strl_walk_desc){.error_px = 0.5, .memory_bytes = megabytes << 20});
         for (size_t i = 0; i < sizeof distances / sizeof *distances; i++) {
             const strl_camera camera = camera_at(distances[i]);
             settle(walk, &camera, 2000);
@@ -298,8 +304,8 @@ static void it_settles_with_little_memory(void **state)
     }
 }
 
-/* Who comes from near holds whole bricks of which little shows from afar: what is too much of them goes where room is wanted, and the image
- * is as fine as that of who never was near. What more memory allows is used. */
+/* Who comes from near holds whole bricks of which little shows from afar: what is too much of them goes where room is
+ * wanted, and the image is as fine as that of who never was near. What more memory allows is used. */
 static void from_near_it_is_as_fine_as_from_afar(void **state)
 {
     (void)state;
@@ -313,10 +319,11 @@ static void from_near_it_is_as_fine_as_from_afar(void **state)
             strl_walk *fresh = open_walk(memory_source(bytes[0], size[0]), &desc);
             const strl_camera camera = camera_at(distances[i]);
             strl_draw_list list = settle(walk, &camera, 2000), fresh_list = settle(fresh, &camera, 2000);
-            double px = strl_walk_get_stats(walk)->allowed_error_px, fresh_px = strl_walk_get_stats(fresh)->allowed_error_px;
+            double px = strl_walk_get_stats(walk)->allowed_error_px,
+                   fresh_px = strl_walk_get_stats(fresh)->allowed_error_px;
             if (px > MOST_COARSER * fresh_px)
-                fail_msg("with %u KiB, at %g, %g pixels are allowed, %g on a walk that begins there", (unsigned)kilobytes, distances[i], px,
-                         fresh_px);
+                fail_msg("with %u KiB, at %g, %g pixels are allowed, %g on a walk that begins there",
+                         (unsigned)kilobytes, distances[i], px, fresh_px);
             if (px == fresh_px)
                 assert_true(hash_of_list(&list) == hash_of_list(&fresh_list));
             assert_true(kilobytes == 1024 || fresh_px <= before[i]);
@@ -329,14 +336,16 @@ static void from_near_it_is_as_fine_as_from_afar(void **state)
     assert_true(tight > 3);
 }
 
-/* What has settled stays as it is while the camera stands, but for little: of bricks more may come that is only likely to be wanted. */
+/* What has settled stays as it is while the camera stands, but for little: of bricks more may come that is only likely
+ * to be wanted. */
 static void what_has_settled_stays(void **state)
 {
     (void)state;
     unsigned changed = 0, all = 0;
     for (double distance = 0.6; distance < 6; distance *= 1.25)
         for (uint64_t kilobytes = 1024; kilobytes <= 8192; kilobytes *= 2, all++) {
-            strl_walk *walk = open_walk(memory_source(bytes[0], size[0]), &(strl_walk_desc){.error_px = 0.5, .memory_bytes = kilobytes << 10});
+            strl_walk *walk = open_walk(memory_source(bytes[0], size[0]),
+                                        &(strl_walk_desc){.error_px = 0.5, .memory_bytes = kilobytes << 10});
             const strl_camera camera = camera_at(distance);
             settle(walk, &camera, 2000);
             double settled_px = strl_walk_get_stats(walk)->allowed_error_px;
@@ -357,8 +366,8 @@ static void what_has_settled_stays(void **state)
 /* Near enough that of all bricks more is wanted than from afar, and back. */
 static const double trip[] = {6, 1.6, 6, 4, 1.2, 6};
 
-/* Once nothing is missing (settled does not tell that: it waits for nothing that failed three times) it shows what a walk shows that never
- * had to do with any of that. */
+/* Once nothing is missing (settled does not tell that: it waits for nothing that failed three times) it shows what a
+ * walk shows that never had to do with any of that. */
 static void check_settles_right(strl_walk *walk, double distance)
 {
     const strl_camera camera = camera_at(distance);
@@ -382,14 +391,16 @@ static void without_memory_it_keeps_what_it_has(void **state)
     unsigned failed = 0;
     for (unsigned i = 0; i < 2; i++)
         for (uint64_t n = 1; n < 80; n += 1 + n) {
-            strl_walk *walk = open_walk(memory_source(bytes[0], size[0]), &(strl_walk_desc){.error_px = 1, .memory_bytes = budgets[i]});
+            strl_walk *walk = open_walk(memory_source(bytes[0], size[0]),
+                                        &(strl_walk_desc){.error_px = 1, .memory_bytes = budgets[i]});
             for (size_t at = 0; at < sizeof trip / sizeof *trip; at++) {
                 const strl_camera camera = camera_at(trip[at]);
                 for (unsigned frame = 0; frame < 6; frame++) {
                     strl_draw_list list;
                     bool fails = walk_frame_without_memory(walk, &camera, n, &list) != STRL_OK;
                     failed += fails || strl_walk_get_stats(walk)->faults > 0;
-                    if (!fails && budgets[i] == 0) /* splats of tens of pixels are as transparent as what they stand for is open */
+                    /* splats of tens of pixels are as transparent as what they stand for is open */
+                    if (!fails && budgets[i] == 0)
                         assert_true(uncovered_share(&list, trip[at]) <= MOST_UNCOVERED);
                 }
             }

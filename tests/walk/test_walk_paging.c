@@ -1,4 +1,5 @@
-/* A model of 200,000 placements: a walk opens by what runs of them look like from outside, and reads the pages that it comes near. */
+/* A model of 200,000 placements: a walk opens by what runs of them look like from outside, and reads the pages that it
+ * comes near. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -26,7 +27,8 @@ static double width; /* of the array, which lies in x and -z */
 static uint8_t *make_array(uint64_t copies, size_t *file_bytes)
 {
     strl_error err = {0};
-    const strl_scene_desc scene = {.name = "array", .path = built_path("many.gltf"), .of = built_path("one.ply"), .copies = copies};
+    const strl_scene_desc scene = {
+        .name = "array", .path = built_path("many.gltf"), .of = built_path("one.ply"), .copies = copies};
     if (strl_scene_write(&scene, NULL, NULL, &err) != STRL_OK)
         fail_msg("%s", err.message);
     assert_int_equal(built_build_one(built_path("many.gltf"), built_path("many.stroll")).placements, copies);
@@ -56,8 +58,12 @@ static int drop_model(void **state)
 /* x, z and what is looked at are shares of the array's width. */
 static strl_camera look(double x, double height, double z, double target_x, double target_z)
 {
-    return (strl_camera){.eye = {x * width, height, -z * width}, .target = {target_x * width, 0, -target_z * width},
-                         .up = {0.01, 1, 0.02}, .fov_y_deg = 40, .width = 640, .height = 360};
+    return (strl_camera){.eye = {x * width, height, -z * width},
+                         .target = {target_x * width, 0, -target_z * width},
+                         .up = {0.01, 1, 0.02},
+                         .fov_y_deg = 40,
+                         .width = 640,
+                         .height = 360};
 }
 
 /* Low over a corner of the array, over another, ... */
@@ -90,7 +96,8 @@ static strl_walk *open_whole(void)
     for (uint32_t i = 0; i < walk->run_count; i++) {
         strl__run *run = &walk->runs[i];
         strl__run_reserve(walk, run, NULL);
-        assert_int_equal(strl__run_load(walk, run, bytes + run->facts.page.offset, run->facts.page.bytes, NULL), STRL_OK);
+        assert_int_equal(strl__run_load(walk, run, bytes + run->facts.page.offset, run->facts.page.bytes, NULL),
+                         STRL_OK);
     }
     return walk;
 }
@@ -161,8 +168,12 @@ static void a_settled_list_is_that_of_a_walk_that_has_read_all(void **state)
 {
     (void)state;
     strl_walk *whole = open_whole(), *paged = open_walk(memory_source(bytes, size), NULL);
-    const strl_camera cameras[] = {low_over(0), low_over(18), look(0.2, 5, 0.2, -1, -1), look(0.5, 20, -0.1, 0.5, 0.3),
-                                   look(0.5, 80, 0.5, 0.55, 0.55), look(0.5, 8 * width, 0.501, 0.5, 0.5)};
+    const strl_camera cameras[] = {low_over(0),
+                                   low_over(18),
+                                   look(0.2, 5, 0.2, -1, -1),
+                                   look(0.5, 20, -0.1, 0.5, 0.3),
+                                   look(0.5, 80, 0.5, 0.55, 0.55),
+                                   look(0.5, 8 * width, 0.501, 0.5, 0.5)};
     for (unsigned i = 0; i < sizeof cameras / sizeof *cameras; i++) {
         const strl_draw_list expected = settle(whole, &cameras[i], 500), found = settle(paged, &cameras[i], 500);
         check_equal(&expected, &found);
@@ -297,7 +308,8 @@ static void what_is_no_longer_wanted_gives_its_room_back(void **state)
     uint64_t pages = 0;
     for (uint32_t i = 0; i < RUNS; i++)
         pages += walk->runs[i].page ? strl__run_bytes(walk->runs[i].page->count) : 0;
-    assert_int_equal(walk->resident_bytes, walk->placement_bytes + walk->treelet_bytes + walk->kept_bytes + walk->root_bytes + pages);
+    assert_int_equal(walk->resident_bytes,
+                     walk->placement_bytes + walk->treelet_bytes + walk->kept_bytes + walk->root_bytes + pages);
     strl_walk_close(walk);
 }
 
@@ -309,7 +321,8 @@ static void damage_placements(uint8_t *data, size_t data_bytes, uint64_t *random
     unsigned damages = 1 + (unsigned)(next_random(random) * 3);
     for (unsigned i = 0; i < damages; i++) {
         bool runs = next_random(random) < 0.5;
-        uint64_t section = STRL__AT_SECTIONS + (runs ? 4 : 1) * (uint64_t)STRL__SECTION_BYTES, start = strl__load_le(data + section + 16, 8);
+        uint64_t section = STRL__AT_SECTIONS + (runs ? 4 : 1) * (uint64_t)STRL__SECTION_BYTES,
+                 start = strl__load_le(data + section + 16, 8);
         uint64_t length = strl__load_le(data + section + 24, 4);
         if (!runs && next_random(random) < 0.8) { /* a page of placements; each run tells where one is */
             uint64_t leaf = strl__load_le(data + STRL__AT_SECTIONS + 4 * STRL__SECTION_BYTES + 16, 8);
@@ -321,7 +334,8 @@ static void damage_placements(uint8_t *data, size_t data_bytes, uint64_t *random
             start = section, length = STRL__SECTION_BYTES;
         uint64_t at = start + (uint64_t)(next_random(random) * (double)length);
         if (at < data_bytes)
-            data[at] = next_random(random) < 0.3 ? 0xff : (uint8_t)(data[at] ^ (1 + (unsigned)(next_random(random) * 255)));
+            data[at] =
+                next_random(random) < 0.3 ? 0xff : (uint8_t)(data[at] ^ (1 + (unsigned)(next_random(random) * 255)));
     }
     reseal_all(data, data_bytes, NULL, NULL);
 }

@@ -48,7 +48,8 @@ static int make_model(void **state)
     if (built_setup(state) != 0)
         return -1;
     built_scene("isosurface", "one.ply", 20000, true);
-    const strl_scene_desc scene = {.name = "array", .path = built_path("many.gltf"), .of = built_path("one.ply"), .copies = COPIES};
+    const strl_scene_desc scene = {
+        .name = "array", .path = built_path("many.gltf"), .of = built_path("one.ply"), .copies = COPIES};
     if (strl_scene_write(&scene, NULL, NULL, &err) != STRL_OK)
         fail_msg("%s", err.message);
     const strl_build_result result = built_build_one(built_path("many.gltf"), built_path("many.stroll"));
@@ -84,8 +85,12 @@ static int drop_model(void **state)
 /* y is up; the array lies in x and -z. */
 static strl_camera look(double x, double height, double z, double target_x, double target_z)
 {
-    return (strl_camera){.eye = {x, height, -z}, .target = {target_x, 0, -target_z}, .up = {0.01, 1, 0.02}, .fov_y_deg = 40,
-                         .width = 640, .height = 360};
+    return (strl_camera){.eye = {x, height, -z},
+                         .target = {target_x, 0, -target_z},
+                         .up = {0.01, 1, 0.02},
+                         .fov_y_deg = 40,
+                         .width = 640,
+                         .height = 360};
 }
 
 /* Every placement of the list is counted once; what is seen must be in it. */
@@ -157,8 +162,8 @@ static void placements_share_keys_and_uploads(void **state)
     strl_renderer_destroy(renderer);
 }
 
-/* Roots are kept, whether one of their placements is seen or not, and so are placements while there is room: what comes back into
- * view is drawn at once. */
+/* Roots are kept, whether one of their placements is seen or not, and so are placements while there is room: what comes
+ * back into view is drawn at once. */
 static void what_comes_back_into_view_is_there_at_once(void **state)
 {
     (void)state;
@@ -176,14 +181,16 @@ static void what_comes_back_into_view_is_there_at_once(void **state)
 
 /* ---- states */
 
-/* The corners that the item draws are those of one state of the node's payload; which one: the coarsest with so many triangles. */
+/* The corners that the item draws are those of one state of the node's payload; which one: the coarsest with so many
+ * triangles. */
 static uint32_t state_of(const strl_draw_item *item, const strl_pm *mesh)
 {
     uint32_t state = 0, triangles = item->draw_count / 3;
     const uint16_t *corner = item->indices + item->draw_first;
-    while (state < mesh->step_count && (mesh->triangle_end[state] < triangles ||
-                                        fabsf(fmaxf(mesh->geometric_error[state], mesh->appearance_error[state]) * (float)item->step -
-                                              item->error) > 1e-6f * item->error))
+    while (state < mesh->step_count &&
+           (mesh->triangle_end[state] < triangles ||
+            fabsf(fmaxf(mesh->geometric_error[state], mesh->appearance_error[state]) * (float)item->step -
+                  item->error) > 1e-6f * item->error))
         state++;
     assert_int_equal(mesh->triangle_end[state], triangles);
     for (uint32_t k = 0; k < 3 * triangles; k++)
@@ -207,7 +214,8 @@ static void each_placement_is_drawn_in_a_state_of_its_own(void **state)
         const strl_draw_item *item = &list.items[i];
         if (item->point_px > 0 || !item->visible)
             continue;
-        assert_true(item->error_px <= 1 || (item->level == 0 && item->draw_first + item->draw_count == item->index_count));
+        assert_true(item->error_px <= 1 ||
+                    (item->level == 0 && item->draw_first + item->draw_count == item->index_count));
         if (item->node != 0)
             continue;
         least = item->draw_count < least ? item->draw_count : least;
@@ -215,8 +223,11 @@ static void each_placement_is_drawn_in_a_state_of_its_own(void **state)
         if (i % 16 == 0) {
             uint32_t of = state_of(item, &model.mesh[0]);
             checked++;
-            if (of > 0) { /* the next coarser one that is kept has at least 0.6 of its triangles less, or would not suffice */
-                double error = fmax((double)model.mesh[0].geometric_error[0], (double)model.mesh[0].appearance_error[0]) * item->step;
+            /* the next coarser one that is kept has at least 0.6 of its triangles less, or would not suffice */
+            if (of > 0) {
+                double error =
+                    fmax((double)model.mesh[0].geometric_error[0], (double)model.mesh[0].appearance_error[0]) *
+                    item->step;
                 assert_true(strl_view_error_px(&view, &shared.boxes[item->placement], error) > 1);
             }
         }
@@ -229,15 +240,16 @@ static void each_placement_is_drawn_in_a_state_of_its_own(void **state)
 
 /* ---- far away */
 
-/* Where the copies are smaller than a pixel each, points stand for runs of them: few, within what they stand for, and of the
- * copies' colour. Coming nearer brings every copy back. */
+/* Where the copies are smaller than a pixel each, points stand for runs of them: few, within what they stand for, and
+ * of the copies' colour. Coming nearer brings every copy back. */
 static void copies_below_a_pixel_are_drawn_as_points(void **state)
 {
     (void)state;
     strl_walk *walk = open_walk(memory_source(shared.bytes, shared.size), NULL);
     const strl_camera far = look(60, 6000, 61, 60, 60), near = look(60, 300, 61, 60, 60);
     strl_draw_list list = settle(walk, &far, 500);
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, bounds[6], opacity = 0, covered = 0;
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, bounds[6], opacity = 0,
+           covered = 0;
     uint32_t points = 0;
     strl_walk_bounds(walk, bounds);
     for (uint32_t i = 0; i < list.count; i++) {
@@ -250,7 +262,8 @@ static void copies_below_a_pixel_are_drawn_as_points(void **state)
                 high[k] = fmax(high[k], at);
                 opacity += item->vertices[v].rgba[3] / 765.0;
                 assert_in_range(item->vertices[v].rgba[k], 100, 255); /* the scene is light grey */
-                assert_in_range(item->vertices[v].normal[0] >> STRL_SPREAD_SHIFT, 40, STRL_SPREAD_MOST); /* and faces all ways */
+                /* and faces all ways */
+                assert_in_range(item->vertices[v].normal[0] >> STRL_SPREAD_SHIFT, 40, STRL_SPREAD_MOST);
                 assert_in_range(item->vertices[v].normal[1], 0, 1023);
             }
     }
@@ -261,9 +274,11 @@ static void copies_below_a_pixel_are_drawn_as_points(void **state)
         assert_true(high[k] <= bounds[3 + k] && high[k] > bounds[3 + k] - 0.1 * (bounds[3 + k] - bounds[k]));
     }
     for (uint32_t i = 0; i < COPIES; i++)
-        covered += (shared.boxes[i].max[0] - shared.boxes[i].min[0]) * (shared.boxes[i].max[2] - shared.boxes[i].min[2]);
+        covered +=
+            (shared.boxes[i].max[0] - shared.boxes[i].min[0]) * (shared.boxes[i].max[2] - shared.boxes[i].min[2]);
     covered *= pow(far.height / 2 / tan(far.fov_y_deg * M_PI / 360) / far.eye[1], 2);
-    assert_true(opacity > 0.3 * covered && opacity < 2 * covered); /* the surfaces fill about half of their boxes, and lie in layers */
+    /* the surfaces fill about half of their boxes, and lie in layers */
+    assert_true(opacity > 0.3 * covered && opacity < 2 * covered);
     list = settle(walk, &near, 500);
     assert_true(list.count >= COPIES);
     strl_walk_close(walk);

@@ -1,4 +1,5 @@
-/* Splats of very many copies: they are drawn together, and each is where it would be, turned as its copy is, and says whose it is. */
+/* Splats of very many copies: they are drawn together, and each is where it would be, turned as its copy is, and says
+ * whose it is. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -39,11 +40,13 @@ static void tell_splats(uint32_t id)
     assert_non_null(told);
     for (uint32_t i = 0; i < brick.splat_count; i++) {
         told_splat *splat = &told[told_count++];
-        const uint16_t code[2] = {(uint16_t)(brick.splat[i].normal[0] * 1023u / 255u), (uint16_t)(brick.splat[i].normal[1] * 1023u / 255u)};
+        const uint16_t code[2] = {(uint16_t)(brick.splat[i].normal[0] * 1023u / 255u),
+                                  (uint16_t)(brick.splat[i].normal[1] * 1023u / 255u)};
         strl_oct_decode(code, splat->line);
         splat->rgba = brick.splat[i].rgba;
         for (int k = 0; k < 3; k++)
-            splat->at[k] = model.tree.origin[k] + model.tree.step * (double)(node->anchor[k] + brick.splat[i].centre[k]);
+            splat->at[k] =
+                model.tree.origin[k] + model.tree.step * (double)(node->anchor[k] + brick.splat[i].centre[k]);
     }
     test_brick_free(&brick);
 }
@@ -54,7 +57,8 @@ static int create_array(void **state)
     if (built_setup(state) != 0)
         return -1;
     built_scene("isosurface", "one.ply", 20000, true);
-    const strl_scene_desc scene = {.name = "array", .path = built_path("many.gltf"), .of = built_path("one.ply"), .copies = COPIES};
+    const strl_scene_desc scene = {
+        .name = "array", .path = built_path("many.gltf"), .of = built_path("one.ply"), .copies = COPIES};
     assert_int_equal(strl_scene_write(&scene, NULL, NULL, &err), STRL_OK);
     assert_int_equal(sample_tree_build("many.gltf", "many.stroll", (strl_build_desc){0}).placements, COPIES);
     built_open(&model, built_path("many.stroll"));
@@ -78,8 +82,12 @@ static int drop_array(void **state)
 static strl_camera high_above(double height)
 {
     const double *b = model.info.bounds, middle[2] = {(b[0] + b[3]) / 2, (b[2] + b[5]) / 2};
-    return (strl_camera){.eye = {middle[0], height, middle[1]}, .target = {middle[0], 0, middle[1]}, .up = {0.1, 0, 1}, .fov_y_deg = 40,
-                         .width = 640, .height = 480};
+    return (strl_camera){.eye = {middle[0], height, middle[1]},
+                         .target = {middle[0], 0, middle[1]},
+                         .up = {0.1, 0, 1},
+                         .fov_y_deg = 40,
+                         .width = 640,
+                         .height = 480};
 }
 
 /* The turning and scaling part of arrays is a similarity: its transpose over the square of the scale takes it back. */
@@ -88,7 +96,8 @@ static void to_model(const double transform[12], const double world[3], double a
     *scale = sqrt(transform[0] * transform[0] + transform[4] * transform[4] + transform[8] * transform[8]);
     for (int k = 0; k < 3; k++)
         at[k] = (transform[k] * (world[0] - transform[3]) + transform[4 + k] * (world[1] - transform[7]) +
-                 transform[8 + k] * (world[2] - transform[11])) / (*scale * *scale);
+                 transform[8 + k] * (world[2] - transform[11])) /
+                (*scale * *scale);
 }
 
 /* The splat that lies nearest to the place, by how far. */
@@ -137,7 +146,8 @@ static void check_point(const strl_draw_item *item, uint32_t v, uint32_t *of_cop
     const uint16_t code[2] = {item->vertices[v].normal[0] & 1023u, item->vertices[v].normal[1]};
     strl_oct_decode(code, line);
     for (int k = 0; k < 3; k++) {
-        double back = placement[copy].transform[k] * (double)line[0] + placement[copy].transform[4 + k] * (double)line[1] +
+        double back = placement[copy].transform[k] * (double)line[0] +
+                      placement[copy].transform[4 + k] * (double)line[1] +
                       placement[copy].transform[8 + k] * (double)line[2];
         along += back / scale * (double)splat->line[k];
     }
@@ -198,7 +208,8 @@ static void labels_are_those_of_the_copies(void **state)
     }
 }
 
-/* What is read first over a slow link: roots without what is below them, and the ground under the trees with the first placements. */
+/* What is read first over a slow link: roots without what is below them, and the ground under the trees with the first
+ * placements. */
 static void roots_and_large_placements_are_read_first(void **state)
 {
     (void)state;
@@ -216,7 +227,8 @@ static void roots_and_large_placements_are_read_first(void **state)
         assert_int_equal(strl_container_placement(container, i, &at, &err), STRL_OK);
         const strl_tree *tree = strl_container_tree(container, at.tree);
         double width = tree->step * (double)(tree->box_max[0] - tree->box_min[0]) *
-                      sqrt(at.transform[0] * at.transform[0] + at.transform[4] * at.transform[4] + at.transform[8] * at.transform[8]);
+                       sqrt(at.transform[0] * at.transform[0] + at.transform[4] * at.transform[4] +
+                            at.transform[8] * at.transform[8]);
         if (width > widest)
             widest = width, first = (uint32_t)i;
     }

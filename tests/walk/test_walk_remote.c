@@ -98,7 +98,8 @@ static void no_more_is_asked_for_than_there_is_room_for(void **state)
         strl_draw_list expected = settle(fast, &camera, 5000), found = walk_frame(slow, &camera);
         check_same_lists(&expected, &found);
         assert_true(before == 0 && link->most_wanted_bytes <= (tight ? 1 : ROOM_BYTES) + LARGEST_PAGE);
-        assert_true(none->most_wanted_bytes > 3 * link->most_wanted_bytes / 2); /* or the room was not what bound it */
+        /* or the room was not what bound it */
+        assert_true(none->most_wanted_bytes > 3 * link->most_wanted_bytes / 2);
         strl_walk_close(slow);
         strl_walk_close(fast);
     }

@@ -1,4 +1,5 @@
-/* The walk through a sample tree: what is drawn is whole and nothing of it twice, whatever the camera, the memory and the source. */
+/* The walk through a sample tree: what is drawn is whole and nothing of it twice, whatever the camera, the memory and
+ * the source. */
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -68,7 +69,8 @@ static int destroy_model(void **state)
 
 static strl_camera camera_at(double x, double y, double z)
 {
-    return (strl_camera){.eye = {x, y, z}, .target = {0.5, 0.5, 0.5}, .up = {0, 0, 1}, .fov_y_deg = 60, .width = 800, .height = 600};
+    return (strl_camera){
+        .eye = {x, y, z}, .target = {0.5, 0.5, 0.5}, .up = {0, 0, 1}, .fov_y_deg = 60, .width = 800, .height = 600};
 }
 
 /* Round the model, now and then inside it. */
@@ -141,9 +143,11 @@ static listed look_at_list(const strl_draw_list *list, const strl_walk_stats *st
         if (item->point_px > 0 || model.node[item->node].child_count == 0 || !drawn[model.node[item->node].first_child])
             continue;
         if (item->draw_count != 3 * model.mesh[item->node].triangle_count)
-            fail_msg("brick %u is drawn with what is below it, and with %u of its %u triangles: its cells of %g are %g pixels of %g; record %g visible %d settled %d",
-                     item->node, item->draw_count / 3, model.mesh[item->node].triangle_count, (double)item->error,
-                     (double)item->error_px, stats->allowed_error_px, model.node[item->node].geometric_max * model.tree.step, item->visible, stats->missing_nodes);
+            fail_msg(
+                "brick %u is drawn with what is below it, and with %u of its %u triangles: its cells of %g are %g pixels of %g; record %g visible %d settled %d",
+                item->node, item->draw_count / 3, model.mesh[item->node].triangle_count, (double)item->error,
+                (double)item->error_px, stats->allowed_error_px, model.node[item->node].geometric_max * model.tree.step,
+                item->visible, stats->missing_nodes);
     }
     assert_int_equal(found.triangles, stats->triangles);
     assert_int_equal(found.splats, stats->splats);
@@ -196,7 +200,8 @@ static void as_the_error_goes_to_nothing_all_triangles_are_drawn(void **state)
     settle_and_look(walk, &camera);
     strl_draw_list list = walk_frame(walk, &camera);
     uint64_t count, wanted;
-    sample_tree_triangle *found = list_triangles(&list, &count), *stored = sample_tree_triangles("walked.stroll", &wanted);
+    sample_tree_triangle *found = list_triangles(&list, &count),
+                         *stored = sample_tree_triangles("walked.stroll", &wanted);
     assert_int_equal(count, wanted);
     assert_memory_equal(found, stored, count * sizeof *found);
     assert_int_equal(strl_walk_get_stats(walk)->splats, 0);
@@ -250,8 +255,8 @@ static void splats_are_as_large_as_the_error(void **state)
     }
 }
 
-/* The least side of the square that covers a cell, sqrt(sqrt(3)) sides: what is drawn as a splat may not cover more than the error, seen from
- * the nearest point of its brick's box at worst. Found by distances alone. */
+/* The least side of the square that covers a cell, sqrt(sqrt(3)) sides: what is drawn as a splat may not cover more
+ * than the error, seen from the nearest point of its brick's box at worst. Found by distances alone. */
 static void what_is_near_is_open(void **state)
 {
     (void)state;
@@ -275,14 +280,18 @@ static void what_is_near_is_open(void **state)
                 double sum = 0;
                 for (int axis = 0; axis < 3; axis++) {
                     const strl_node *node = &model.node[item->node];
-                    double at = model.tree.origin[axis] + model.tree.step * (double)(c >> axis & 1 ? node->box_max[axis] : node->box_min[axis]);
+                    double at = model.tree.origin[axis] +
+                                model.tree.step * (double)(c >> axis & 1 ? node->box_max[axis] : node->box_min[axis]);
                     sum += (at - camera.eye[axis]) * (at - camera.eye[axis]);
                 }
                 far = fmax(far, sqrt(sum));
             }
             if ((double)item->error * pixels / far > 32.001)
-                fail_msg("brick %u of %u children in state %u with %u of %u triangles: its cells of %g are %.2f pixels, or as it says %.2f", item->node, model.node[item->node].child_count, item->state,
-                         item->draw_count / 3, model.mesh[item->node].triangle_count, (double)item->error, (double)item->error * pixels / far, (double)item->error_px);
+                fail_msg(
+                    "brick %u of %u children in state %u with %u of %u triangles: its cells of %g are %.2f pixels, or as it says %.2f",
+                    item->node, model.node[item->node].child_count, item->state, item->draw_count / 3,
+                    model.mesh[item->node].triangle_count, (double)item->error, (double)item->error * pixels / far,
+                    (double)item->error_px);
         }
     }
     assert_true(looked_at > CAMERAS);
@@ -357,7 +366,8 @@ static void a_late_source_shows_what_is_there(void **state)
     (void)state;
     uint64_t random = 6;
     watched_source *source = watched_source_open(memory_source(bytes, size));
-    strl_walk *walk = open_walk(&source->base, &(strl_walk_desc){.error_px = 0.5, .requests_in_flight = 2, .labels = true});
+    strl_walk *walk =
+        open_walk(&source->base, &(strl_walk_desc){.error_px = 0.5, .requests_in_flight = 2, .labels = true});
     const strl_walk_stats *stats = strl_walk_get_stats(walk);
     uint32_t late = 0;
     source->walking = true;
@@ -431,7 +441,8 @@ static void check_same_meshes(const strl__mesh *a, const strl__mesh *b)
         const strl_splat *s = &a->splats[i], *t = &b->splats[i];
         assert_memory_equal(s->centre, t->centre, sizeof s->centre);
         assert_memory_equal(s->normal, t->normal, sizeof s->normal);
-        assert_true(s->side == t->side && s->coverage == t->coverage && s->parallel == t->parallel && s->rgba == t->rgba);
+        assert_true(s->side == t->side && s->coverage == t->coverage && s->parallel == t->parallel &&
+                    s->rgba == t->rgba);
     }
 }
 
@@ -439,7 +450,8 @@ static strl__mesh make_brick(const strl_node *record, float closed_size)
 {
     strl__mesh mesh;
     strl_error err = {0};
-    if (strl__mesh_create(record, bytes + record->page.offset, record->page.bytes, NULL, true, false, closed_size, &mesh, &err) != STRL_OK)
+    if (strl__mesh_create(record, bytes + record->page.offset, record->page.bytes, NULL, true, false, closed_size,
+                          &mesh, &err) != STRL_OK)
         fail_msg("%s", err.message);
     return mesh;
 }
@@ -481,7 +493,7 @@ static void a_trimmed_brick_is_one_made_so(void **state)
 /* What a renderer holds of a node. */
 typedef struct shadow {
     uint64_t key;
-    bool drawn; /* in the last frame */
+    bool drawn;            /* in the last frame */
     uint32_t vertex_count; /* of which a key tells */
     uint16_t *indices;
     strl_vertex *vertices;
@@ -511,7 +523,8 @@ static void what_bricks_give_back_is_told(void **state)
     (void)state;
     shadow *shadows = calloc(model.tree.node_count, sizeof *shadows);
     bool *now = calloc(model.tree.node_count, sizeof *now);
-    strl_walk *walk = open_walk(memory_source(bytes, size), &(strl_walk_desc){.error_px = 0.5, .memory_bytes = (uint64_t)3 << 20});
+    strl_walk *walk =
+        open_walk(memory_source(bytes, size), &(strl_walk_desc){.error_px = 0.5, .memory_bytes = (uint64_t)3 << 20});
     unsigned gave_back = 0;
     assert_true(shadows && now);
     for (unsigned at = 0; at < 240; at++) {

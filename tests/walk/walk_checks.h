@@ -18,15 +18,15 @@ typedef struct watched_source {
     bool walking;
     unsigned hold_percent; /* of polls that find nothing, whatever has arrived */
     uint64_t random;
-    uint64_t room_bytes; /* as a slow link says; 0 = there is nothing to wait for */
-    uint64_t link_bytes; /* that still come before the test sets it anew; of a slow link alone */
+    uint64_t room_bytes;                      /* as a slow link says; 0 = there is nothing to wait for */
+    uint64_t link_bytes;                      /* that still come before the test sets it anew; of a slow link alone */
     uint64_t wanted_bytes, most_wanted_bytes; /* asked for and not answered: now, and at most */
-    uint32_t asked[256]; /* bytes, by the token's last byte, which is the walk's slot */
+    uint32_t asked[256];                      /* bytes, by the token's last byte, which is the walk's slot */
     uint64_t came_bytes;
-    uint64_t read_bytes; /* while somebody waited */
-    uint64_t offsets[512]; /* that were read, those waited for included */
+    uint64_t read_bytes;            /* while somebody waited */
+    uint64_t offsets[512];          /* that were read, those waited for included */
     unsigned offset_count, repeats; /* of them; reads of one of them */
-    strl_source_result held; /* waits for the link */
+    strl_source_result held;        /* waits for the link */
     bool holds;
 } watched_source;
 
@@ -45,7 +45,8 @@ strl_walk *open_walk(strl_source *source, const strl_walk_desc *desc);
 /* Frames and pumps until the walk has settled; fails the test where it does not in max_frames. */
 strl_draw_list settle(strl_walk *walk, const strl_camera *camera, unsigned max_frames);
 strl_draw_list walk_frame(strl_walk *walk, const strl_camera *camera);
-/* A frame and what is decoded after it, of which the n-th allocation fails: it gets through, or says that there is no memory. */
+/* A frame and what is decoded after it, of which the n-th allocation fails: it gets through, or says that there is no
+ * memory. */
 strl_status walk_frame_without_memory(strl_walk *walk, const strl_camera *camera, uint64_t n, strl_draw_list *list);
 
 /* The items of a placement cover the height field without a crack: every edge inside is run as

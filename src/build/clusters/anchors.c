@@ -7,10 +7,13 @@
 #include "geometry/near.h"
 #include "store/pack.h"
 
-#define EARLY_FIRST 3u  /* below, what is claimed without certificates is tight, and most of the triangles are there */
-#define FEW_LEVELS 4u   /* so far from the root certificates begin without --certify: the few levels where claims by drifts are loose */
-#define CROWD 3u        /* pieces a triangle: the more, the tighter and the dearer */
-#define FEW_NODES 8u    /* levels of so few keep the anchors they have for longer: they cost little there, and errors grow slowly */
+/* below, what is claimed without certificates is tight, and most of the triangles are there */
+#define EARLY_FIRST 3u
+/* so far from the root certificates begin without --certify: the few levels where claims by drifts are loose */
+#define FEW_LEVELS 4u
+#define CROWD 3u /* pieces a triangle: the more, the tighter and the dearer */
+/* levels of so few keep the anchors they have for longer: they cost little there, and errors grow slowly */
+#define FEW_NODES 8u
 #define FEW_CROWD 20u
 #define CANDIDATES 256u
 #define PARTS_MAX 64u
@@ -32,8 +35,10 @@ strl_anchor_plan strl_anchor_plan_of(uint32_t level, uint32_t depth, bool certif
 {
     uint32_t first = strl_anchor_first_level(depth, certify);
     bool are_few = 1u << (depth - level) <= FEW_NODES;
-    return (strl_anchor_plan){.begins = level == first && level < depth, .measures = level > first,
-                              .crowd = level == depth ? 0 : are_few ? FEW_CROWD : CROWD};
+    return (strl_anchor_plan){.begins = level == first && level<depth, .measures = level> first,
+                              .crowd = level == depth ? 0
+                                       : are_few      ? FEW_CROWD
+                                                      : CROWD};
 }
 
 /* ---- pieces ---- */
@@ -53,7 +58,8 @@ void strl_anchors_deinit(strl_anchors *anchors)
 
 static bool add_piece(strl_pieces *pieces, const strl_piece *piece)
 {
-    if (pieces->count == UINT32_MAX || !strl__grow(&pieces->item, &pieces->capacity, (size_t)pieces->count + 1, sizeof *piece))
+    if (pieces->count == UINT32_MAX ||
+        !strl__grow(&pieces->item, &pieces->capacity, (size_t)pieces->count + 1, sizeof *piece))
         return false;
     pieces->item[pieces->count++] = *piece;
     return true;
@@ -103,13 +109,15 @@ static void unpack_pieces(strl_unpacker *unpacker, uint32_t count, const int64_t
     }
 }
 
-strl_status strl_pieces_read(const void *data, size_t size, const int64_t moved[3], strl_pieces *pieces, strl_error *err)
+strl_status strl_pieces_read(const void *data, size_t size, const int64_t moved[3], strl_pieces *pieces,
+                             strl_error *err)
 {
     strl_cursor cursor = strl_cursor_make(data, size);
     uint32_t count = strl_cursor_u32(&cursor);
     /* a piece takes ten bits at least, so a damaged count costs no more memory than some times the bytes read */
     if (cursor.failed || count > strl_cursor_left(&cursor) || count > UINT32_MAX - pieces->count)
-        return strl__fail(err, STRL_ERR_INTERNAL, "a node's anchors are %zu bytes, not what %u pieces are", size, count);
+        return strl__fail(err, STRL_ERR_INTERNAL, "a node's anchors are %zu bytes, not what %u pieces are", size,
+                          count);
     if (!strl__grow(&pieces->item, &pieces->capacity, (size_t)pieces->count + count, sizeof *pieces->item))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %u pieces", count);
     strl_unpacker unpacker = strl_unpacker_make((const uint8_t *)data + cursor.at, size - cursor.at);
@@ -190,7 +198,8 @@ typedef struct divider {
     uint32_t triangles;
     strl_facet *facet; /* [triangles] */
     uint32_t candidate[CANDIDATES], candidate_count;
-    double tolerance, enough; /* distances within which a member's triangles are near enough: always, and to the piece at hand */
+    /* distances within which a member's triangles are near enough: always, and to the piece at hand */
+    double tolerance, enough;
     double distance; /* of the middle of the piece from the first candidate */
     part parts[PARTS_MAX];
     uint32_t part_count;
@@ -244,7 +253,8 @@ static bool is_near_first(const divider *d, const strl_facet *piece, uint32_t me
     return d->owner[first] == member && strl_facet_is_near(&d->facet[first], piece, d->enough, &distance);
 }
 
-/* Pieces come in the order of the triangles that they are or were: the next piece belongs to the next triangle, or to the same. */
+/* Pieces come in the order of the triangles that they are or were: the next piece belongs to the next triangle, or to
+ * the same. */
 static bool is_near_likely(divider *d, const strl_facet *piece, uint32_t member)
 {
     uint32_t last = d->candidate[0];
@@ -305,8 +315,13 @@ static bool divide_piece(divider *d, const strl_piece *piece, uint32_t own, strl
         return add_piece(&shares[own].own, piece);
     d->part_count = 0;
     d->is_full = false;
-    strl_cover_bound(&facet, &(strl_cover){.by = d->facet, .pick = d->candidate, .count = d->candidate_count, .along = along,
-                                           .enough = d->enough, .take = take_part, .context = d});
+    strl_cover_bound(&facet, &(strl_cover){.by = d->facet,
+                                           .pick = d->candidate,
+                                           .count = d->candidate_count,
+                                           .along = along,
+                                           .enough = d->enough,
+                                           .take = take_part,
+                                           .context = d});
     if (d->is_full || parts_are_of_one(d))
         return add_piece(&shares[d->is_full ? d->owner[d->candidate[0]] : d->parts[0].member].own, piece);
     bool good = true;
@@ -338,8 +353,8 @@ static bool divide_pieces(divider *d, const strl_pieces *pieces, uint32_t own, s
     return good;
 }
 
-strl_status strl_anchors_divide(const strl_mesh *mesh, const uint32_t *owner, uint32_t members, double tolerance, const strl_pieces *own,
-                                strl_arena *arena, strl_anchors *shares, strl_error *err)
+strl_status strl_anchors_divide(const strl_mesh *mesh, const uint32_t *owner, uint32_t members, double tolerance,
+                                const strl_pieces *own, strl_arena *arena, strl_anchors *shares, strl_error *err)
 {
     strl_arena_mark mark = strl_arena_get_mark(arena);
     divider *d = strl_arena_alloc(arena, 1, sizeof *d);

@@ -65,8 +65,8 @@ static void go_on_to_the_end(strl_hierarchy *hierarchy)
 
 static strl_status simplify_levels(strl_hierarchy *hierarchy, const strl_position *from, strl_error *err)
 {
-    static const char *const names[] = {"level 0", "level 1", "level 2", "level 3", "level 4", "level 5", "level 6",
-                                        "level 7", "level 8", "level 9", "higher levels"};
+    static const char *const names[] = {"level 0", "level 1", "level 2", "level 3", "level 4",      "level 5",
+                                        "level 6", "level 7", "level 8", "level 9", "higher levels"};
     strl_status status = STRL_OK;
     for (uint32_t level = from->level; level <= hierarchy->partition->depth && !status; level++) {
         uint32_t first = level == from->level ? from->done : 0;
@@ -76,7 +76,8 @@ static strl_status simplify_levels(strl_hierarchy *hierarchy, const strl_positio
         if (first == 0)
             status = strl_level_open(hierarchy, level, err);
         if (!status)
-            status = level == 0 ? strl_make_leaves(hierarchy, first, err) : strl_make_level(hierarchy, level, first, err);
+            status =
+                level == 0 ? strl_make_leaves(hierarchy, first, err) : strl_make_level(hierarchy, level, first, err);
         if (!status)
             status = end_level(hierarchy, level, err);
     }
@@ -102,8 +103,11 @@ static strl_status write_tree(const strl_hierarchy *hierarchy, strl_error *err)
     strl_build_context *context = hierarchy->context;
     const strl_ingest *ingest = hierarchy->ingest;
     strl_container_writer *writer = NULL;
-    strl_tree tree = {.structure = STRL_STRUCTURE_CLUSTERS, .step = ingest->step, .node_count = (uint32_t)((2ull << hierarchy->partition->depth) - 1),
-                      .level_count = hierarchy->partition->depth + 1, .leaf_geometric = ingest->leaf_error};
+    strl_tree tree = {.structure = STRL_STRUCTURE_CLUSTERS,
+                      .step = ingest->step,
+                      .node_count = (uint32_t)((2ull << hierarchy->partition->depth) - 1),
+                      .level_count = hierarchy->partition->depth + 1,
+                      .leaf_geometric = ingest->leaf_error};
     memcpy(tree.origin, ingest->origin, sizeof tree.origin);
     for (uint32_t i = 0; i <= hierarchy->partition->depth; i++)
         tree.group_count += hierarchy->levels[i].group_count;
@@ -179,8 +183,12 @@ strl_status strl__clusters_run(strl_build_context *context, strl_error *err)
 {
     strl_ingest ingest = {0};
     strl_partition partition = {0};
-    strl_hierarchy hierarchy = {.context = context, .ingest = &ingest, .partition = &partition, .growth = FIRST_GROWTH,
-                                .soft_triangles = STRL_SOFT_TRIANGLES, .most_target = UINT32_MAX};
+    strl_hierarchy hierarchy = {.context = context,
+                                .ingest = &ingest,
+                                .partition = &partition,
+                                .growth = FIRST_GROWTH,
+                                .soft_triangles = STRL_SOFT_TRIANGLES,
+                                .most_target = UINT32_MAX};
     strl_status status = run_stages(&hierarchy, &partition, err);
     if (!status && ingest.triangle_count) {
         fill_result(&hierarchy, context->result);

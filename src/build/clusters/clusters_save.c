@@ -120,7 +120,8 @@ static strl_status restore_levels(strl_hierarchy *hierarchy, strl_cursor *words,
     if (position->level > depth + 1 || (position->level > depth && position->done))
         return strl_saved_fail("the number of levels", err);
     hierarchy->levels = strl__alloc_zero((size_t)depth + 1, sizeof *hierarchy->levels);
-    strl_status status = hierarchy->levels ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u levels", depth + 1);
+    strl_status status =
+        hierarchy->levels ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %u levels", depth + 1);
     for (uint32_t i = 0; i < position->level && !status; i++) {
         hierarchy->levels[i].group_count = strl_cursor_u32(words);
         status = restore_level(hierarchy, position, i, err);

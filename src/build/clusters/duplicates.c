@@ -1,5 +1,5 @@
-/* Identical faces in great number: no collapse can reduce them without losing the surface, so above the leaves they go in pairs.
- * An edge keeps its parity, and every node keeps a face at every place. */
+/* Identical faces in great number: no collapse can reduce them without losing the surface, so above the leaves they go
+ * in pairs. An edge keeps its parity, and every node keeps a face at every place. */
 #include <math.h>
 #include <string.h>
 
@@ -9,8 +9,8 @@
 /* A face by its points, rotated so that the least comes first: faces of opposite orientation differ. */
 typedef struct face_slot {
     uint32_t point[3], owner;
-    uint32_t count; /* 0 = free */
-    uint32_t drop;  /* how many of them are still to go */
+    uint32_t count;   /* 0 = free */
+    uint32_t drop;    /* how many of them are still to go */
     strl_drift drift; /* of all of them */
 } face_slot;
 
@@ -23,7 +23,9 @@ static face_slot *find_face(face_slot *slots, uint32_t mask, const strl_mesh *me
             least = c;
     for (uint32_t c = 0; c < 3; c++)
         point[c] = mesh->wedge[mesh->triangle[triangle][(least + c) % 3]].point;
-    uint32_t at = (uint32_t)strl__mix64(((uint64_t)point[0] << 32 | point[1]) ^ strl__mix64((uint64_t)point[2] << 32 | owner[triangle])) & mask;
+    uint32_t at = (uint32_t)strl__mix64(((uint64_t)point[0] << 32 | point[1]) ^
+                                        strl__mix64((uint64_t)point[2] << 32 | owner[triangle])) &
+                  mask;
     while (slots[at].count && (slots[at].owner != owner[triangle] || memcmp(slots[at].point, point, sizeof point)))
         at = (at + 1) & mask;
     memcpy(slots[at].point, point, sizeof point);

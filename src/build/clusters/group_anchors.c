@@ -7,8 +7,8 @@
 /* Of what children claim: a piece that reaches beyond its member's boundary by so little may be measured there. */
 #define TOLERANCE 0.5
 
-/* Claims of no more lattice units, some times what rounding costs, are left as they are: flat places, where drifts do not grow and what
- * pieces lose at boundaries would count. */
+/* Claims of no more lattice units, some times what rounding costs, are left as they are: flat places, where drifts do
+ * not grow and what pieces lose at boundaries would count. */
 #define SMALL_CLAIM 4.f
 /* For each triangle: a soup is no surface to measure. */
 #define MOST_POINTS 2u
@@ -55,8 +55,9 @@ static float children_claim(const strl_level *children, uint32_t node)
     return fmaxf(fmaxf(a->most, a->group), fmaxf(b->most, b->group));
 }
 
-strl_status strl_group_anchors(const strl_level *children, const uint32_t *member, uint32_t count, const strl_node_mesh *merged,
-                               const uint32_t *owner, strl_arena *arena, strl_anchors *shares, strl_error *err)
+strl_status strl_group_anchors(const strl_level *children, const uint32_t *member, uint32_t count,
+                               const strl_node_mesh *merged, const uint32_t *owner, strl_arena *arena,
+                               strl_anchors *shares, strl_error *err)
 {
     strl_pieces own[STRL_GROUP_MAX] = {0};
     double claimed = 0;

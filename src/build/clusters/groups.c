@@ -54,10 +54,10 @@ typedef struct neighbour {
 typedef struct chooser {
     const strl_level *children;
     uint32_t node_count, levels_above;
-    uint32_t *first;      /* [node_count + 2] */
+    uint32_t *first;       /* [node_count + 2] */
     neighbour *neighbours; /* most shared first, then by index */
     float *priority;
-    uint32_t *group;      /* per node; UINT32_MAX = none yet */
+    uint32_t *group; /* per node; UINT32_MAX = none yet */
 } chooser;
 
 static int compare_neighbours(const void *a, const void *b)
@@ -109,8 +109,8 @@ static float error_of(const chooser *c, uint32_t node)
     return left->geometric_max > right->geometric_max ? left->geometric_max : right->geometric_max;
 }
 
-/* Condition 1 is asked of the first partner alone: later ones may well be a member's sibling. Condition 3, no chains: a node
- * joins only where it shares vertices with at least half of the members. */
+/* Condition 1 is asked of the first partner alone: later ones may well be a member's sibling. Condition 3, no chains: a
+ * node joins only where it shares vertices with at least half of the members. */
 static bool may_join(const chooser *c, const uint32_t *members, uint32_t count, uint32_t node)
 {
     uint32_t touching = 0, soon = c->levels_above < MERGED_SOON ? c->levels_above : MERGED_SOON;

@@ -19,41 +19,42 @@
 #define STRL_NORMAL_WEIGHT 0.4f
 #define STRL_COLOUR_WEIGHT 1.f
 
-/* What a node will claim, lattice units. Its record has the same by drifts alone, which the build goes by, so that certificates change
- * no geometry. */
+/* What a node will claim, lattice units. Its record has the same by drifts alone, which the build goes by, so that
+ * certificates change no geometry. */
 typedef struct strl_node_claims {
     float least, most, group; /* of geometric_min, geometric_max, group_geometric */
 } strl_node_claims;
 
-/* What is kept of every node. Nodes of a level are numbered 0 .. count - 1; the children of i are 2i and 2i + 1 one level down. */
+/* What is kept of every node. Nodes of a level are numbered 0 .. count - 1; the children of i are 2i and 2i + 1 one
+ * level down. */
 typedef struct strl_node_state {
-    strl_node record;       /* ids, group and page fields are filled in when the container is written */
-    uint64_t payload_at;    /* its progressive mesh, in the payload spill of its level */
+    strl_node record;    /* ids, group and page fields are filled in when the container is written */
+    uint64_t payload_at; /* its progressive mesh, in the payload spill of its level */
     uint32_t payload_bytes;
-    uint64_t mesh_at;       /* base mesh, in the mesh spill of its level; when it is written, the order of its mesh */
+    uint64_t mesh_at; /* base mesh, in the mesh spill of its level; when it is written, the order of its mesh */
     uint32_t mesh_bytes;
-    uint64_t anchors_at;    /* in the anchor spill of its level */
+    uint64_t anchors_at; /* in the anchor spill of its level */
     uint64_t anchors_bytes;
     strl_node_claims claims;
-    bool needs_payload;     /* positions of the base mesh are in the payload alone */
-    uint32_t point_count;   /* of the base mesh */
-    uint32_t outer_shared;  /* points of the base mesh that a node other than the sibling has too */
-    uint32_t group;         /* index within the level */
+    bool needs_payload;    /* positions of the base mesh are in the payload alone */
+    uint32_t point_count;  /* of the base mesh */
+    uint32_t outer_shared; /* points of the base mesh that a node other than the sibling has too */
+    uint32_t group;        /* index within the level */
 } strl_node_state;
 
 typedef struct strl_level {
     uint32_t count;         /* nodes */
     strl_node_state *nodes; /* [count] */
     uint32_t group_count;
-    strl_spill *payloads;   /* progressive meshes, packed (pm_spill.h) until they are written */
-    strl_spill *meshes;     /* base meshes, deleted when the next level is done; while writing, orders of meshes */
-    strl_spill *anchors;    /* the same of anchors; NULL where there are none */
-    strl_spill *states;     /* of the nodes as they were taken, for checkpoints; NULL where none are made */
+    strl_spill *payloads; /* progressive meshes, packed (pm_spill.h) until they are written */
+    strl_spill *meshes;   /* base meshes, deleted when the next level is done; while writing, orders of meshes */
+    strl_spill *anchors;  /* the same of anchors; NULL where there are none */
+    strl_spill *states;   /* of the nodes as they were taken, for checkpoints; NULL where none are made */
 } strl_level;
 
 /* How many points two nodes of the next level share: counted while a level is made. */
 typedef struct strl_adjacency {
-    uint64_t *key;   /* low << 32 | high, + 1; 0 = free */
+    uint64_t *key; /* low << 32 | high, + 1; 0 = free */
     uint32_t *count;
     size_t size, used;
 } strl_adjacency;
@@ -64,7 +65,8 @@ void strl_adjacency_deinit(strl_adjacency *adjacency);
 /* A base mesh of so many triangles is good enough where fewer would cost many times the error. */
 #define STRL_SOFT_TRIANGLES 6144u
 
-/* The root of a tree that is placed many times goes on down to so many: from afar each placement is drawn by no less. */
+/* The root of a tree that is placed many times goes on down to so many: from afar each placement is drawn by no less.
+ */
 #define STRL_PLACED_ROOT_TRIANGLES 64u
 
 typedef struct strl_hierarchy {
@@ -74,13 +76,15 @@ typedef struct strl_hierarchy {
     strl_level *levels;     /* [partition->depth + 1] */
     strl_adjacency current; /* of the level being made, until its groups are chosen */
     strl_adjacency next;    /* of the level above it */
-    float even_error;       /* lattice units: where the nodes of the level being made are to end; 0 = at half their triangles */
-    uint32_t soft_triangles; /* STRL_SOFT_TRIANGLES but while leaves are sampled, and at the root of a tree with placements */
-    uint32_t most_target;    /* nodes are to end at no more; UINT32_MAX = at half their triangles */
+    /* lattice units: where the nodes of the level being made are to end; 0 = at half their triangles */
+    float even_error;
+    /* STRL_SOFT_TRIANGLES but while leaves are sampled, and at the root of a tree with placements */
+    uint32_t soft_triangles;
+    uint32_t most_target;         /* nodes are to end at no more; UINT32_MAX = at half their triangles */
     strl_anchor_plan anchor_plan; /* of the level opened last: the one being made */
-    float growth;           /* by which even_error grows from level to level, so that about half the triangles go */
-    uint32_t saved_done;    /* groups of the level being made that the last checkpoint has */
-    uint64_t saved_at_ns;   /* when it was made */
+    float growth;         /* by which even_error grows from level to level, so that about half the triangles go */
+    uint32_t saved_done;  /* groups of the level being made that the last checkpoint has */
+    uint64_t saved_at_ns; /* when it was made */
 } strl_hierarchy;
 
 /* One node as a worker has made it, before its bytes are put into the spills in order. */
@@ -92,19 +96,22 @@ typedef struct strl_made_node {
 } strl_made_node;
 
 void strl_made_node_deinit(strl_made_node *made);
-/* Simplifies to `target` triangles, records the progressive mesh, packs it, keeps the base mesh with its shares. `self` is the node's index
- * in its level. Boxes and errors are those of the mesh alone. anchors: what the node stands for; NULL = nothing. */
-strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh *node, const strl_anchors *anchors, uint32_t self,
-                           uint32_t target, strl_arena *arena, strl_made_node *made, strl_error *err);
+/* Simplifies to `target` triangles, records the progressive mesh, packs it, keeps the base mesh with its shares. `self`
+ * is the node's index in its level. Boxes and errors are those of the mesh alone. anchors: what the node stands for;
+ * NULL = nothing. */
+strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh *node, const strl_anchors *anchors,
+                           uint32_t self, uint32_t target, strl_arena *arena, strl_made_node *made, strl_error *err);
 /* Appends a made node's bytes to its level and counts its neighbours. In node order, one thread. */
 strl_status strl_take_node(strl_hierarchy *hierarchy, strl_level *level, uint32_t self, strl_made_node *made,
                            strl_error *err);
 
 /* What happens at a level; those below must be done. */
 strl_anchor_plan strl_hierarchy_anchor_plan(const strl_hierarchy *hierarchy, uint32_t level);
-/* The anchors of a group's children, given to its `count` members: shares[i] is member i's. owner: of the merged mesh's triangles. */
-strl_status strl_group_anchors(const strl_level *children, const uint32_t *member, uint32_t count, const strl_node_mesh *merged,
-                               const uint32_t *owner, strl_arena *arena, strl_anchors *shares, strl_error *err);
+/* The anchors of a group's children, given to its `count` members: shares[i] is member i's. owner: of the merged mesh's
+ * triangles. */
+strl_status strl_group_anchors(const strl_level *children, const uint32_t *member, uint32_t count,
+                               const strl_node_mesh *merged, const uint32_t *owner, strl_arena *arena,
+                               strl_anchors *shares, strl_error *err);
 /* Raises the claims of a group's members to those of their children, and to each other's. */
 void strl_group_claims(const strl_level *children, const uint32_t *member, uint32_t count, strl_made_node *made);
 
@@ -124,8 +131,9 @@ strl_status strl_make_level(strl_hierarchy *hierarchy, uint32_t level, uint32_t 
 /* How far a build has come. */
 typedef enum strl_stage { STRL_STAGE_NONE, STRL_STAGE_INGEST, STRL_STAGE_PARTITION } strl_stage;
 typedef struct strl_position {
-    strl_stage finished;  /* the last of the stages before the levels */
-    uint32_t level, done; /* all levels below are finished, and so many groups of this one; level depth + 1 = all are */
+    strl_stage finished; /* the last of the stages before the levels */
+    /* all levels below are finished, and so many groups of this one; level depth + 1 = all are */
+    uint32_t level, done;
 } strl_position;
 
 strl_status strl_clusters_save(strl_hierarchy *hierarchy, const strl_position *position, strl_error *err);
@@ -148,8 +156,8 @@ strl_status strl_node_states_restore(strl_level *level, uint32_t groups, strl_ad
 /* All nodes, breadth first, each payload told by its parent's. Uses up the payloads of the levels. */
 strl_status strl_write_nodes(const strl_hierarchy *hierarchy, strl_container_writer *writer, strl_error *err);
 
-/* Removes faces of which there are more than two identical ones, in pairs, from a group's merged mesh. *dropped: how many. False
- * without memory. */
+/* Removes faces of which there are more than two identical ones, in pairs, from a group's merged mesh. *dropped: how
+ * many. False without memory. */
 bool strl__drop_duplicate_pairs(strl_mesh *mesh, uint32_t *owner, uint32_t *dropped, strl_arena *arena);
 
 /* Groups of nodes whose shared boundary may be simplified together (Quick-VDR 4.4, conditions 1 to 3). */

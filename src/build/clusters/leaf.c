@@ -16,13 +16,13 @@ typedef struct shared_ref {
 typedef struct leaf_stage {
     strl_hierarchy *hierarchy;
     strl_level *level;
-    uint32_t *words;       /* the bucket of shares at hand */
-    shared_ref *refs;      /* sorted by (cluster, at) */
+    uint32_t *words;  /* the bucket of shares at hand */
+    shared_ref *refs; /* sorted by (cluster, at) */
     size_t ref_count;
     uint32_t first_cluster; /* of the item 0 of the pipeline at hand */
-    uint32_t *last_reader; /* [cell_count] as in strl_leaf_shares; NO_READER = dropped */
+    uint32_t *last_reader;  /* [cell_count] as in strl_leaf_shares; NO_READER = dropped */
     strl_made_node *slots;
-    strl_arena *arenas;    /* per worker */
+    strl_arena *arenas; /* per worker */
 } leaf_stage;
 
 #define SAMPLE_LEAVES 16u
@@ -68,11 +68,11 @@ static const uint32_t *cells_of_ref(const leaf_stage *stage, const shared_ref *r
     return list + 1;
 }
 
-/* The cluster's own cells and those of others that have one of its positions, ascending, each once: faces round a position then
- * come in one order wherever the position is looked at. Positions in very many cells list none: their normals are then
- * of the cluster's own faces. */
-static uint32_t *cells_with_halo(const leaf_stage *stage, const uint32_t *own, uint32_t own_count, const shared_ref *refs,
-                                 size_t ref_count, strl_arena *arena, uint32_t *count)
+/* The cluster's own cells and those of others that have one of its positions, ascending, each once: faces round a
+ * position then come in one order wherever the position is looked at. Positions in very many cells list none: their
+ * normals are then of the cluster's own faces. */
+static uint32_t *cells_with_halo(const leaf_stage *stage, const uint32_t *own, uint32_t own_count,
+                                 const shared_ref *refs, size_t ref_count, strl_arena *arena, uint32_t *count)
 {
     size_t total = own_count, unique = 0;
     uint32_t some;
@@ -131,8 +131,8 @@ static bool lacks_normals(const strl_soup_triangle *triangles, uint32_t count)
 }
 
 /* Which triangles of the cells are the cluster's. */
-static bool *mark_own(const leaf_stage *stage, uint32_t cluster, const uint32_t *cells, uint32_t cell_count, uint64_t all,
-                      strl_arena *arena)
+static bool *mark_own(const leaf_stage *stage, uint32_t cluster, const uint32_t *cells, uint32_t cell_count,
+                      uint64_t all, strl_arena *arena)
 {
     bool *is_own = strl_arena_alloc(arena, all, sizeof *is_own);
     uint64_t at = 0;
@@ -186,8 +186,10 @@ static strl_status weld(const strl_hierarchy *hierarchy, const strl_soup_triangl
             uint32_t at = 3 * t + c;
             for (int k = 0; k < 3; k++)
                 soup.mesh.position[at][k] = (int32_t)((int64_t)corner->position[k] - soup.anchor[k]);
-            soup.mesh.wedge[at] = (strl_wedge){.point = at, .normal = {corner->normal[0], corner->normal[1]},
-                                               .colour = corner->colour, .texcoord = corner->texcoord,
+            soup.mesh.wedge[at] = (strl_wedge){.point = at,
+                                               .normal = {corner->normal[0], corner->normal[1]},
+                                               .colour = corner->colour,
+                                               .texcoord = corner->texcoord,
                                                .palette = triangles[t].palette};
             soup.mesh.triangle[t][c] = at;
         }
@@ -393,8 +395,8 @@ static strl_status make_bucket(leaf_stage *stage, const strl_leaf_shares *shares
     if (!status && stage->first_cluster == 0)
         status = sample_error(stage, end - begin, err);
     if (!status)
-        status = strl_pool_ordered(stage->hierarchy->context->pool, end - stage->first_cluster, 0, make_leaf, take_leaf, stage,
-                                   NULL, err);
+        status = strl_pool_ordered(stage->hierarchy->context->pool, end - stage->first_cluster, 0, make_leaf, take_leaf,
+                                   stage, NULL, err);
     strl__free(stage->words);
     strl__free(stage->refs);
     return status;

@@ -24,7 +24,8 @@ static strl_status next_word(word_reader *reader, uint32_t *word, strl_error *er
         reader->used = 0;
         if (!reader->have)
             return strl__fail(err, STRL_ERR_INTERNAL, "the list of shared positions is cut off");
-        strl_status status = strl_spill_read(reader->spill, reader->at * 4, reader->buffer, (size_t)reader->have * 4, err);
+        strl_status status =
+            strl_spill_read(reader->spill, reader->at * 4, reader->buffer, (size_t)reader->have * 4, err);
         if (status)
             return status;
         reader->at += reader->have;
@@ -37,8 +38,8 @@ static strl_status next_cell(word_reader *reader, uint32_t cells, uint32_t *cell
 {
     strl_status status = next_word(reader, cell, err);
     return status || *cell < cells ? status
-                                   : strl__fail(err, STRL_ERR_INTERNAL, "a shared position is in cell %" PRIu32 " of %" PRIu32,
-                                                *cell, cells);
+                                   : strl__fail(err, STRL_ERR_INTERNAL,
+                                                "a shared position is in cell %" PRIu32 " of %" PRIu32, *cell, cells);
 }
 
 typedef struct distributor {
@@ -121,7 +122,8 @@ static strl_status hand_out(distributor *d, const uint32_t position[3], uint32_t
         uint32_t *cells = d->words + size + 1, outside = list_cells_outside(d, cluster, cell_count, cells);
         d->words[size] = outside;
         size += 1 + outside;
-        status = strl_spill_append(d->shares->spill[bucket_of_cluster(d->shares, cluster)], d->words, (size_t)size * 4, err);
+        status =
+            strl_spill_append(d->shares->spill[bucket_of_cluster(d->shares, cluster)], d->words, (size_t)size * 4, err);
     }
     return status;
 }

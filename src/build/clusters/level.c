@@ -10,7 +10,8 @@
 #include "geometry/record.h"
 #include "geometry/simplify.h"
 
-/* The boundary of a group is simplified up to a little more than the error that its nodes' children have reached anyway. */
+/* The boundary of a group is simplified up to a little more than the error that its nodes' children have reached
+ * anyway. */
 #define BOUNDARY_ERROR_SHARE 1.25f
 
 /* A node with more before it is simplified holds what cannot be simplified: then duplicate faces go. */
@@ -28,25 +29,25 @@ typedef struct made_group {
 
 typedef struct level_stage {
     strl_hierarchy *hierarchy;
-    strl_level *level;          /* being made */
+    strl_level *level; /* being made */
     const strl_level *children;
     strl_groups groups;
     uint32_t level_index;
-    uint32_t first_group;       /* that is made: those before are restored */
+    uint32_t first_group; /* that is made: those before are restored */
     made_group *slots;
-    strl_arena *arenas;         /* per worker */
+    strl_arena *arenas; /* per worker */
 } level_stage;
 
 /* The meshes of one group and what is known of their points. */
 typedef struct group_work {
-    uint32_t count;              /* members */
-    const uint32_t *member;      /* node indices of the level */
+    uint32_t count;         /* members */
+    const uint32_t *member; /* node indices of the level */
     uint32_t child_count;
     uint32_t child_triangles[2 * STRL_GROUP_MAX];
     strl_node_mesh merged;
-    uint32_t *owner;             /* per triangle of merged: index of the member */
+    uint32_t *owner;                   /* per triangle of merged: index of the member */
     uint32_t *outside_first, *outside; /* per point: holders that are not members, ascending */
-    uint32_t steps;              /* collapses of the boundary */
+    uint32_t steps;                    /* collapses of the boundary */
     strl_simplify_rung rung;
     strl_anchors shares[STRL_GROUP_MAX]; /* what each member stands for */
 } group_work;
@@ -143,8 +144,8 @@ static bool find_holders(group_work *work, const strl_node_mesh *children, uint3
     return true;
 }
 
-/* The diagonal of the box that holds the group and the input it stands for: that of the children's groups, because a triangle may
- * have taken over what one of another member of its group stood for. */
+/* The diagonal of the box that holds the group and the input it stands for: that of the children's groups, because a
+ * triangle may have taken over what one of another member of its group stood for. */
 static float diagonal_of_group(const level_stage *stage, const group_work *work)
 {
     double squared = 0;
@@ -160,14 +161,15 @@ static float diagonal_of_group(const level_stage *stage, const group_work *work)
     return nextafterf((float)sqrt(squared) + work->merged.mesh.start_error, INFINITY);
 }
 
-static strl_status merge_into_one(const level_stage *stage, group_work *work, const strl_node_mesh *children, strl_arena *arena,
-                                  strl_error *err)
+static strl_status merge_into_one(const level_stage *stage, group_work *work, const strl_node_mesh *children,
+                                  strl_arena *arena, strl_error *err)
 {
     const strl_node_mesh *list[2 * STRL_GROUP_MAX];
     uint32_t *point_of[2 * STRL_GROUP_MAX];
     for (uint32_t i = 0; i < work->child_count; i++)
         list[i] = &children[i];
-    strl_status status = strl_node_mesh_merge(list, work->child_count, arena, &work->merged, &work->owner, point_of, err);
+    strl_status status =
+        strl_node_mesh_merge(list, work->child_count, arena, &work->merged, &work->owner, point_of, err);
     if (status)
         return status;
     work->merged.mesh.most_error = diagonal_of_group(stage, work);
@@ -206,13 +208,15 @@ static float boundary_limit(const level_stage *stage, const group_work *work)
     return (float)(BOUNDARY_ERROR_SHARE * sum / work->child_count);
 }
 
-/* Collapses points that several members have and nobody else (paper, 4.4), on the merged mesh, before any progressive mesh
- * of the level begins. */
+/* Collapses points that several members have and nobody else (paper, 4.4), on the merged mesh, before any progressive
+ * mesh of the level begins. */
 static strl_status collapse_boundary(const level_stage *stage, group_work *work, strl_arena *own, strl_arena *arena,
                                      strl_error *err)
 {
-    strl_simplify_desc desc = {.error_limit = boundary_limit(stage, work), .last_rung = STRL_SIMPLIFY_SEAMS,
-                               .normal_weight = STRL_NORMAL_WEIGHT, .colour_weight = STRL_COLOUR_WEIGHT};
+    strl_simplify_desc desc = {.error_limit = boundary_limit(stage, work),
+                               .last_rung = STRL_SIMPLIFY_SEAMS,
+                               .normal_weight = STRL_NORMAL_WEIGHT,
+                               .colour_weight = STRL_COLOUR_WEIGHT};
     strl_mesh *mesh = &work->merged.mesh, after;
     strl_simplified simplified;
     uint32_t *point_map = strl_arena_alloc(own, mesh->point_count, sizeof *point_map);
@@ -335,8 +339,8 @@ static strl_status make_group(void *context, uint64_t index, unsigned slot, unsi
         strl_node *record = &made->node[m].state.record;
         status = extract_member(&work, m, arena, &node, err);
         if (!status)
-            status = strl_make_node(stage->hierarchy, &node, &work.shares[m], work.member[m], half_of_children(&work, m), arena,
-                                    &made->node[m], err);
+            status = strl_make_node(stage->hierarchy, &node, &work.shares[m], work.member[m],
+                                    half_of_children(&work, m), arena, &made->node[m], err);
         strl_anchors_deinit(&work.shares[m]);
         record->boundary_steps = work.steps;
         if (work.steps && (uint32_t)work.rung > record->rung)
@@ -357,8 +361,9 @@ static void include_box(int64_t least[3], int64_t most[3], const int64_t other_l
     }
 }
 
-/* A node's errors and box cover its own mesh (which may have got points of its neighbours), its children's and those of their groups; so every rule that holds for a child's group
- * holds for the groups above it, and a cut chosen by groups is closed. */
+/* A node's errors and box cover its own mesh (which may have got points of its neighbours), its children's and those of
+ * their groups; so every rule that holds for a child's group holds for the groups above it, and a cut chosen by groups
+ * is closed. */
 static void raise_to_children(const level_stage *stage, uint32_t self, strl_node *record, int64_t group_least[3],
                               int64_t group_most[3])
 {
@@ -368,7 +373,8 @@ static void raise_to_children(const level_stage *stage, uint32_t self, strl_node
         include_box(group_least, group_most, child->group_box_min, child->group_box_max);
         record->geometric_min = fmaxf(record->geometric_min, fmaxf(child->geometric_max, child->group_geometric));
         record->appearance_min = fmaxf(record->appearance_min, fmaxf(child->appearance_max, child->group_appearance));
-        if (child->rung == STRL_SIMPLIFY_CLUSTERING) /* its rims end where they did not in the input: whoever holds them says so */
+        /* its rims end where they did not in the input: whoever holds them says so */
+        if (child->rung == STRL_SIMPLIFY_CLUSTERING)
             record->rung = child->rung;
     }
     record->geometric_max = fmaxf(record->geometric_max, record->geometric_min);
@@ -425,7 +431,8 @@ static strl_status take_group(void *context, uint64_t index, unsigned slot, unsi
     if (!status)
         status = strl_clusters_note(stage->hierarchy, stage->level_index, (uint32_t)index + 1, err);
     return status ? status
-                  : strl__build_report(stage->hierarchy->context, stage->groups.first[index + 1], stage->level->count, err);
+                  : strl__build_report(stage->hierarchy->context, stage->groups.first[index + 1], stage->level->count,
+                                       err);
 }
 
 float strl_node_error(const strl_node *record)
@@ -461,7 +468,8 @@ bool strl_choose_even_error(strl_hierarchy *hierarchy, const strl_level *level)
     }
     double left = fmin(fmax(base / finest, 0.35), 0.7);
     hierarchy->growth = (float)fmin(fmax(pow(hierarchy->growth, log(0.5) / log(left)), LEAST_GROWTH), MOST_GROWTH);
-    hierarchy->even_error = level->count >= LEAST_EVEN_NODES ? hierarchy->growth * strl_median(errors, level->count) : 0;
+    hierarchy->even_error =
+        level->count >= LEAST_EVEN_NODES ? hierarchy->growth * strl_median(errors, level->count) : 0;
     strl__free(errors);
     return true;
 }
@@ -488,15 +496,19 @@ static strl_status choose_groups(level_stage *stage, strl_error *err)
     if (status)
         return status;
     stage->level->group_count = stage->groups.count;
-    return stage->first_group <= stage->groups.count && fits_restored(stage) ? STRL_OK
-                                                                             : strl_saved_fail("the groups of a level", err);
+    return stage->first_group <= stage->groups.count && fits_restored(stage)
+               ? STRL_OK
+               : strl_saved_fail("the groups of a level", err);
 }
 
 strl_status strl_make_level(strl_hierarchy *hierarchy, uint32_t level, uint32_t first, strl_error *err)
 {
     strl_pool *pool = hierarchy->context->pool;
-    level_stage stage = {.hierarchy = hierarchy, .level = &hierarchy->levels[level],
-                         .children = &hierarchy->levels[level - 1], .level_index = level, .first_group = first};
+    level_stage stage = {.hierarchy = hierarchy,
+                         .level = &hierarchy->levels[level],
+                         .children = &hierarchy->levels[level - 1],
+                         .level_index = level,
+                         .first_group = first};
     unsigned workers = strl_pool_workers(pool);
     strl_status status = choose_groups(&stage, err);
     stage.slots = strl__alloc_zero(strl_pool_window(pool, 0), sizeof *stage.slots);

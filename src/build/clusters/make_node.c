@@ -22,13 +22,17 @@ void strl_made_node_deinit(strl_made_node *made)
     *made = (strl_made_node){0};
 }
 
-static strl_status simplify(const strl_hierarchy *hierarchy, const strl_mesh *mesh, uint32_t target, strl_arena *arena, strl_simplified *result,
-                            strl_error *err)
+static strl_status simplify(const strl_hierarchy *hierarchy, const strl_mesh *mesh, uint32_t target, strl_arena *arena,
+                            strl_simplified *result, strl_error *err)
 {
     target = target < hierarchy->most_target ? target : hierarchy->most_target;
-    strl_simplify_desc desc = {.target_triangles = target, .soft_triangles = hierarchy->soft_triangles, .error_limit = INFINITY,
-                               .last_rung = STRL_SIMPLIFY_CLUSTERING, .normal_weight = STRL_NORMAL_WEIGHT,
-                               .colour_weight = STRL_COLOUR_WEIGHT, .even_error = hierarchy->even_error,
+    strl_simplify_desc desc = {.target_triangles = target,
+                               .soft_triangles = hierarchy->soft_triangles,
+                               .error_limit = INFINITY,
+                               .last_rung = STRL_SIMPLIFY_CLUSTERING,
+                               .normal_weight = STRL_NORMAL_WEIGHT,
+                               .colour_weight = STRL_COLOUR_WEIGHT,
+                               .even_error = hierarchy->even_error,
                                .least_triangles = (uint32_t)(target * LEAST_OF_TARGET),
                                .most_triangles = (uint32_t)(target * MOST_OF_TARGET)};
     return strl_simplify(mesh, &desc, arena, result, err);
@@ -130,8 +134,9 @@ static void coarsen_normals(strl_pm *pm)
             pm->normal[v][k] = strl_oct_coarsen(pm->normal[v][k]);
 }
 
-/* Measured claims in place of chained ones: of the way from the mesh to the input the smaller counts; which input the node stands for
- * is decided by its pieces, so the way back is the measured one. Both surfaces lie in one box: no claim passes its diagonal. */
+/* Measured claims in place of chained ones: of the way from the mesh to the input the smaller counts; which input the
+ * node stands for is decided by its pieces, so the way back is the measured one. Both surfaces lie in one box: no claim
+ * passes its diagonal. */
 static void lower_errors(const strl_certificate *certificate, const strl_mesh *mesh, strl_pm *pm)
 {
     float diagonal = mesh->most_error > 0 ? mesh->most_error : INFINITY;
@@ -151,7 +156,8 @@ static strl_status certify(const strl_node_mesh *node, const strl_anchors *ancho
     memcpy(piece, anchors->own.item, own * sizeof *piece);
     if (beside)
         memcpy(piece + own, anchors->beside.item, beside * sizeof *piece);
-    strl_status status = strl_certify(&node->mesh, simplified, &(strl_older){piece, own, own + beside, anchors->granted}, arena, certificate, err);
+    strl_status status = strl_certify(
+        &node->mesh, simplified, &(strl_older){piece, own, own + beside, anchors->granted}, arena, certificate, err);
     if (!status)
         lower_errors(certificate, &node->mesh, pm);
     return status;
@@ -173,8 +179,8 @@ static strl_status pass_anchors(const strl_hierarchy *hierarchy, const strl_anch
     return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for the anchors of a node");
 }
 
-strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh *node, const strl_anchors *anchors, uint32_t self,
-                           uint32_t target, strl_arena *arena, strl_made_node *made, strl_error *err)
+strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh *node, const strl_anchors *anchors,
+                           uint32_t self, uint32_t target, strl_arena *arena, strl_made_node *made, strl_error *err)
 {
     const strl_ingest *ingest = hierarchy->ingest;
     strl_arena_mark mark = strl_arena_get_mark(arena);
@@ -186,7 +192,8 @@ strl_status strl_make_node(const strl_hierarchy *hierarchy, const strl_node_mesh
     strl_status status = point_map ? simplify(hierarchy, &node->mesh, target, arena, &simplified, err)
                                    : strl__fail(err, STRL_ERR_MEMORY, "no memory for a node");
     if (!status)
-        status = strl_pm_record(&node->mesh, &simplified, ingest->palette, (uint32_t)ingest->palette_count, arena, &pm, err);
+        status =
+            strl_pm_record(&node->mesh, &simplified, ingest->palette, (uint32_t)ingest->palette_count, arena, &pm, err);
     if (!status && hierarchy->context->desc->compact)
         coarsen_normals(&pm);
     if (!status)
@@ -241,7 +248,8 @@ strl_status strl_take_node(strl_hierarchy *hierarchy, strl_level *level, uint32_
     for (size_t i = 0; i < made->neighbour_count && !status; i++)
         if (made->next_neighbour[2 * i] >= (level->count + 1) / 2)
             status = strl__fail(err, STRL_ERR_INTERNAL, "node %u shares points with one that is not there", self);
-        else if (!strl_adjacency_add(&hierarchy->next, self >> 1, made->next_neighbour[2 * i], made->next_neighbour[2 * i + 1]))
+        else if (!strl_adjacency_add(&hierarchy->next, self >> 1, made->next_neighbour[2 * i],
+                                     made->next_neighbour[2 * i + 1]))
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the neighbours of a level");
     return status || !level->states ? status : strl_node_state_save(level, self, made, err);
 }

@@ -15,8 +15,8 @@ bool strl__metis_bisect(int32_t count, int32_t *first, int32_t *neighbour, int32
     METIS_SetDefaultOptions(options);
     options[METIS_OPTION_SEED] = 1;
     options[METIS_OPTION_UFACTOR] = 10;
-    int result = METIS_PartGraphRecursive(&count, &constraints, first, neighbour, vertex_weight, NULL, edge_weight, &parts,
-                                          NULL, NULL, options, &cut, side);
+    int result = METIS_PartGraphRecursive(&count, &constraints, first, neighbour, vertex_weight, NULL, edge_weight,
+                                          &parts, NULL, NULL, options, &cut, side);
     strl_mutex_unlock(&metis_lock);
     return result == METIS_OK;
 }

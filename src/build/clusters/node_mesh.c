@@ -40,14 +40,15 @@ static uint32_t weld_point(index_table *table, strl_mesh *mesh, const int32_t po
 
 static uint32_t weld_wedge(index_table *table, strl_mesh *mesh, const strl_wedge *wedge)
 {
-    uint64_t hash = strl__mix64(((uint64_t)wedge->point << 32 | (uint32_t)wedge->normal[0] << 16 | wedge->normal[1]) ^
-                                strl__mix64(((uint64_t)wedge->colour << 32 | wedge->palette) ^ (uint64_t)wedge->texcoord << 16));
+    uint64_t hash =
+        strl__mix64(((uint64_t)wedge->point << 32 | (uint32_t)wedge->normal[0] << 16 | wedge->normal[1]) ^
+                    strl__mix64(((uint64_t)wedge->colour << 32 | wedge->palette) ^ (uint64_t)wedge->texcoord << 16));
     uint32_t at = (uint32_t)hash & table->mask;
     while (table->slots[at]) {
         const strl_wedge *other = &mesh->wedge[table->slots[at] - 1];
         if (other->point == wedge->point && other->normal[0] == wedge->normal[0] &&
-            other->normal[1] == wedge->normal[1] && other->colour == wedge->colour && other->palette == wedge->palette &&
-            other->texcoord == wedge->texcoord)
+            other->normal[1] == wedge->normal[1] && other->colour == wedge->colour &&
+            other->palette == wedge->palette && other->texcoord == wedge->texcoord)
             return table->slots[at] - 1;
         at = (at + 1) & table->mask;
     }

@@ -113,7 +113,8 @@ static void write_wedges(const strl_mesh *mesh, models *m, strl_packer *packer)
             strl_pack_step(packer, &m->normal[k], wedge->normal[k], last.normal[k]);
         strl_pack_colour(packer, &m->colour, wedge->colour, last.colour);
         for (unsigned k = 0; k < 2 && has_texcoords; k++)
-            strl_pack_step(packer, &m->texcoord[k], wedge->texcoord >> 16 * k & 0xffff, last.texcoord >> 16 * k & 0xffff);
+            strl_pack_step(packer, &m->texcoord[k], wedge->texcoord >> 16 * k & 0xffff,
+                           last.texcoord >> 16 * k & 0xffff);
         strl_pack(packer, &m->palette, strl_pack_zigzag(wedge->palette - last.palette));
         last = *wedge;
     }
@@ -130,7 +131,8 @@ static bool read_wedges(strl_mesh *mesh, models *m, strl_unpacker *unpacker)
         last.colour = strl_unpack_colour(unpacker, &m->colour, last.colour);
         uint32_t texcoord = 0;
         for (unsigned k = 0; k < 2 && has_texcoords; k++)
-            texcoord |= (strl_unpack_step(unpacker, &m->texcoord[k], last.texcoord >> 16 * k & 0xffff) & 0xffff) << 16 * k;
+            texcoord |= (strl_unpack_step(unpacker, &m->texcoord[k], last.texcoord >> 16 * k & 0xffff) & 0xffff)
+                        << 16 * k;
         last.texcoord = texcoord;
         last.palette += strl_unpack_zigzag(strl_unpack(unpacker, &m->palette));
         good &= last.point < mesh->point_count;

@@ -10,12 +10,13 @@
 
 typedef struct splitter {
     const strl_ingest *ingest;
-    uint32_t *order;     /* [cell_count] cells; a piece is a range of it */
-    uint32_t *other;     /* [cell_count] */
-    int32_t *local;      /* [cell_count] index within the piece at hand; -1 = not in it */
-    size_t *edge_first;  /* [cell_count + 1] */
+    uint32_t *order;                 /* [cell_count] cells; a piece is a range of it */
+    uint32_t *other;                 /* [cell_count] */
+    int32_t *local;                  /* [cell_count] index within the piece at hand; -1 = not in it */
+    size_t *edge_first;              /* [cell_count + 1] */
     uint32_t *edge_to, *edge_weight; /* both directions */
-    int32_t *first, *neighbour, *vertex_weight, *metis_weight, *side; /* METIS' arrays, as large as the whole graph needs */
+    /* METIS' arrays, as large as the whole graph needs */
+    int32_t *first, *neighbour, *vertex_weight, *metis_weight, *side;
 } splitter;
 
 static bool build_adjacency(splitter *s)

@@ -138,7 +138,8 @@ static void write_packed(const strl_pm *pm, strl_writer *writer)
     strl_writer_u32(writer, pm->palette_count);
     strl_writer_u32(writer, pm->vertex_end[0]);
     strl_writer_u32(writer, pm->triangle_end[0]);
-    strl_writer_u32(writer, (pm->colour ? HAS_COLOURS : 0) | (pm->palette_index ? HAS_PALETTE : 0) | (pm->texcoord ? HAS_TEXCOORDS : 0));
+    strl_writer_u32(writer, (pm->colour ? HAS_COLOURS : 0) | (pm->palette_index ? HAS_PALETTE : 0) |
+                                (pm->texcoord ? HAS_TEXCOORDS : 0));
     write_ends(pm, &m, &packer);
     write_errors(pm, &m, &packer);
     write_parents(pm, &m, &packer);
@@ -156,9 +157,8 @@ strl_status strl_pm_spill_write(const strl_pm *pm, strl_arena *scratch, strl_wri
     if (!packed)
         return strl_payload_encode(pm, NULL, scratch, writer, NULL, err);
     write_packed(pm, writer);
-    return writer->failed
-               ? strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", pm->triangle_count)
-               : STRL_OK;
+    return writer->failed ? strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", pm->triangle_count)
+                          : STRL_OK;
 }
 
 /* ---- reading: the same in the same order; everything that is used as an index is checked before */
@@ -166,8 +166,10 @@ strl_status strl_pm_spill_write(const strl_pm *pm, strl_arena *scratch, strl_wri
 static bool read_ends(strl_pm *pm, models *m, strl_unpacker *unpacker)
 {
     for (uint32_t s = 1; s <= pm->step_count; s++) {
-        uint32_t vertices = strl_unpack(unpacker, &m->step_vertices), triangles = strl_unpack(unpacker, &m->step_triangles);
-        if (vertices >= pm->vertex_count - pm->vertex_end[s - 1] || triangles > pm->triangle_count - pm->triangle_end[s - 1])
+        uint32_t vertices = strl_unpack(unpacker, &m->step_vertices),
+                 triangles = strl_unpack(unpacker, &m->step_triangles);
+        if (vertices >= pm->vertex_count - pm->vertex_end[s - 1] ||
+            triangles > pm->triangle_count - pm->triangle_end[s - 1])
             return false;
         pm->vertex_end[s] = pm->vertex_end[s - 1] + vertices + 1;
         pm->triangle_end[s] = pm->triangle_end[s - 1] + triangles;
@@ -216,15 +218,15 @@ static void read_attributes(strl_pm *pm, models *m, strl_unpacker *unpacker)
     for (uint32_t v = 0; v < pm->vertex_count; v++) {
         uint32_t guide = guide_of(pm, v);
         for (unsigned k = 0; k < 2; k++)
-            pm->normal[v][k] =
-                (uint16_t)strl_unpack_step(unpacker, &m->normal[k], v ? pm->normal[guide][k] : 0);
+            pm->normal[v][k] = (uint16_t)strl_unpack_step(unpacker, &m->normal[k], v ? pm->normal[guide][k] : 0);
         if (pm->colour)
             pm->colour[v] = strl_unpack_colour(unpacker, &m->colour, v ? pm->colour[guide] : 0);
         if (pm->texcoord)
             pm->texcoord[v] = 0;
         for (unsigned k = 0; k < 2 && pm->texcoord; k++)
-            pm->texcoord[v] |= (strl_unpack_step(unpacker, &m->texcoord[k], v ? pm->texcoord[guide] >> 16 * k & 0xffff : 0) &
-                                0xffff) << 16 * k;
+            pm->texcoord[v] |=
+                (strl_unpack_step(unpacker, &m->texcoord[k], v ? pm->texcoord[guide] >> 16 * k & 0xffff : 0) & 0xffff)
+                << 16 * k;
         if (pm->palette_index)
             pm->palette_index[v] =
                 (uint16_t)strl_unpack_beside(unpacker, &m->palette, v ? pm->palette_index[guide] : 0);
@@ -293,10 +295,12 @@ strl_status strl_pm_spill_read(const void *data, size_t size, strl_arena *arena,
     pm->triangle_count = strl_cursor_u32(&cursor);
     pm->step_count = strl_cursor_u32(&cursor);
     pm->palette_count = strl_cursor_u32(&cursor);
-    uint32_t vertices = strl_cursor_u32(&cursor), triangles = strl_cursor_u32(&cursor), flags = strl_cursor_u32(&cursor);
-    if (cursor.failed || kind != PACKED || pm->vertex_count > STRL_PM_MAX_VERTICES || pm->triangle_count > STRL_PM_MAX_TRIANGLES ||
-        pm->palette_count == 0 || pm->palette_count > STRL_PM_MAX_PALETTE || vertices > pm->vertex_count ||
-        triangles > pm->triangle_count || pm->step_count > pm->vertex_count - vertices)
+    uint32_t vertices = strl_cursor_u32(&cursor), triangles = strl_cursor_u32(&cursor),
+             flags = strl_cursor_u32(&cursor);
+    if (cursor.failed || kind != PACKED || pm->vertex_count > STRL_PM_MAX_VERTICES ||
+        pm->triangle_count > STRL_PM_MAX_TRIANGLES || pm->palette_count == 0 ||
+        pm->palette_count > STRL_PM_MAX_PALETTE || vertices > pm->vertex_count || triangles > pm->triangle_count ||
+        pm->step_count > pm->vertex_count - vertices)
         return strl__fail(err, STRL_ERR_INTERNAL, "a node's progressive mesh in scratch is damaged");
     if (!strl_pm_create(pm, flags & HAS_COLOURS, flags & HAS_PALETTE, flags & HAS_TEXCOORDS, arena))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", pm->triangle_count);

@@ -1,9 +1,9 @@
-/* The last stage: nodes into the container, breadth first. Until here progressive meshes wait in scratch (pm_spill.h), because
- * children are made before their parents; now each is encoded, told by its parent's finest state, which holds most of its base
- * mesh.
+/* The last stage: nodes into the container, breadth first. Until here progressive meshes wait in scratch (pm_spill.h),
+ * because children are made before their parents; now each is encoded, told by its parent's finest state, which holds
+ * most of its base mesh.
  *
- * No checkpoint is made meanwhile: the one of the finished levels stays in place, and with it the payloads that are used up
- * here. A build that is resumed begins this stage anew. */
+ * No checkpoint is made meanwhile: the one of the finished levels stays in place, and with it the payloads that are
+ * used up here. A build that is resumed begins this stage anew. */
 #include <stdio.h>
 #include <string.h>
 
@@ -54,15 +54,16 @@ static void keep_order(const strl_pm *pm, const strl_payload_order *order, strl_
     strl_writer_bytes(out, order->triangle, pm->triangle_count * sizeof *order->triangle);
 }
 
-static strl_status load_order(const strl_level *level, const strl_node_state *state, const strl_pm *pm, strl_arena *arena,
-                              strl_payload_order *order, strl_error *err)
+static strl_status load_order(const strl_level *level, const strl_node_state *state, const strl_pm *pm,
+                              strl_arena *arena, strl_payload_order *order, strl_error *err)
 {
     uint32_t base = pm->vertex_end[0];
     if (!order_create(order, pm, arena))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a node of %u triangles", pm->triangle_count);
     for (uint32_t v = base; v < pm->vertex_count; v++)
         order->vertex[v] = (uint16_t)v;
-    strl_status status = strl_spill_read(level->meshes, state->mesh_at, order->vertex, base * sizeof *order->vertex, err);
+    strl_status status =
+        strl_spill_read(level->meshes, state->mesh_at, order->vertex, base * sizeof *order->vertex, err);
     if (!status)
         status = strl_spill_read(level->meshes, state->mesh_at + base * sizeof *order->vertex, order->triangle,
                                  pm->triangle_count * sizeof *order->triangle, err);
@@ -119,8 +120,8 @@ static strl_status read_alone(const strl_level *level, const strl_node_state *st
 }
 
 /* Not placed yet. */
-static strl_status load_parent(const write_stage *stage, uint32_t index, strl_arena *arena, strl_payload_reference *reference,
-                               strl_error *err)
+static strl_status load_parent(const write_stage *stage, uint32_t index, strl_arena *arena,
+                               strl_payload_reference *reference, strl_error *err)
 {
     const strl_node_state *state = &stage->above->nodes[index];
     strl_pm alone, finest;
@@ -135,8 +136,8 @@ static strl_status load_parent(const write_stage *stage, uint32_t index, strl_ar
     return status;
 }
 
-static strl_status encode_node(const write_stage *stage, uint32_t index, strl_payload_reference *parent, written_node *node,
-                               strl_arena *arena, strl_error *err)
+static strl_status encode_node(const write_stage *stage, uint32_t index, strl_payload_reference *parent,
+                               written_node *node, strl_arena *arena, strl_error *err)
 {
     strl_pm pm;
     strl_payload_order order;
@@ -182,7 +183,8 @@ static strl_status finish_node(write_stage *stage, uint32_t index, const written
         state->mesh_at = strl_spill_bytes(stage->level->meshes);
     else
         strl_spill_drop(stage->level->payloads, state->payload_at, state->payload_bytes);
-    strl_status status = strl_container_writer_add_node(stage->writer, &node->record, node->payload.data, node->payload.size, err);
+    strl_status status =
+        strl_container_writer_add_node(stage->writer, &node->record, node->payload.data, node->payload.size, err);
     if (!status && stage->index)
         status = strl_spill_append(stage->level->meshes, node->order.data, node->order.size, err);
     return status ? status : strl__build_report(stage->hierarchy->context, ++stage->done, stage->total, err);
@@ -219,7 +221,8 @@ static strl_status write_level(write_stage *stage, strl_error *err)
     snprintf(name, sizeof name, "order-%02u", stage->index);
     strl_status status = stage->index ? strl_spill_open(context->spills, name, 0, &stage->level->meshes, err) : STRL_OK;
     if (!status)
-        status = strl_pool_ordered(context->pool, stage->above ? stage->above->count : 1, 0, work, finish, stage, NULL, err);
+        status =
+            strl_pool_ordered(context->pool, stage->above ? stage->above->count : 1, 0, work, finish, stage, NULL, err);
     if (!status && stage->index)
         status = strl_spill_flush(stage->level->meshes, err);
     return status || !stage->above ? status : close_above(stage, err);

@@ -8,7 +8,8 @@
 #define LEAST_TRIANGLES 64u
 #define SHARES_OF_MEMORY 8u
 #define SLOTS_OF_WORKER 2u
-/* The pipeline wants to know how many items there are; where the input ends is not known, so there are several pipelines. */
+/* The pipeline wants to know how many items there are; where the input ends is not known, so there are several
+ * pipelines. */
 #define ROUND 256u
 
 typedef struct reading {

@@ -17,7 +17,8 @@ static strl_status write_splitters(const strl_buckets *buckets, strl_saved_write
     return status;
 }
 
-strl_status strl_buckets_save(strl_build_context *context, const strl_ingest *ingest, const strl_buckets *buckets, strl_error *err)
+strl_status strl_buckets_save(strl_build_context *context, const strl_ingest *ingest, const strl_buckets *buckets,
+                              strl_error *err)
 {
     strl_saved_writer saved = {0};
     strl_status status = strl__ingest_save_facts(context, ingest, err);
@@ -30,7 +31,8 @@ static strl_status read_splitters(strl_saved_reader *saved, strl_buckets *bucket
 {
     strl_status status = strl_saved_get(saved, 4, err);
     uint32_t count = status ? 0 : strl_cursor_u32(&saved->cursor);
-    if (!status && (count < 1 || count > MAX_BUCKETS || strl_saved_left(saved) != (uint64_t)(count - 1) * SPLITTER_BYTES))
+    if (!status &&
+        (count < 1 || count > MAX_BUCKETS || strl_saved_left(saved) != (uint64_t)(count - 1) * SPLITTER_BYTES))
         status = strl_saved_fail("the number of buckets", err);
     if (!status)
         status = strl_saved_get(saved, (uint64_t)(count - 1) * SPLITTER_BYTES, err);
@@ -49,8 +51,8 @@ static strl_status read_splitters(strl_saved_reader *saved, strl_buckets *bucket
     return STRL_OK;
 }
 
-strl_status strl_buckets_restore(strl_build_context *context, uint32_t first, strl_ingest *ingest, strl_buckets *buckets,
-                                 strl_error *err)
+strl_status strl_buckets_restore(strl_build_context *context, uint32_t first, strl_ingest *ingest,
+                                 strl_buckets *buckets, strl_error *err)
 {
     strl_saved_reader saved = {0};
     uint64_t left = 0;

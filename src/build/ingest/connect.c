@@ -1,4 +1,5 @@
-/* Pairs (position, cell), in spills by hash of position, become the edges of the cell graph and the list of shared positions. */
+/* Pairs (position, cell), in spills by hash of position, become the edges of the cell graph and the list of shared
+ * positions. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -53,8 +54,10 @@ static bool make_chains(chains *c, const pair *pairs, uint32_t count)
     uint32_t size = 16;
     while (size / 2 < count)
         size *= 2;
-    *c = (chains){.slots = strl__alloc_zero(size, sizeof *c->slots), .mask = size - 1,
-                  .next = strl__alloc(count, sizeof *c->next), .last = strl__alloc(count, sizeof *c->last),
+    *c = (chains){.slots = strl__alloc_zero(size, sizeof *c->slots),
+                  .mask = size - 1,
+                  .next = strl__alloc(count, sizeof *c->next),
+                  .last = strl__alloc(count, sizeof *c->last),
                   .cells = strl__alloc(count, sizeof *c->cells)};
     if (!c->slots || !c->next || !c->last || !c->cells)
         return false;
@@ -169,7 +172,8 @@ static strl_status take_connected(void *context, uint64_t index, unsigned slot, 
     connecting *c = context;
     connected *out = &c->slots[slot];
     (void)worker;
-    strl_status status = strl_spill_append(c->ingest->shared, out->shared, out->shared_count * sizeof *out->shared, err);
+    strl_status status =
+        strl_spill_append(c->ingest->shared, out->shared, out->shared_count * sizeof *out->shared, err);
     for (size_t i = 0; i < out->edge_count && !status; i++)
         if (!count_edge(c, out->edges[i], SHARED_WEIGHT))
             status = strl__fail(err, STRL_ERR_MEMORY, "no memory for the graph of %u cells", c->ingest->cell_count);
@@ -187,8 +191,8 @@ static int compare_edges(const void *a, const void *b)
     return x->b < y->b ? -1 : x->b > y->b;
 }
 
-/* Cells that follow each other on the curve are near each other, if not connected: a weak edge keeps them together where
- * nothing else decides (the paper's inverse distance). */
+/* Cells that follow each other on the curve are near each other, if not connected: a weak edge keeps them together
+ * where nothing else decides (the paper's inverse distance). */
 static bool add_curve_edges(connecting *c)
 {
     for (uint32_t cell = 0; cell + 1 < c->ingest->cell_count; cell++)

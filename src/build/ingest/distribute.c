@@ -12,8 +12,8 @@
 #include "build/model.h"
 #include "geometry/octahedral.h"
 
-/* Buckets decide where cells are cut, so their size must not depend on the number of threads, or the output would. Sorting takes
- * some three times a bucket: with this share up to 32 threads may sort at once (strl__ingest_window). */
+/* Buckets decide where cells are cut, so their size must not depend on the number of threads, or the output would.
+ * Sorting takes some three times a bucket: with this share up to 32 threads may sort at once (strl__ingest_window). */
 #define SHARES_OF_MEMORY 96u
 
 #define BUFFER_BYTES ((size_t)64 << 10)      /* of a bucket */
@@ -91,8 +91,8 @@ void strl__bucket_name(uint32_t index, char name[24])
 }
 
 /* Uses up the sample. */
-static strl_status open_buckets(strl_build_context *context, model_survey *survey, const strl_ingest *ingest, bool octree,
-                                strl_buckets *buckets, strl_error *err)
+static strl_status open_buckets(strl_build_context *context, model_survey *survey, const strl_ingest *ingest,
+                                bool octree, strl_buckets *buckets, strl_error *err)
 {
     uint64_t bytes = survey->triangles * strl__soup_bucket_bytes(ingest), each = strl__bucket_bytes(context) * 2 / 3;
     uint64_t wanted = bytes / (each ? each : 1) + 1;
@@ -115,8 +115,9 @@ static strl_status open_buckets(strl_build_context *context, model_survey *surve
     for (uint32_t i = 0; i < buckets->count && !status; i++) {
         char name[24];
         strl__bucket_name(i, name);
-        status = octree && context->keep ? strl_spill_open_kept(context->spills, name, KEPT_BUFFER_BYTES, &buckets->spill[i], err)
-                                         : strl_spill_open(context->spills, name, BUFFER_BYTES, &buckets->spill[i], err);
+        status = octree && context->keep
+                     ? strl_spill_open_kept(context->spills, name, KEPT_BUFFER_BYTES, &buckets->spill[i], err)
+                     : strl_spill_open(context->spills, name, BUFFER_BYTES, &buckets->spill[i], err);
     }
 done:
     strl__free(keys);
@@ -208,7 +209,8 @@ static bool palette_id(palette_table *table, strl_ingest *ingest, uint32_t part,
         return false;
     size_t at = palette_slot(table, ingest, part, material);
     if (!table->slots[at]) {
-        if (!strl__grow(&ingest->palette, &ingest->palette_capacity, ingest->palette_count + 1, sizeof *ingest->palette))
+        if (!strl__grow(&ingest->palette, &ingest->palette_capacity, ingest->palette_count + 1,
+                        sizeof *ingest->palette))
             return false;
         ingest->palette[ingest->palette_count++] = (strl_palette_entry){part, material, 0xffffffffu};
         table->slots[at] = (uint32_t)ingest->palette_count;
@@ -223,7 +225,8 @@ static uint32_t texcoord_code(const strl_reader_image *image, const float texcoo
     uint32_t code[2];
     for (int k = 0; k < 2; k++) {
         double extent = (double)(image->texcoord_max[k] - image->texcoord_min[k]);
-        double at = extent > 0 ? ((double)texcoord[k] - (double)image->texcoord_min[k]) / extent * STRL_TEXCOORD_MOST : 0;
+        double at =
+            extent > 0 ? ((double)texcoord[k] - (double)image->texcoord_min[k]) / extent * STRL_TEXCOORD_MOST : 0;
         code[k] = (uint32_t)nearbyint(fmin(fmax(at, 0), STRL_TEXCOORD_MOST));
     }
     return code[0] | code[1] << 16;
@@ -234,7 +237,8 @@ static bool to_lattice(const strl_ingest *ingest, const strl_reader *reader, con
                        strl_soup_triangle *out, bool *lacks_normals)
 {
     strl_reader_image image;
-    bool has_texcoord = (in->flags & STRL_TRIANGLE_HAS_TEXCOORD) && strl_reader_material_image(reader, in->material, &image);
+    bool has_texcoord =
+        (in->flags & STRL_TRIANGLE_HAS_TEXCOORD) && strl_reader_material_image(reader, in->material, &image);
     for (int c = 0; c < 3; c++) {
         strl_soup_corner *corner = &out->corner[c];
         const float *n = in->normal[c];
@@ -283,7 +287,8 @@ static double longest_edge2(const strl_triangle *triangle)
     return most;
 }
 
-static strl_status place_batch(void *user, const strl_triangle_batch *batch, unsigned slot, unsigned worker, strl_error *err)
+static strl_status place_batch(void *user, const strl_triangle_batch *batch, unsigned slot, unsigned worker,
+                               strl_error *err)
 {
     const distribution *d = user;
     const strl_ingest *ingest = d->ingest;
@@ -310,7 +315,8 @@ static strl_status put_triangle(distribution *d, const strl_triangle *triangle, 
                                 strl_error *err)
 {
     uint32_t palette;
-    if (!palette_id(&d->table, d->ingest, d->part_base + triangle->part, d->material_base + triangle->material, &palette))
+    if (!palette_id(&d->table, d->ingest, d->part_base + triangle->part, d->material_base + triangle->material,
+                    &palette))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu part and material pairs", d->ingest->palette_count);
     strl__soup_set_palette(d->ingest, palette, record);
     return strl_spill_append(d->buckets->spill[bucket], record, d->record_bytes, err);
@@ -326,7 +332,8 @@ static strl_status put_batch(void *user, const strl_triangle_batch *batch, unsig
         if (placed->bucket[i] == COLLAPSED) {
             d->context->result->dropped_degenerate++;
         } else {
-            status = put_triangle(d, &batch->triangle[i], placed->records + i * d->record_bytes, placed->bucket[i], err);
+            status =
+                put_triangle(d, &batch->triangle[i], placed->records + i * d->record_bytes, placed->bucket[i], err);
             ingest->triangle_count += !status;
         }
     ingest->lacks_normals |= placed->lacks_normals;
@@ -380,8 +387,8 @@ static bool add_name(strl_names *names, const char *prefix, const char *name, ui
 }
 
 /* With several inputs each file is a group: FILE/part. */
-static strl_status add_names(const strl_build_desc *desc, strl_ingest *ingest, const strl_reader *reader, uint32_t input,
-                             strl_error *err)
+static strl_status add_names(const strl_build_desc *desc, strl_ingest *ingest, const strl_reader *reader,
+                             uint32_t input, strl_error *err)
 {
     const char *slash = strrchr(desc->inputs[input], '/'), *file = slash ? slash + 1 : desc->inputs[input];
     bool good = true;
@@ -393,11 +400,13 @@ static strl_status add_names(const strl_build_desc *desc, strl_ingest *ingest, c
         good = add_name(&ingest->materials, "", name, rgba, true);
         strl_reader_image image;
         if (good && strl_reader_material_image(reader, i, &image))
-            good = strl__ingest_add_image(&ingest->materials, ingest->materials.count - 1, &(strl_material_image){
-                .reference = image.reference, .wrap = {(strl_wrap)image.wrap[0], (strl_wrap)image.wrap[1]},
-                .texcoord_min = {image.texcoord_min[0], image.texcoord_min[1]},
-                .texcoord_extent = {image.texcoord_max[0] - image.texcoord_min[0],
-                                    image.texcoord_max[1] - image.texcoord_min[1]}});
+            good = strl__ingest_add_image(
+                &ingest->materials, ingest->materials.count - 1,
+                &(strl_material_image){.reference = image.reference,
+                                       .wrap = {(strl_wrap)image.wrap[0], (strl_wrap)image.wrap[1]},
+                                       .texcoord_min = {image.texcoord_min[0], image.texcoord_min[1]},
+                                       .texcoord_extent = {image.texcoord_max[0] - image.texcoord_min[0],
+                                                           image.texcoord_max[1] - image.texcoord_min[1]}});
     }
     return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for the names of %s", desc->inputs[input]);
 }
@@ -428,8 +437,7 @@ static strl_status distribute_inputs(distribution *d, strl_reader *const *reader
 {
     strl_batch_pass pass;
     d->record_bytes = strl__soup_bucket_bytes(d->ingest);
-    strl_status status =
-        strl__batch_pass_create(d->context, d->record_bytes + sizeof *d->slots->bucket, &pass, err);
+    strl_status status = strl__batch_pass_create(d->context, d->record_bytes + sizeof *d->slots->bucket, &pass, err);
     pass.work = place_batch;
     pass.finish = put_batch;
     pass.user = d;
@@ -456,8 +464,8 @@ static strl_status distribute_inputs(distribution *d, strl_reader *const *reader
     return status;
 }
 
-strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, model_survey *survey, bool octree,
-                             strl_ingest *ingest, strl_buckets *buckets, strl_error *err)
+strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, model_survey *survey,
+                             bool octree, strl_ingest *ingest, strl_buckets *buckets, strl_error *err)
 {
     distribution d = {.context = context, .ingest = ingest, .buckets = buckets};
     strl_status status = open_buckets(context, survey, ingest, octree, buckets, err);

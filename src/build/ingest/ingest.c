@@ -26,8 +26,8 @@ static void note_drops(strl_build_context *context, strl_reader *const *readers)
     }
 }
 
-/* Cells are bounded by the budget (sort.c), and a leaf is some cells: with fewer bytes a triangle leaves have more triangles
- * than STRL_CLUSTER_TRIANGLES. */
+/* Cells are bounded by the budget (sort.c), and a leaf is some cells: with fewer bytes a triangle leaves have more
+ * triangles than STRL_CLUSTER_TRIANGLES. */
 #define MEMORY_BYTES_OF_TRIANGLE 2u
 
 strl_status strl__ingest_check_memory(const strl_build_context *context, uint64_t triangles, strl_error *err)
@@ -35,8 +35,10 @@ strl_status strl__ingest_check_memory(const strl_build_context *context, uint64_
     uint64_t least = triangles * MEMORY_BYTES_OF_TRIANGLE;
     if (least <= context->memory_bytes)
         return STRL_OK;
-    return strl__fail(err, STRL_ERR_ARGUMENT, "--memory %" PRIu64 "M is below the least that a build of %" PRIu64
-                      " triangles needs, %" PRIu64 "M", context->memory_bytes >> 20, triangles, (least >> 20) + 1);
+    return strl__fail(err, STRL_ERR_ARGUMENT,
+                      "--memory %" PRIu64 "M is below the least that a build of %" PRIu64 " triangles needs, %" PRIu64
+                      "M",
+                      context->memory_bytes >> 20, triangles, (least >> 20) + 1);
 }
 
 /* What becomes of a tree without a triangle. Where there are other trees nothing is said: they are the model. */
@@ -74,13 +76,15 @@ static strl_status read_tree(strl_build_context *context, model_survey *survey, 
     status = strl__distribute(context, context->model->readers, survey, octree, ingest, buckets, err);
     if (status)
         return status;
-    strl__ingest_warn(context, context->model->readers, ingest); /* not before: of a refused model only the refusal is told */
+    /* not before: of a refused model only the refusal is told */
+    strl__ingest_warn(context, context->model->readers, ingest);
     strl__build_note_scratch(context);
     context->spool_bytes = 0;
     return strl__model_rest(context, err);
 }
 
-strl_status strl_ingest_begin(strl_build_context *context, bool octree, strl_ingest *ingest, strl_buckets *buckets, strl_error *err)
+strl_status strl_ingest_begin(strl_build_context *context, bool octree, strl_ingest *ingest, strl_buckets *buckets,
+                              strl_error *err)
 {
     model_survey survey = {0};
     strl_build_model *model = context->model;
@@ -97,8 +101,9 @@ strl_status strl_ingest_begin(strl_build_context *context, bool octree, strl_ing
     note_drops(context, model->readers);
     if (strl__model_is_plain(context))
         strl__build_expect(context, survey.triangles);
-    context->keep &= strl__model_is_plain(context) &&
-                     survey.triangles >= (context->desc->keep_triangles ? context->desc->keep_triangles : KEEP_TRIANGLES);
+    context->keep &=
+        strl__model_is_plain(context) &&
+        survey.triangles >= (context->desc->keep_triangles ? context->desc->keep_triangles : KEEP_TRIANGLES);
     if (survey.triangles && has_no_extent(context, &survey)) {
         context->result->dropped_degenerate += survey.triangles;
         survey.triangles = 0;

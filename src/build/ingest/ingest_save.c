@@ -26,7 +26,8 @@ static void write_numbers(const strl_ingest *ingest, strl_writer *writer)
     strl_writer_u8(writer, (uint8_t)ingest->curve_spare);
     strl_writer_u8(writer, (uint8_t)ingest->up);
     strl_writer_bytes(writer, ingest->unit, sizeof ingest->unit);
-    strl_writer_u8(writer, (uint8_t)(ingest->has_normals | ingest->has_colours << 1 | ingest->lacks_normals << 2 | ingest->has_texcoords << 3));
+    strl_writer_u8(writer, (uint8_t)(ingest->has_normals | ingest->has_colours << 1 | ingest->lacks_normals << 2 |
+                                     ingest->has_texcoords << 3));
     strl_writer_u64(writer, ingest->triangle_count);
     strl_writer_u32(writer, ingest->cell_count);
     strl_writer_u64(writer, ingest->palette_count);
@@ -145,7 +146,8 @@ static bool read_numbers(strl_cursor *cursor, strl_ingest *ingest)
     ingest->parts.count = ingest->materials.count = 0; /* grow with the names */
     bool finite = isfinite(ingest->origin[0]) && isfinite(ingest->origin[1]) && isfinite(ingest->origin[2]);
     return finite && ingest->step > 0 && isfinite(ingest->step) && ingest->leaf_error > 0 &&
-           isfinite(ingest->leaf_error) && ingest->curve_shift <= MOST_CURVE_SHIFT && ingest->curve_spare <= 20 && up < 3 && flags < 16;
+           isfinite(ingest->leaf_error) && ingest->curve_shift <= MOST_CURVE_SHIFT && ingest->curve_spare <= 20 &&
+           up < 3 && flags < 16;
 }
 
 static strl_status read_cells(strl_saved_reader *saved, strl_ingest *ingest, strl_error *err)
@@ -242,7 +244,8 @@ static strl_status read_image(strl_saved_reader *saved, strl_names *materials, s
     }
     uint32_t length = strl_cursor_u32(&saved->cursor);
     if (material >= materials->count || length >= sizeof reference || (wrap & 0xff) > STRL_WRAP_MIRROR ||
-        wrap >> 8 > STRL_WRAP_MIRROR || (materials->images && material < materials->image_capacity && materials->images[material].reference))
+        wrap >> 8 > STRL_WRAP_MIRROR ||
+        (materials->images && material < materials->image_capacity && materials->images[material].reference))
         return strl_saved_fail("the image of a material", err);
     status = strl_saved_get(saved, length, err);
     if (status)
@@ -312,7 +315,8 @@ static strl_status take_soup(strl_build_context *context, strl_ingest *ingest, s
     return status;
 }
 
-strl_status strl__ingest_restore_facts(strl_build_context *context, bool with_cells, strl_ingest *ingest, strl_error *err)
+strl_status strl__ingest_restore_facts(strl_build_context *context, bool with_cells, strl_ingest *ingest,
+                                       strl_error *err)
 {
     strl_saved_reader saved = {0};
     *ingest = (strl_ingest){0};

@@ -14,28 +14,29 @@ typedef struct survey_sample {
 /* First pass: what must be known before a single position can be put on the lattice. */
 typedef struct model_survey {
     double min[3], max[3];
-    uint64_t triangles;            /* as the readers gave them */
+    uint64_t triangles; /* as the readers gave them */
     bool any_normal, any_colour, any_texcoord;
-    uint64_t *edge_histogram;      /* [EDGE_BINS] of squared edge lengths */
-    survey_sample *sample;         /* [SAMPLE_CAPACITY] one of sample_stride triangles */
+    uint64_t *edge_histogram; /* [EDGE_BINS] of squared edge lengths */
+    survey_sample *sample;    /* [SAMPLE_CAPACITY] one of sample_stride triangles */
     uint32_t sample_count;
-    bool is_scattered;             /* no pattern in the order of the input hides anything from the sample */
+    bool is_scattered; /* no pattern in the order of the input hides anything from the sample */
     uint64_t sample_stride;
 } model_survey;
 
 /* octree: buckets will be made as strl_ingest_begin says. */
-strl_status strl__survey_run(strl_build_context *context, strl_reader *const *readers, bool octree, model_survey *survey,
-                             strl_error *err);
+strl_status strl__survey_run(strl_build_context *context, strl_reader *const *readers, bool octree,
+                             model_survey *survey, strl_error *err);
 void strl__survey_deinit(model_survey *survey);
 /* Sets origin, step and what is said about it, curve_shift, leaf_error. */
-strl_status strl__survey_choose_lattice(const strl_build_context *context, const model_survey *survey, strl_ingest *ingest,
-                                        strl_error *err);
+strl_status strl__survey_choose_lattice(const strl_build_context *context, const model_survey *survey,
+                                        strl_ingest *ingest, strl_error *err);
 
 /* Sentences (report.c). Long enough for most; what is longer is cut. */
 #define STRL_INPUTS_NAME_BYTES 200u
 /* "a.ply", or "a.ply and 2 more". */
 void strl__ingest_name_inputs(const strl_build_desc *desc, char *text, size_t size);
-/* Refuses more triangles than the budget has room for nodes and cells of: their leaves would outgrow what a worker may hold. */
+/* Refuses more triangles than the budget has room for nodes and cells of: their leaves would outgrow what a worker may
+ * hold. */
 strl_status strl__ingest_check_memory(const strl_build_context *context, uint64_t triangles, strl_error *err);
 /* No triangle is left of what was read: a warning with what was found, by kind; a refusal where triangles were lost,
  * or nothing but the names of the inputs says that they are models at all. The result has the drops. */
@@ -57,8 +58,8 @@ void strl__soup_set_palette(const strl_ingest *ingest, uint32_t palette, uint8_t
 /* Parts, materials and images of all inputs, whichever the tree is made of. They are known after the first survey. */
 strl_status strl__ingest_add_names(strl_build_context *context, strl_ingest *ingest, strl_error *err);
 /* Triangles to buckets by curve range. Uses up the survey's sample. */
-strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, model_survey *survey, bool octree,
-                             strl_ingest *ingest, strl_buckets *buckets, strl_error *err);
+strl_status strl__distribute(strl_build_context *context, strl_reader *const *readers, model_survey *survey,
+                             bool octree, strl_ingest *ingest, strl_buckets *buckets, strl_error *err);
 
 /* A lattice position and the cell that has it. */
 typedef struct pair {
@@ -70,7 +71,7 @@ typedef struct pair {
  * in order and their positions lie near each other. */
 typedef struct pair_spill {
     strl_spill *spill;
-    uint64_t count; /* pairs */
+    uint64_t count;               /* pairs */
     struct pair_packing *packing; /* owned; NULL when the stream has ended */
 } pair_spill;
 
@@ -92,16 +93,18 @@ strl_status strl__pair_spills_delete(pair_spills *pairs, uint32_t index, strl_er
 void strl__pair_spills_deinit(pair_spills *pairs);
 
 /* Buckets to soup, cells and position pairs. */
-strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest, strl_buckets *buckets, pair_spills *pairs,
-                               strl_error *err);
+strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest, strl_buckets *buckets,
+                               pair_spills *pairs, strl_error *err);
 /* Pairs to edges and shared positions. */
 strl_status strl__connect_cells(strl_build_context *context, strl_ingest *ingest, pair_spills *pairs, strl_error *err);
 
 /* The stream "ingest" of a checkpoint: all that is neither graph nor triangles. with_cells: they have been cut. */
 strl_status strl__ingest_save_facts(strl_build_context *context, const strl_ingest *ingest, strl_error *err);
-strl_status strl__ingest_restore_facts(strl_build_context *context, bool with_cells, strl_ingest *ingest, strl_error *err);
+strl_status strl__ingest_restore_facts(strl_build_context *context, bool with_cells, strl_ingest *ingest,
+                                       strl_error *err);
 
-/* Bytes that one bucket or pair spill may take, so that every worker can hold one and its sort; the same for any number of workers. */
+/* Bytes that one bucket or pair spill may take, so that every worker can hold one and its sort; the same for any number
+ * of workers. */
 uint64_t strl__bucket_bytes(const strl_build_context *context);
 
 #endif

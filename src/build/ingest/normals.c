@@ -7,7 +7,7 @@
 #include "geometry/octahedral.h"
 
 #define CREASE_COSINE 0.76604444f /* 40 degrees */
-#define MOST_FACES 1024u /* round one position; the rest has no say */
+#define MOST_FACES 1024u          /* round one position; the rest has no say */
 #define NO_INDEX UINT32_MAX
 
 typedef struct face_facts {
@@ -38,7 +38,8 @@ static face_facts face_of(const strl_soup_triangle *triangle)
     return face;
 }
 
-/* The corners at each position. Positions are numbered as they come, so that what lies side by side in space does in memory. */
+/* The corners at each position. Positions are numbered as they come, so that what lies side by side in space does in
+ * memory. */
 typedef struct fans {
     uint32_t *position; /* [3 * count] of each corner */
     uint32_t *first;    /* [positions + 1] into corner[] */
@@ -141,7 +142,8 @@ static void mean_normal(const fan_face *face, uint32_t count, const float axis[3
 }
 
 /* Faces in one plane have one normal: it is made once where they follow each other, as many equal triangles do. */
-static void fill_position(const uint32_t *corners, uint32_t count, const face_facts *faces, const bool *wanted, strl_soup_triangle *triangles)
+static void fill_position(const uint32_t *corners, uint32_t count, const face_facts *faces, const bool *wanted,
+                          strl_soup_triangle *triangles)
 {
     fan_face face[MOST_FACES];
     const uint32_t seen = count < MOST_FACES ? count : MOST_FACES;

@@ -23,8 +23,7 @@ struct pair_packing {
     strl_writer bytes; /* not appended yet */
 };
 
-strl_status strl__pair_spills_open(strl_build_context *context, uint64_t triangles, pair_spills *pairs,
-                                   strl_error *err)
+strl_status strl__pair_spills_open(strl_build_context *context, uint64_t triangles, pair_spills *pairs, strl_error *err)
 {
     uint64_t bytes = triangles * PAIR_BYTES_OF_TRIANGLE, each = strl__bucket_bytes(context) / 4;
     pairs->count = 1;

@@ -63,8 +63,10 @@ strl_status strl__ingest_refuse_collapsed(const strl_build_context *context, con
         advice = ", the finest that the extent allows: build what lies far apart into files of its own";
     add_drops(&others, context->result, collapsed);
     strl__ingest_name_inputs(context->desc, inputs, sizeof inputs);
-    return strl__fail(err, STRL_ERR_FORMAT, "%s: no triangle is left: %" PRIu64 " lose%s their area on the lattice of step %g%s%s%s",
-                      inputs, collapsed, collapsed == 1 ? "s" : "", ingest->step, advice, others.length ? "; also found " : "", others.text);
+    return strl__fail(err, STRL_ERR_FORMAT,
+                      "%s: no triangle is left: %" PRIu64 " lose%s their area on the lattice of step %g%s%s%s", inputs,
+                      collapsed, collapsed == 1 ? "s" : "", ingest->step, advice, others.length ? "; also found " : "",
+                      others.text);
 }
 
 /* The caller's sentence; the library itself never prints. */
@@ -109,8 +111,9 @@ static void warn_of_unread(const strl_build_context *context, strl_reader *const
     }
 }
 
-/* A model of lines alone is a model, and a script that builds a hundred files should not end at it. But where triangles were read
- * none of which could be kept something is broken, and of a text whose name ends in .obj an empty model would be no answer. */
+/* A model of lines alone is a model, and a script that builds a hundred files should not end at it. But where triangles
+ * were read none of which could be kept something is broken, and of a text whose name ends in .obj an empty model would
+ * be no answer. */
 strl_status strl__ingest_check_empty(strl_build_context *context, strl_reader *const *readers, strl_error *err)
 {
     char inputs[STRL_INPUTS_NAME_BYTES];
@@ -167,6 +170,8 @@ void strl__ingest_warn(strl_build_context *context, strl_reader *const *readers,
     char inputs[STRL_INPUTS_NAME_BYTES];
     strl__ingest_name_inputs(context->desc, inputs, sizeof inputs);
     context->result->coarse_lattices++;
-    warn(context, "%s: the lattice step %g is more than a sixteenth of a short edge, %g, but the extent allows none finer: "
-         "build what lies far apart into files of its own", inputs, ingest->step, ingest->short_edge);
+    warn(context,
+         "%s: the lattice step %g is more than a sixteenth of a short edge, %g, but the extent allows none finer: "
+         "build what lies far apart into files of its own",
+         inputs, ingest->step, ingest->short_edge);
 }

@@ -15,11 +15,11 @@
 #define BLOCK_TABLE 4096u /* a power of two above 3 * BLOCK * 2 */
 
 typedef struct sorted_bucket {
-    uint8_t *records;  /* sorted */
+    uint8_t *records; /* sorted */
     uint64_t count;
-    uint32_t *cells;   /* [cell_count] triangles of each */
+    uint32_t *cells; /* [cell_count] triangles of each */
     size_t cell_count, cell_capacity;
-    pair *pairs;       /* [pair_count] with cells counted from the bucket's first */
+    pair *pairs; /* [pair_count] with cells counted from the bucket's first */
     size_t pair_count, pair_capacity;
 } sorted_bucket;
 
@@ -28,7 +28,7 @@ typedef struct sorting {
     strl_ingest *ingest;
     strl_buckets *buckets;
     pair_spills *pairs;
-    sorted_bucket *slots; /* per pipeline slot */
+    sorted_bucket *slots;    /* per pipeline slot */
     uint32_t cell_triangles; /* most triangles of a cell */
     size_t cell_capacity;
 } sorting;
@@ -91,8 +91,8 @@ done:
     return status;
 }
 
-/* Where to end a run that begins at `at` and may have `most` items: where the curve makes its largest step in reach, so that runs are
- * compact. */
+/* Where to end a run that begins at `at` and may have `most` items: where the curve makes its largest step in reach, so
+ * that runs are compact. */
 static uint64_t run_end(const strl_keyed *keys, uint64_t at, uint64_t most, uint64_t count)
 {
     uint64_t widest = 0, best = at + most;
@@ -110,12 +110,12 @@ static uint64_t run_end(const strl_keyed *keys, uint64_t at, uint64_t most, uint
 
 /* Room for the triangles of one block. */
 typedef struct block {
-    uint32_t *component;  /* [3 * BLOCK] union-find over corners; then, per triangle, its component */
-    uint32_t *table;      /* [BLOCK_TABLE] corner + 1 by position */
-    uint32_t *order;      /* [BLOCK] */
-    strl_keyed *keys;          /* [BLOCK] */
-    uint8_t *records;     /* [BLOCK] packed */
-    uint32_t run[BLOCK];  /* triangles of each component, in new order */
+    uint32_t *component; /* [3 * BLOCK] union-find over corners; then, per triangle, its component */
+    uint32_t *table;     /* [BLOCK_TABLE] corner + 1 by position */
+    uint32_t *order;     /* [BLOCK] */
+    strl_keyed *keys;    /* [BLOCK] */
+    uint8_t *records;    /* [BLOCK] packed */
+    uint32_t run[BLOCK]; /* triangles of each component, in new order */
     uint32_t runs;
 } block;
 
@@ -152,8 +152,8 @@ static void find_components(block *b, const uint8_t *records, size_t bytes, uint
     }
 }
 
-/* Sheets that pass through one block are laid one after the other, each in the order of the curve: cells then hold pieces of
- * one sheet, and clusters of layered models keep short borders. */
+/* Sheets that pass through one block are laid one after the other, each in the order of the curve: cells then hold
+ * pieces of one sheet, and clusters of layered models keep short borders. */
 static void separate_sheets(block *b, uint8_t *records, strl_keyed *keys, size_t bytes, uint32_t count)
 {
     uint32_t placed = 0;
@@ -200,8 +200,10 @@ static bool cut_block(const sorting *s, sorted_bucket *out, const block *b, cons
 static bool cut_cells(const sorting *s, sorted_bucket *out, strl_keyed *keys)
 {
     size_t bytes = strl_soup_bytes(s->ingest);
-    block b = {.component = strl__alloc(3 * BLOCK, sizeof *b.component), .table = strl__alloc(BLOCK_TABLE, sizeof *b.table),
-               .order = strl__alloc(BLOCK, sizeof *b.order), .keys = strl__alloc(BLOCK, sizeof *b.keys),
+    block b = {.component = strl__alloc(3 * BLOCK, sizeof *b.component),
+               .table = strl__alloc(BLOCK_TABLE, sizeof *b.table),
+               .order = strl__alloc(BLOCK, sizeof *b.order),
+               .keys = strl__alloc(BLOCK, sizeof *b.keys),
                .records = strl__alloc(BLOCK, bytes)};
     bool good = b.component && b.table && b.order && b.keys && b.records;
     for (uint64_t at = 0, end; at < out->count && good; at = end) {
@@ -232,8 +234,9 @@ static bool collect_pairs(const sorting *s, sorted_bucket *out)
             for (int c = 0; c < 3 && good; c++) {
                 pair found = {.cell = cell};
                 memcpy(found.position, out->records + at * bytes + 12 * c, 12);
-                size_t slot = strl__mix64(found.position[0] ^ strl__mix64((uint64_t)found.position[1] << 32 |
-                                                                          found.position[2])) & (table_size - 1);
+                size_t slot = strl__mix64(found.position[0] ^
+                                          strl__mix64((uint64_t)found.position[1] << 32 | found.position[2])) &
+                              (table_size - 1);
                 while (table[slot] && memcmp(out->pairs[table[slot] - 1].position, found.position, 12))
                     slot = (slot + 1) & (table_size - 1);
                 if (table[slot])
@@ -280,7 +283,8 @@ static strl_status append_bucket(void *context, uint64_t index, unsigned slot, u
     uint64_t first = strl_spill_bytes(ingest->soup) / bytes;
     uint32_t base = ingest->cell_count;
     (void)worker;
-    strl_status status = strl_spill_close_and_delete(s->buckets->spill[index], err); /* its disk is needed for the soup */
+    /* its disk is needed for the soup */
+    strl_status status = strl_spill_close_and_delete(s->buckets->spill[index], err);
     s->buckets->spill[index] = NULL; /* closed in any case */
     if (!status)
         status = strl_spill_append(ingest->soup, out->records, out->count * bytes, err);
@@ -298,8 +302,8 @@ static strl_status append_bucket(void *context, uint64_t index, unsigned slot, u
     return status ? status : strl__build_report(s->context, first, ingest->triangle_count, err);
 }
 
-strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest, strl_buckets *buckets, pair_spills *pairs,
-                               strl_error *err)
+strl_status strl__sort_buckets(strl_build_context *context, strl_ingest *ingest, strl_buckets *buckets,
+                               pair_spills *pairs, strl_error *err)
 {
     sorting s = {.context = context, .ingest = ingest, .buckets = buckets, .pairs = pairs};
     uint64_t most_cells = context->memory_bytes / CELL_BYTES_OF_MEMORY;

@@ -5,7 +5,8 @@
 #include "base/fail.h"
 #include "build/ingest/internal.h"
 
-/* Positions 36 bytes, normals 8, colours 12, texture coordinates 12, the palette last: the sorted soup goes without it where there is but one. */
+/* Positions 36 bytes, normals 8, colours 12, texture coordinates 12, the palette last: the sorted soup goes without it
+ * where there is but one. */
 size_t strl__soup_bucket_bytes(const strl_ingest *ingest)
 {
     return 40u + (ingest->has_normals ? 8u : 0) + (ingest->has_colours ? 12u : 0) + (ingest->has_texcoords ? 12u : 0);
@@ -102,8 +103,9 @@ strl_status strl_ingest_read(const strl_ingest *ingest, uint64_t first, uint32_t
         if (ingest->palette_count > 1)
             memcpy(&triangles[i].palette, palette, 4);
         if (triangles[i].palette >= ingest->palette_count)
-            status = strl__fail(err, STRL_ERR_INTERNAL, "triangle %" PRIu64 " has the part and material %" PRIu32 " of %zu",
-                                first + i, triangles[i].palette, ingest->palette_count);
+            status =
+                strl__fail(err, STRL_ERR_INTERNAL, "triangle %" PRIu64 " has the part and material %" PRIu32 " of %zu",
+                           first + i, triangles[i].palette, ingest->palette_count);
         else if (strl__soup_has_collapsed(&triangles[i]))
             status = strl__fail(err, STRL_ERR_INTERNAL, "triangle %" PRIu64 " has two corners at one place", first + i);
     }
@@ -159,6 +161,7 @@ uint64_t strl__curve_key_of_triangle(const strl_ingest *ingest, const strl_soup_
     uint32_t centre[3];
     for (int k = 0; k < 3; k++)
         centre[k] = (uint32_t)(((uint64_t)triangle->corner[0].position[k] + triangle->corner[1].position[k] +
-                                triangle->corner[2].position[k]) / 3);
+                                triangle->corner[2].position[k]) /
+                               3);
     return strl__curve_key(ingest, centre);
 }

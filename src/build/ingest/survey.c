@@ -18,7 +18,7 @@
 #define STEPS_EXPONENT 30
 /* Of a compact lattice: to the median edge, which half a diagonal then is at most a 37th of. */
 #define COMPACT_STEPS 32
-#define LEAST_EXTENT 1e-140 /* steps below 2^-512 are not of the container's format */
+#define LEAST_EXTENT 1e-140   /* steps below 2^-512 are not of the container's format */
 #define MOST_COORDINATE 1e150 /* nor those above 2^512; and squares of lengths stay finite */
 
 /* What one worker has seen: no order in it. */
@@ -31,7 +31,7 @@ typedef struct tally {
 typedef struct surveying {
     strl_build_context *context;
     model_survey *survey;
-    tally *tallies; /* [workers] */
+    tally *tallies;                     /* [workers] */
     uint64_t bytes_before, bytes_total; /* of the inputs before the one at hand, and of all */
 } surveying;
 
@@ -144,8 +144,8 @@ static uint64_t bytes_of(const strl_reader *reader)
     return info.file_bytes;
 }
 
-strl_status strl__survey_run(strl_build_context *context, strl_reader *const *readers, bool octree, model_survey *survey,
-                             strl_error *err)
+strl_status strl__survey_run(strl_build_context *context, strl_reader *const *readers, bool octree,
+                             model_survey *survey, strl_error *err)
 {
     surveying s = {.context = context, .survey = survey};
     unsigned workers = strl_pool_workers(context->pool);
@@ -154,8 +154,10 @@ strl_status strl__survey_run(strl_build_context *context, strl_reader *const *re
     pass.work = look_at_batch;
     pass.finish = sample_batch;
     pass.user = &s;
-    *survey = (model_survey){.min = {INFINITY, INFINITY, INFINITY}, .max = {-INFINITY, -INFINITY, -INFINITY},
-                              .is_scattered = octree, .sample_stride = 1};
+    *survey = (model_survey){.min = {INFINITY, INFINITY, INFINITY},
+                             .max = {-INFINITY, -INFINITY, -INFINITY},
+                             .is_scattered = octree,
+                             .sample_stride = 1};
     survey->edge_histogram = strl__alloc_zero(EDGE_BINS, sizeof *survey->edge_histogram);
     survey->sample = strl__alloc(SAMPLE_CAPACITY, sizeof *survey->sample);
     if (!status && (!make_tallies(&s, workers) || !survey->edge_histogram || !survey->sample))
@@ -214,22 +216,26 @@ static double power_of_two_below(double value)
 }
 
 /* What no lattice can hold, or doubles cannot tell apart. */
-static strl_status check_extent(const strl_build_context *context, const model_survey *survey, double extent, double largest,
-                                strl_error *err)
+static strl_status check_extent(const strl_build_context *context, const model_survey *survey, double extent,
+                                double largest, strl_error *err)
 {
     char inputs[STRL_INPUTS_NAME_BYTES];
     strl__ingest_name_inputs(context->desc, inputs, sizeof inputs);
     if (largest > MOST_COORDINATE)
-        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected coordinates of at most %g, found %g", inputs, MOST_COORDINATE,
-                          largest);
+        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected coordinates of at most %g, found %g", inputs,
+                          MOST_COORDINATE, largest);
     if (!(extent > 0))
-        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected a model with an extent, found all corners at one point, %.9g %.9g %.9g",
-                          inputs, survey->min[0], survey->min[1], survey->min[2]);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "%s: expected a model with an extent, found all corners at one point, %.9g %.9g %.9g", inputs,
+                          survey->min[0], survey->min[1], survey->min[2]);
     if (extent < LEAST_EXTENT)
-        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected an extent of at least %g, found %g", inputs, LEAST_EXTENT, extent);
+        return strl__fail(err, STRL_ERR_FORMAT, "%s: expected an extent of at least %g, found %g", inputs, LEAST_EXTENT,
+                          extent);
     if (!(extent > largest * 1e-13))
-        return strl__fail(err, STRL_ERR_FORMAT, "%s: the extent of %g is lost in the rounding of coordinates as large as %g: "
-                          "move the model towards the origin", inputs, extent, largest);
+        return strl__fail(err, STRL_ERR_FORMAT,
+                          "%s: the extent of %g is lost in the rounding of coordinates as large as %g: "
+                          "move the model towards the origin",
+                          inputs, extent, largest);
     return STRL_OK;
 }
 
@@ -245,9 +251,10 @@ static strl_status choose_step(const strl_build_context *context, const model_su
             return STRL_OK;
         char inputs[STRL_INPUTS_NAME_BYTES];
         strl__ingest_name_inputs(context->desc, inputs, sizeof inputs);
-        return strl__fail(err, STRL_ERR_LIMIT, "%s: --grid %g asks for a lattice step of %g, finer than the %g that the extent of %g "
-                          "allows: ask for %g or more, or build what lies far apart into files of its own", inputs, asked,
-                          ingest->step, ingest->finest_step, extent, ingest->finest_step);
+        return strl__fail(err, STRL_ERR_LIMIT,
+                          "%s: --grid %g asks for a lattice step of %g, finer than the %g that the extent of %g "
+                          "allows: ask for %g or more, or build what lies far apart into files of its own",
+                          inputs, asked, ingest->step, ingest->finest_step, extent, ingest->finest_step);
     }
     double wanted = ldexp(extent, -20);
     if (ingest->short_edge > 0)
@@ -259,8 +266,8 @@ static strl_status choose_step(const strl_build_context *context, const model_su
     return STRL_OK;
 }
 
-strl_status strl__survey_choose_lattice(const strl_build_context *context, const model_survey *survey, strl_ingest *ingest,
-                                        strl_error *err)
+strl_status strl__survey_choose_lattice(const strl_build_context *context, const model_survey *survey,
+                                        strl_ingest *ingest, strl_error *err)
 {
     double extent = 0, largest = 0;
     for (int k = 0; k < 3; k++) {
@@ -281,7 +288,8 @@ strl_status strl__survey_choose_lattice(const strl_build_context *context, const
         ingest->origin[k] = floor(survey->min[k] / ingest->step) * ingest->step;
     while (extent / ingest->step + 2 >= ldexp(1, 21 + (int)ingest->curve_shift))
         ingest->curve_shift++;
-    while (ingest->curve_spare < 20 && extent / ingest->step + 2 < ldexp(1, 20 + (int)ingest->curve_shift - (int)ingest->curve_spare))
+    while (ingest->curve_spare < 20 &&
+           extent / ingest->step + 2 < ldexp(1, 20 + (int)ingest->curve_shift - (int)ingest->curve_spare))
         ingest->curve_spare++;
     double rounding = (largest + extent) * 4 * DBL_EPSILON / ingest->step;
     ingest->leaf_error = nextafterf((float)(0.5 * sqrt(3.) + 2 * rounding), INFINITY);

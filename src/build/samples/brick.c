@@ -24,10 +24,10 @@ typedef struct brick_content {
     uint8_t *level;     /* [count] as of strl_brick_run */
     uint32_t count;
     uint32_t level_count;
-    uint32_t *cell[STRL_BRICK_LEVELS];     /* octants of level s + 1 */
+    uint32_t *cell[STRL_BRICK_LEVELS]; /* octants of level s + 1 */
     uint32_t cell_count[STRL_BRICK_LEVELS];
-    uint32_t cell_capacity;                /* of each */
-    float size[STRL_BRICK_LEVELS];         /* the largest of a level's cells, lattice units */
+    uint32_t cell_capacity;        /* of each */
+    float size[STRL_BRICK_LEVELS]; /* the largest of a level's cells, lattice units */
 } brick_content;
 
 void strl_bricks_deinit(strl_brick_set *set)
@@ -53,14 +53,15 @@ typedef struct welding {
 static bool same_vertex(const welding *weld, uint32_t vertex, const strl_soup_corner *corner, uint32_t palette)
 {
     const strl_soup_corner *other = weld->corner[vertex];
-    return memcmp(other->position, corner->position, sizeof corner->position) == 0 && other->normal[0] == corner->normal[0] &&
-           other->normal[1] == corner->normal[1] && other->colour == corner->colour && other->texcoord == corner->texcoord &&
-           weld->palette[vertex] == palette;
+    return memcmp(other->position, corner->position, sizeof corner->position) == 0 &&
+           other->normal[0] == corner->normal[0] && other->normal[1] == corner->normal[1] &&
+           other->colour == corner->colour && other->texcoord == corner->texcoord && weld->palette[vertex] == palette;
 }
 
 static uint16_t weld_corner(welding *weld, const strl_soup_corner *corner, uint32_t palette)
 {
-    uint64_t hash = strl__mix64(corner->position[0] ^ strl__mix64((uint64_t)corner->position[1] << 32 | corner->position[2]));
+    uint64_t hash =
+        strl__mix64(corner->position[0] ^ strl__mix64((uint64_t)corner->position[1] << 32 | corner->position[2]));
     uint64_t normal = (uint64_t)corner->normal[0] << 16 | corner->normal[1];
     hash = strl__mix64(hash ^ (normal << 32 | (corner->colour ^ corner->texcoord)));
     uint32_t at = (uint32_t)hash & weld->mask;
@@ -117,8 +118,8 @@ static bool make_palette(const welding *weld, strl_pm *pm, strl_arena *arena)
     return pm->palette != NULL;
 }
 
-/* Positions are relative to the least corner of their box; where all triangles have been drawn by cells above, it is a point of
- * theirs. */
+/* Positions are relative to the least corner of their box; where all triangles have been drawn by cells above, it is a
+ * point of theirs. */
 static void set_box(const welding *weld, const int64_t alone[3], strl_node *record)
 {
     for (int k = 0; k < 3; k++) {
@@ -142,7 +143,8 @@ static bool make_mesh(const welding *weld, const strl_node *record, strl_pm *pm,
     strl_pm palette = {0};
     if (!make_palette(weld, &palette, arena))
         return false;
-    *pm = (strl_pm){.vertex_count = weld->vertices, .triangle_count = weld->content->count,
+    *pm = (strl_pm){.vertex_count = weld->vertices,
+                    .triangle_count = weld->content->count,
                     .palette_count = palette.palette_count ? palette.palette_count : 1};
     if (!strl_pm_create(pm, ingest->has_colours, palette.palette_count > 1, ingest->has_texcoords, arena))
         return false;
@@ -204,11 +206,13 @@ static void set_line(const double normal[3], const uint8_t near[2], uint8_t line
         memcpy(line, other, sizeof other);
 }
 
-static strl_splat make_splat(const strl_octree *octree, const strl_octant *octant, const int64_t anchor[3], const uint8_t near[2])
+static strl_splat make_splat(const strl_octree *octree, const strl_octant *octant, const int64_t anchor[3],
+                             const uint8_t near[2])
 {
     const strl_splat_sums *sums = &octant->sums;
     double side = strl_octree_side(octree->ingest, octant->depth), length = 0;
-    strl_splat splat = {.side = (uint8_t)(octree->ingest->curve_shift + STRL_OCTREE_DEPTH - octant->depth), .rgba = UINT32_MAX};
+    strl_splat splat = {.side = (uint8_t)(octree->ingest->curve_shift + STRL_OCTREE_DEPTH - octant->depth),
+                        .rgba = UINT32_MAX};
     bool has_area = sums->area > 0;
     for (int k = 0; k < 3; k++) {
         double centre = has_area ? sums->centre[k] / sums->area - (double)anchor[k] : 0;
@@ -220,7 +224,8 @@ static strl_splat make_splat(const strl_octree *octree, const strl_octant *octan
     set_line(sums->normal, near, splat.normal);
     double walls = sums->area / (side * side), parallel = sqrt(length) / sums->area;
     splat.parallel = to_byte(parallel);
-    splat.coverage = to_byte(strl_hidden_share(walls, walls, fmax(0, 2 * parallel - 1))); /* any direction, turned to one side, has half the length */
+    /* any direction, turned to one side, has half the length */
+    splat.coverage = to_byte(strl_hidden_share(walls, walls, fmax(0, 2 * parallel - 1)));
     splat.rgba = splat_colour(sums);
     return splat;
 }
@@ -242,8 +247,8 @@ static float size_of(const strl_octree *octree, const strl_octant *octant)
 /* ---- one brick */
 
 /* Decoded, triangles come in another order. */
-static strl_status set_runs(const brick_content *content, const strl_payload_order *order, strl_arena *arena, strl_brick_head *head,
-                            strl_error *err)
+static strl_status set_runs(const brick_content *content, const strl_payload_order *order, strl_arena *arena,
+                            strl_brick_head *head, strl_error *err)
 {
     head->run = strl_arena_alloc(arena, content->count + 1, sizeof *head->run);
     head->run_count = 0;
@@ -269,8 +274,8 @@ static void widen_box(const strl_brick_head *head, strl_node *record)
         }
 }
 
-static strl_status set_splats(const strl_octree *octree, const brick_content *content, const int64_t anchor[3], strl_arena *arena,
-                              strl_brick_head *head, strl_error *err)
+static strl_status set_splats(const strl_octree *octree, const brick_content *content, const int64_t anchor[3],
+                              strl_arena *arena, strl_brick_head *head, strl_error *err)
 {
     uint32_t count = 0;
     head->level_count = content->level_count;
@@ -297,9 +302,10 @@ static strl_status encode(strl_brick_set *set, const strl_pm *pm, const brick_co
                                 strl_arena_alloc(arena, pm->triangle_count + 1, sizeof *order.triangle)};
     strl_writer mesh = {0};
     brick->payload_at = set->bytes.size;
-    strl_status status = order.vertex && order.triangle
-                             ? strl_payload_encode(pm, NULL, arena, &mesh, &order, err)
-                             : strl__fail(err, STRL_ERR_MEMORY, "no memory for a brick of %u triangles", content->count);
+    strl_status status =
+        order.vertex && order.triangle
+            ? strl_payload_encode(pm, NULL, arena, &mesh, &order, err)
+            : strl__fail(err, STRL_ERR_MEMORY, "no memory for a brick of %u triangles", content->count);
     if (!status)
         status = set_runs(content, &order, arena, head, err);
     if (!status)
@@ -327,7 +333,8 @@ static strl_status push(strl_brick_set *set, const strl_brick *brick, uint32_t *
 
 static strl_brick start_brick(const strl_brick_set *set, uint32_t parent)
 {
-    return (strl_brick){.parent = parent, .depth = parent == STRL_NO_BRICK ? 0 : set->brick[parent].depth + 1, .chunk = STRL_NO_CHUNK};
+    return (strl_brick){
+        .parent = parent, .depth = parent == STRL_NO_BRICK ? 0 : set->brick[parent].depth + 1, .chunk = STRL_NO_CHUNK};
 }
 
 /* Of the brick's own triangles. */
@@ -352,11 +359,13 @@ static bool set_cone(const welding *weld, strl_arena *arena, strl_cone *cone)
 /* Along the curve, whatever the level: what lies side by side is told by each other. */
 static bool sort_triangles(const strl_octree *octree, const brick_content *content, strl_arena *arena)
 {
-    strl_keyed *keys = strl_arena_alloc(arena, content->count, sizeof *keys), *other = strl_arena_alloc(arena, content->count, sizeof *keys);
+    strl_keyed *keys = strl_arena_alloc(arena, content->count, sizeof *keys),
+               *other = strl_arena_alloc(arena, content->count, sizeof *keys);
     if (!keys || !other)
         return false;
     for (uint32_t i = 0; i < content->count; i++)
-        keys[i] = (strl_keyed){octree->key[content->triangle[i]], (uint64_t)content->triangle[i] << 8 | content->level[i]};
+        keys[i] =
+            (strl_keyed){octree->key[content->triangle[i]], (uint64_t)content->triangle[i] << 8 | content->level[i]};
     strl__sort_keys(keys, other, content->count);
     for (uint32_t i = 0; i < content->count; i++) {
         content->triangle[i] = (uint32_t)(keys[i].index >> 8);
@@ -365,8 +374,8 @@ static bool sort_triangles(const strl_octree *octree, const brick_content *conte
     return true;
 }
 
-static strl_status add_brick(strl_brick_set *set, const strl_octree *octree, const brick_content *content, uint32_t parent,
-                             strl_arena *arena, uint32_t *index, strl_error *err)
+static strl_status add_brick(strl_brick_set *set, const strl_octree *octree, const brick_content *content,
+                             uint32_t parent, strl_arena *arena, uint32_t *index, strl_error *err)
 {
     strl_arena_mark mark = strl_arena_get_mark(arena);
     strl_brick brick = start_brick(set, parent);
@@ -374,9 +383,10 @@ static strl_status add_brick(strl_brick_set *set, const strl_octree *octree, con
     int64_t alone[3] = {0};
     welding weld = {.octree = octree, .content = content};
     strl_pm pm;
-    strl_status status = sort_triangles(octree, content, arena) && weld_all(&weld, arena)
-                             ? STRL_OK
-                             : strl__fail(err, STRL_ERR_MEMORY, "no memory for a brick of %u triangles", content->count);
+    strl_status status =
+        sort_triangles(octree, content, arena) && weld_all(&weld, arena)
+            ? STRL_OK
+            : strl__fail(err, STRL_ERR_MEMORY, "no memory for a brick of %u triangles", content->count);
     if (!status) {
         if (content->cell_count[0])
             find_centre(octree, &octree->octant[content->cell[0][0]], alone);
@@ -393,7 +403,8 @@ static strl_status add_brick(strl_brick_set *set, const strl_octree *octree, con
     strl_node *record = &brick.record;
     record->vertex_count = record->base_vertex_count = weld.vertices;
     record->triangle_count = record->base_triangle_count = content->count;
-    record->geometric_min = record->geometric_max = record->group_geometric = fmaxf(head.error[0], octree->ingest->leaf_error);
+    record->geometric_min = record->geometric_max = record->group_geometric =
+        fmaxf(head.error[0], octree->ingest->leaf_error);
     record->group_size = 1;
     record->rung = STRL_RUNG_SAMPLED;
     record->decode_parent = STRL_NONE;
@@ -418,7 +429,8 @@ static void gather(const strl_octree *octree, uint32_t child, uint32_t level, br
 }
 
 /* What the children of an octant at `level` store, and with is_whole all that is below them. */
-static void gather_children(const strl_octree *octree, const strl_octant *octant, uint32_t level, bool is_whole, brick_content *content)
+static void gather_children(const strl_octree *octree, const strl_octant *octant, uint32_t level, bool is_whole,
+                            brick_content *content)
 {
     /* Large triangles first: they are drawn as soon as the brick is. */
     for (uint32_t i = 0; i < octant->child_count; i++)
@@ -437,7 +449,8 @@ static void gather_children(const strl_octree *octree, const strl_octant *octant
     }
 }
 
-static void count_below(const strl_octree *octree, const strl_octant *octant, bool is_whole, uint32_t *items, uint32_t *cells)
+static void count_below(const strl_octree *octree, const strl_octant *octant, bool is_whole, uint32_t *items,
+                        uint32_t *cells)
 {
     for (uint32_t i = 0; i < octant->child_count; i++) {
         const strl_octant *child = &octree->octant[octant->child[i]];
@@ -457,7 +470,8 @@ uint32_t strl_preview_depth(const strl_ingest *ingest)
 }
 
 /* How many cells a cut through the octree at `depth` has; with content they become those of `level`. */
-static uint32_t cut_cells(const strl_octree *octree, uint32_t index, uint32_t depth, uint32_t level, brick_content *content)
+static uint32_t cut_cells(const strl_octree *octree, uint32_t index, uint32_t depth, uint32_t level,
+                          brick_content *content)
 {
     const strl_octant *octant = &octree->octant[index];
     uint32_t count = 0;
@@ -474,7 +488,8 @@ static uint32_t cut_cells(const strl_octree *octree, uint32_t index, uint32_t de
 }
 
 /* The second level of the first brick. Large triangles are in no splat but that of their cell. */
-static strl_status add_preview(const strl_octree *octree, uint32_t root, strl_arena *arena, brick_content *content, strl_error *err)
+static strl_status add_preview(const strl_octree *octree, uint32_t root, strl_arena *arena, brick_content *content,
+                               strl_error *err)
 {
     uint32_t count = 0, depth = strl_preview_depth(octree->ingest) + 1;
     while (depth > octree->octant[root].depth && (count == 0 || count >= STRL_BRICK_SPLATS))
@@ -527,8 +542,8 @@ static void open_for_large(const strl_octree *octree, const brick_content *left,
         front->size[0] = fmaxf(front->size[0], strl_octree_extent(&octree->triangle[left->triangle[i]]));
 }
 
-/* Too much for one brick: some leaves beside the next one, which goes on in the same way. The splats are with those that have something
- * below. *parent: the last. */
+/* Too much for one brick: some leaves beside the next one, which goes on in the same way. The splats are with those
+ * that have something below. *parent: the last. */
 static strl_status add_beside(strl_brick_set *set, const strl_octree *octree, brick_content *whole, uint32_t *parent,
                               strl_arena *arena, strl_error *err)
 {
@@ -552,8 +567,8 @@ static strl_status add_place(strl_brick_set *set, uint32_t chunk, uint32_t paren
     return push(set, &place, &index, err);
 }
 
-strl_status strl_bricks_add(strl_brick_set *set, const strl_octree *octree, uint32_t index, uint32_t parent, strl_arena *arena,
-                            strl_error *err)
+strl_status strl_bricks_add(strl_brick_set *set, const strl_octree *octree, uint32_t index, uint32_t parent,
+                            strl_arena *arena, strl_error *err)
 {
     const strl_octant *octant = &octree->octant[index];
     strl_arena_mark mark = strl_arena_get_mark(arena);
@@ -574,7 +589,8 @@ strl_status strl_bricks_add(strl_brick_set *set, const strl_octree *octree, uint
     return status;
 }
 
-strl_status strl_bricks_add_root(strl_brick_set *set, const strl_octree *octree, uint32_t root, strl_arena *arena, strl_error *err)
+strl_status strl_bricks_add_root(strl_brick_set *set, const strl_octree *octree, uint32_t root, strl_arena *arena,
+                                 strl_error *err)
 {
     strl_octant above = {.child_count = 1, .child = {root}};
     strl_arena_mark mark = strl_arena_get_mark(arena);

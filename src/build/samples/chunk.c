@@ -6,15 +6,16 @@
 #include "build/ingest/normals.h"
 
 #define LEAF_TRIANGLES 256u
-/* What is at the top is held in memory, so what a bucket hands up is bounded: triangles too large for it, of which more stay where they
- * are and the cells there count as so large; and what the root of a piece stores. */
+/* What is at the top is held in memory, so what a bucket hands up is bounded: triangles too large for it, of which more
+ * stay where they are and the cells there count as so large; and what the root of a piece stores. */
 #define MOST_RISEN 2048u
 #define MOST_OF_ROOT 8192u
 #define LEAST_HANDED_UP 64u
-#define SHARE_OF_MEMORY 8u    /* for all that is handed up */
-#define TIMES_OF_RISEN 2u     /* it is held twice: here and in the octree of the top */
-#define PIECES_OF_BUCKET 8u   /* mostly fewer */
-/* What a bucket takes in memory while it is worked on, in the size of its records: these, triangles, keys twice, cells, payloads. */
+#define SHARE_OF_MEMORY 8u  /* for all that is handed up */
+#define TIMES_OF_RISEN 2u   /* it is held twice: here and in the octree of the top */
+#define PIECES_OF_BUCKET 8u /* mostly fewer */
+/* What a bucket takes in memory while it is worked on, in the size of its records: these, triangles, keys twice, cells,
+ * payloads. */
 #define TIMES_OF_BUCKET 6u
 
 /* One bucket on its way from a worker to the streams. */
@@ -51,7 +52,8 @@ static void release(made_bucket *made)
     *made = (made_bucket){0};
 }
 
-strl_status strl_octree_prepare(strl_octree *octree, const strl_sample_stage *stage, uint32_t triangles, strl_error *err)
+strl_status strl_octree_prepare(strl_octree *octree, const strl_sample_stage *stage, uint32_t triangles,
+                                strl_error *err)
 {
     octree->leaf_triangles = LEAF_TRIANGLES;
     octree->coupons = stage->coupons;
@@ -60,15 +62,16 @@ strl_status strl_octree_prepare(strl_octree *octree, const strl_sample_stage *st
 
 /* ---- from records to triangles in the order of the curve */
 
-static strl_status sort_triangles(const strl_sample_stage *stage, uint32_t index, const uint8_t *records, strl_octree *octree,
-                                  strl_error *err)
+static strl_status sort_triangles(const strl_sample_stage *stage, uint32_t index, const uint8_t *records,
+                                  strl_octree *octree, strl_error *err)
 {
     uint64_t low, high;
     strl__bucket_range(stage->buckets, index, &low, &high);
     uint32_t count = octree->triangle_count;
     size_t bytes = strl__soup_bucket_bytes(stage->ingest);
     strl_keyed *keys = strl__alloc(count, sizeof *keys), *other = strl__alloc(count, sizeof *keys);
-    strl_status status = keys && other ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory to sort %u triangles", count);
+    strl_status status =
+        keys && other ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory to sort %u triangles", count);
     for (uint32_t i = 0; i < count && !status; i++) {
         strl_soup_triangle triangle;
         strl__soup_unpack(stage->ingest, records + i * bytes, &triangle);
@@ -100,7 +103,8 @@ static strl_status fill_normals(const strl_ingest *ingest, strl_octree *octree, 
         good = wanted && strl__fill_normals(octree->triangle, wanted, octree->triangle_count, &arena);
     }
     strl_arena_deinit(&arena);
-    return good ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for the normals of %u triangles", octree->triangle_count);
+    return good ? STRL_OK
+                : strl__fail(err, STRL_ERR_MEMORY, "no memory for the normals of %u triangles", octree->triangle_count);
 }
 
 static strl_status load_bucket(const strl_sample_stage *stage, uint32_t index, strl_octree *octree, strl_error *err)
@@ -108,9 +112,10 @@ static strl_status load_bucket(const strl_sample_stage *stage, uint32_t index, s
     strl_spill *spill = stage->buckets->spill[index];
     uint64_t bytes = strl_spill_bytes(spill), count = bytes / strl__soup_bucket_bytes(stage->ingest);
     uint8_t *records = strl__alloc(bytes, 1);
-    strl_status status = records && count < UINT32_MAX ? STRL_OK
-                                                       : strl__fail(err, STRL_ERR_MEMORY, "no memory for %llu triangles",
-                                                                    (unsigned long long)count);
+    strl_status status =
+        records && count < UINT32_MAX
+            ? STRL_OK
+            : strl__fail(err, STRL_ERR_MEMORY, "no memory for %llu triangles", (unsigned long long)count);
     if (!status)
         status = strl_octree_prepare(octree, stage, (uint32_t)count, err);
     if (!status)
@@ -128,8 +133,10 @@ static strl_risen rise(const strl_octree *octree, uint32_t triangle, float weigh
     return (strl_risen){octree->triangle[triangle], octree->key[triangle], weight, octree->limit[triangle]};
 }
 
-/* Those of order[] that are too large for a cell of `depth` go to risen, as long as there is room; *count of them stay. False: no memory. */
-static bool let_rise(const strl_octree *octree, uint32_t *order, uint32_t *count, uint32_t depth, uint32_t most, strl_chunks *chunks)
+/* Those of order[] that are too large for a cell of `depth` go to risen, as long as there is room; *count of them stay.
+ * False: no memory. */
+static bool let_rise(const strl_octree *octree, uint32_t *order, uint32_t *count, uint32_t depth, uint32_t most,
+                     strl_chunks *chunks)
 {
     uint32_t kept = 0;
     for (uint32_t i = 0; i < *count; i++) {
@@ -148,7 +155,8 @@ static bool let_rise(const strl_octree *octree, uint32_t *order, uint32_t *count
 /* What the preview needs: all children of cells above its depth. */
 static strl_status hand_up_below(const strl_octree *octree, strl_octant *above, strl_chunk *chunk, strl_error *err)
 {
-    uint32_t first = chunk->below_count, count = above->depth < strl_preview_depth(octree->ingest) ? above->child_count : 0;
+    uint32_t first = chunk->below_count,
+             count = above->depth < strl_preview_depth(octree->ingest) ? above->child_count : 0;
     size_t capacity = chunk->below_capacity;
     if (!strl__grow(&chunk->below, &capacity, (size_t)first + count, sizeof *chunk->below))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for %u cells", first + count);
@@ -189,7 +197,8 @@ static strl_status cover_root(strl_octree *octree, uint32_t most, uint32_t *root
     const strl_octant *below = &octree->octant[*root];
     if (below->item_count <= most)
         return STRL_OK;
-    strl_octant cell = {.prefix = below->prefix, .depth = below->depth, .chunk = STRL_NO_CHUNK, .child_count = 1, .child = {*root}};
+    strl_octant cell = {
+        .prefix = below->prefix, .depth = below->depth, .chunk = STRL_NO_CHUNK, .child_count = 1, .child = {*root}};
     strl_status status = strl_octree_add(octree, &cell, root, err);
     octree->most_draws = most;
     if (!status)
@@ -265,7 +274,8 @@ static uint32_t bounded(uint64_t wanted, uint32_t most)
 /* The same for any number of threads. */
 static void bound_what_rises(const strl_sample_stage *stage, made_bucket *made)
 {
-    uint64_t each = stage->context->memory_bytes / SHARE_OF_MEMORY / TIMES_OF_RISEN / sizeof(strl_risen) / stage->buckets->count;
+    uint64_t each =
+        stage->context->memory_bytes / SHARE_OF_MEMORY / TIMES_OF_RISEN / sizeof(strl_risen) / stage->buckets->count;
     made->most_risen = bounded(each / 2, MOST_RISEN);
     made->most_of_root = bounded(each / 2 / PIECES_OF_BUCKET, MOST_OF_ROOT);
 }
@@ -305,7 +315,9 @@ static strl_status append_set(strl_sample_stage *stage, strl_chunk *chunk, const
         depths = set->brick[i].depth >= depths ? set->brick[i].depth + 1 : depths;
     chunk->run = strl__alloc_zero(depths, sizeof *chunk->run);
     uint32_t *number = strl__alloc(set->count, sizeof *number), *next = strl__alloc_zero(depths + 1, sizeof *next);
-    strl_status status = chunk->run && number && next ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu bricks", set->count);
+    strl_status status = chunk->run && number && next
+                             ? STRL_OK
+                             : strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu bricks", set->count);
     chunk->run_count = status ? 0 : depths;
     for (size_t i = 0; i < set->count && !status; i++)
         number[i] = chunk->run[set->brick[i].depth].count++;
@@ -316,13 +328,15 @@ static strl_status append_set(strl_sample_stage *stage, strl_chunk *chunk, const
             const strl_brick *brick = &set->brick[i];
             if (brick->depth != depth)
                 continue;
-            strl_stored_brick head = {brick->record, brick->parent == STRL_NO_BRICK ? STRL_NO_BRICK : number[brick->parent],
-                                    brick->child_count ? next[depth + 1] : STRL_NO_BRICK, brick->payload_bytes};
+            strl_stored_brick head = {brick->record,
+                                      brick->parent == STRL_NO_BRICK ? STRL_NO_BRICK : number[brick->parent],
+                                      brick->child_count ? next[depth + 1] : STRL_NO_BRICK, brick->payload_bytes};
             head.record.child_count = brick->child_count;
             next[depth + 1] += brick->child_count;
             status = strl_spill_append(stage->bricks, &head, sizeof head, err);
             if (!status)
-                status = strl_spill_append(stage->bricks, set->bytes.data + brick->payload_at, brick->payload_bytes, err);
+                status =
+                    strl_spill_append(stage->bricks, set->bytes.data + brick->payload_at, brick->payload_bytes, err);
         }
         run->bytes = strl_spill_bytes(stage->bricks) - run->at;
     }
@@ -349,7 +363,8 @@ static strl_status finish(void *context, uint64_t index, unsigned slot, unsigned
         status = append_set(stage, &made->chunks.chunk[i], &made->sets[i], err);
     }
     if (!status && (!strl__grow(&all->chunk, &all->capacity, all->count + made->chunks.count, sizeof *all->chunk) ||
-                    !strl__grow(&all->risen, &all->risen_capacity, all->risen_count + made->chunks.risen_count, sizeof *all->risen)))
+                    !strl__grow(&all->risen, &all->risen_capacity, all->risen_count + made->chunks.risen_count,
+                                sizeof *all->risen)))
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory for %zu pieces", all->count);
     if (!status) {
         if (made->chunks.count)
@@ -383,7 +398,8 @@ strl_status strl_chunks_make(strl_sample_stage *stage, strl_error *err)
     if (!status && !job.slots)
         status = strl__fail(err, STRL_ERR_MEMORY, "no memory to sample");
     if (!status)
-        status = strl_pool_ordered(stage->context->pool, stage->buckets->count - stage->finished, window, work, finish, &job, NULL, err);
+        status = strl_pool_ordered(stage->context->pool, stage->buckets->count - stage->finished, window, work, finish,
+                                   &job, NULL, err);
     for (unsigned i = 0; job.slots && i < slots; i++)
         release(&job.slots[i]);
     strl__free(job.slots);

@@ -1,5 +1,6 @@
-/* Pieces of a sample tree: the largest cells that lie in one bucket. Each is made by one worker on its own; what it hands up to the
- * top of the tree is its root cell with the triangles that this stores, and the triangles that are too large for it. */
+/* Pieces of a sample tree: the largest cells that lie in one bucket. Each is made by one worker on its own; what it
+ * hands up to the top of the tree is its root cell with the triangles that this stores, and the triangles that are too
+ * large for it. */
 #ifndef STRL_BUILD_SAMPLES_CHUNK_H
 #define STRL_BUILD_SAMPLES_CHUNK_H
 
@@ -25,9 +26,11 @@ typedef struct strl_chunk {
     strl_octant root; /* items: of `item` */
     strl_risen *item; /* owned; what the root stores and has drawn */
     uint32_t item_count;
-    strl_octant *below; /* [below_count] upper cells below the root, each before what is below it, children as places in this array; owned */
+    /* [below_count] upper cells below the root, each before what is below it, children as places in this array; owned
+     */
+    strl_octant *below;
     uint32_t below_count, below_capacity;
-    strl_node first;  /* record of its first brick, where it has any */
+    strl_node first; /* record of its first brick, where it has any */
     uint32_t run_count;
     strl_stored_run *run; /* [run_count] by depth; owned */
 } strl_chunk;
@@ -55,7 +58,7 @@ typedef struct strl_sample_stage {
     double coupons;
     strl_spill *bricks, *pieces; /* pieces: what buckets have handed up, for a checkpoint; NULL where none is made */
     strl_chunks chunks;
-    uint32_t finished, saved;    /* buckets, and as of the last checkpoint */
+    uint32_t finished, saved; /* buckets, and as of the last checkpoint */
     uint64_t saved_at_ns;
     uint64_t done, triangles, vertices;
 } strl_sample_stage;
@@ -68,11 +71,13 @@ strl_status strl_samples_write(strl_sample_stage *stage, strl_error *err);
 /* ---- checkpoints (samples_save.c); nothing where the context keeps none */
 /* After ingest: opens the streams of bricks and pieces, and saves. */
 strl_status strl_samples_begin(strl_sample_stage *stage, strl_error *err);
-/* One more bucket is finished: the last `pieces` and `risen` of all are what it has handed up. Saves from time to time. */
+/* One more bucket is finished: the last `pieces` and `risen` of all are what it has handed up. Saves from time to time.
+ */
 strl_status strl_samples_note(strl_sample_stage *stage, size_t pieces, size_t risen, strl_error *err);
 /* Ingest, buckets and what finished buckets have handed up, from the checkpoint that the context goes on with. */
 strl_status strl_samples_restore(strl_sample_stage *stage, strl_ingest *ingest, strl_error *err);
 
-strl_status strl_octree_prepare(strl_octree *octree, const strl_sample_stage *stage, uint32_t triangles, strl_error *err);
+strl_status strl_octree_prepare(strl_octree *octree, const strl_sample_stage *stage, uint32_t triangles,
+                                strl_error *err);
 
 #endif

@@ -31,7 +31,8 @@ uint32_t strl_octree_draws(const strl_octree *octree, uint32_t depth, double are
 }
 
 /* Running sums over the items of all children, so that those of a child sum up to its area. */
-static strl_status sum_weights(strl_octree *octree, const strl_octant *octant, uint32_t *count, double *total, strl_error *err)
+static strl_status sum_weights(strl_octree *octree, const strl_octant *octant, uint32_t *count, double *total,
+                               strl_error *err)
 {
     *count = 0;
     *total = 0;
@@ -82,7 +83,8 @@ static int compare_numbers(const void *a, const void *b)
     return x < y ? -1 : x > y;
 }
 
-static strl_status take_drawn(strl_octree *octree, uint32_t index, const uint32_t *drawn, uint32_t count, strl_error *err)
+static strl_status take_drawn(strl_octree *octree, uint32_t index, const uint32_t *drawn, uint32_t count,
+                              strl_error *err)
 {
     strl_octant *octant = &octree->octant[index];
     strl_status status = STRL_OK;

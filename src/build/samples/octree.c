@@ -59,8 +59,8 @@ float strl_octree_extent(const strl_soup_triangle *triangle)
     return (float)(sqrt(most) * (1 + 1e-6));
 }
 
-/* A triangle no longer than this share of a cell's side lies in its ball wherever in the cell its centroid is: one side less half
- * a diagonal. Its corners are at most two thirds of its longest edge from the centroid. */
+/* A triangle no longer than this share of a cell's side lies in its ball wherever in the cell its centroid is: one side
+ * less half a diagonal. Its corners are at most two thirds of its longest edge from the centroid. */
 #define SURE_SHARE 0.2
 
 uint8_t strl_octree_limit(const strl_ingest *ingest, const strl_soup_triangle *triangle, uint64_t key)
@@ -134,7 +134,8 @@ static double linear_of(uint32_t rgba, int channel)
     return (double)strl_srgb_decode(rgba >> 8 * channel & 255);
 }
 
-static void add_colour(const strl_octree *octree, const strl_soup_triangle *triangle, double area, strl_splat_sums *sums)
+static void add_colour(const strl_octree *octree, const strl_soup_triangle *triangle, double area,
+                       strl_splat_sums *sums)
 {
     uint32_t material = octree->ingest->palette[triangle->palette].rgba;
     if (!octree->ingest->has_colours && material == UINT32_MAX) {
@@ -170,15 +171,18 @@ static void add_vector(double to[3], const double vector[3])
         to[k] += sign * vector[k];
 }
 
-static void add_triangle(const strl_octree *octree, const strl_soup_triangle *triangle, strl_splat_sums *sums, float *area_out)
+static void add_triangle(const strl_octree *octree, const strl_soup_triangle *triangle, strl_splat_sums *sums,
+                         float *area_out)
 {
     double vector[3], area = area_vector(triangle, vector);
     sums->area += area;
     add_vector(sums->normal, vector);
     add_colour(octree, triangle, area, sums);
     for (int k = 0; k < 3; k++)
-        sums->centre[k] += area * ((double)triangle->corner[0].position[k] + triangle->corner[1].position[k] +
-                                   triangle->corner[2].position[k]) / 3;
+        sums->centre[k] += area *
+                           ((double)triangle->corner[0].position[k] + triangle->corner[1].position[k] +
+                            triangle->corner[2].position[k]) /
+                           3;
     *area_out = (float)area;
 }
 
@@ -192,8 +196,8 @@ static void add_sums(strl_splat_sums *to, const strl_splat_sums *from)
     add_vector(to->normal, from->normal);
 }
 
-strl_status strl_octree_add_leaf(strl_octree *octree, const uint32_t *order, uint32_t count, strl_octant *leaf, uint32_t *index,
-                                 strl_error *err)
+strl_status strl_octree_add_leaf(strl_octree *octree, const uint32_t *order, uint32_t count, strl_octant *leaf,
+                                 uint32_t *index, strl_error *err)
 {
     strl_status status = STRL_OK;
     leaf->is_leaf = true;
@@ -222,7 +226,8 @@ static uint32_t common_depth(uint64_t a, uint64_t b)
     return depth;
 }
 
-/* Moves those of order[0 .. count) to its front that no smaller cell holds; all keep their order. Returns how many they are. */
+/* Moves those of order[0 .. count) to its front that no smaller cell holds; all keep their order. Returns how many they
+ * are. */
 static uint32_t part_large(const strl_octree *octree, uint32_t *order, uint32_t count, uint32_t depth, uint32_t *spare)
 {
     uint32_t large = 0, rest = 0;
@@ -235,7 +240,8 @@ static uint32_t part_large(const strl_octree *octree, uint32_t *order, uint32_t 
     return large;
 }
 
-static uint32_t end_of_child(const strl_octree *octree, const uint32_t *order, uint32_t at, uint32_t count, uint32_t depth)
+static uint32_t end_of_child(const strl_octree *octree, const uint32_t *order, uint32_t at, uint32_t count,
+                             uint32_t depth)
 {
     unsigned shift = 3 * (STRL_OCTREE_DEPTH - depth - 1);
     uint64_t prefix = octree->key[order[at]] >> shift;
@@ -244,17 +250,18 @@ static uint32_t end_of_child(const strl_octree *octree, const uint32_t *order, u
     return at;
 }
 
-static strl_status build(strl_octree *octree, uint32_t *order, uint32_t count, uint32_t depth, uint32_t *spare, uint32_t *index,
-                         strl_error *err);
+static strl_status build(strl_octree *octree, uint32_t *order, uint32_t count, uint32_t depth, uint32_t *spare,
+                         uint32_t *index, strl_error *err);
 
-static strl_status build_children(strl_octree *octree, uint32_t *order, uint32_t count, strl_octant *octant, uint32_t *spare,
-                                  strl_error *err)
+static strl_status build_children(strl_octree *octree, uint32_t *order, uint32_t count, strl_octant *octant,
+                                  uint32_t *spare, strl_error *err)
 {
     uint32_t large = part_large(octree, order, count, octant->depth, spare);
     strl_status status = STRL_OK;
     for (uint32_t at = large, end; at < count && !status; at = end) {
         end = end_of_child(octree, order, at, count, octant->depth);
-        status = build(octree, order + at, end - at, octant->depth + 1, spare, &octant->child[octant->child_count++], err);
+        status =
+            build(octree, order + at, end - at, octant->depth + 1, spare, &octant->child[octant->child_count++], err);
     }
     if (!status && large) {
         strl_octant leaf = {.prefix = octant->prefix, .depth = octant->depth, .is_large = true};
@@ -264,14 +271,15 @@ static strl_status build_children(strl_octree *octree, uint32_t *order, uint32_t
 }
 
 /* order[0 .. count) lie in one cell of `depth`, or of less where they are too large for it. */
-static strl_status build(strl_octree *octree, uint32_t *order, uint32_t count, uint32_t depth, uint32_t *spare, uint32_t *index,
-                         strl_error *err)
+static strl_status build(strl_octree *octree, uint32_t *order, uint32_t count, uint32_t depth, uint32_t *spare,
+                         uint32_t *index, strl_error *err)
 {
     uint32_t own = common_depth(octree->key[order[0]], octree->key[order[count - 1]]);
     for (uint32_t i = 0; i < count; i++)
         own = octree->limit[order[i]] < own ? octree->limit[order[i]] : own;
     own = own < depth ? depth : own;
-    strl_octant octant = {.prefix = octree->key[order[0]] >> 3 * (STRL_OCTREE_DEPTH - own), .depth = own, .chunk = STRL_NO_CHUNK};
+    strl_octant octant = {
+        .prefix = octree->key[order[0]] >> 3 * (STRL_OCTREE_DEPTH - own), .depth = own, .chunk = STRL_NO_CHUNK};
     if (count <= octree->leaf_triangles || own == STRL_OCTREE_DEPTH)
         return strl_octree_add_leaf(octree, order, count, &octant, index, err);
     strl_status status = build_children(octree, order, count, &octant, spare, err);
@@ -280,7 +288,8 @@ static strl_status build(strl_octree *octree, uint32_t *order, uint32_t count, u
     return status ? status : strl_octree_sample(octree, *index, err);
 }
 
-strl_status strl_octree_build(strl_octree *octree, uint32_t *order, uint32_t count, uint32_t depth, uint32_t *root, strl_error *err)
+strl_status strl_octree_build(strl_octree *octree, uint32_t *order, uint32_t count, uint32_t depth, uint32_t *root,
+                              strl_error *err)
 {
     *root = STRL_NO_OCTANT;
     if (!count)

@@ -22,7 +22,8 @@ strl_status strl__samples_run(strl_build_context *context, strl_error *err)
     strl_ingest ingest = {0};
     strl_buckets buckets = {0};
     double probability = context->desc->probability > 0 ? context->desc->probability : PROBABILITY;
-    strl_sample_stage stage = {.context = context, .ingest = &ingest, .buckets = &buckets, .coupons = -log(-log(probability))};
+    strl_sample_stage stage = {
+        .context = context, .ingest = &ingest, .buckets = &buckets, .coupons = -log(-log(probability))};
     strl_status status = begin(&stage, &ingest, err);
     if (!status && ingest.triangle_count == 0) {
         status = strl__model_empty_tree(context, &ingest, STRL_STRUCTURE_SAMPLES, err);

@@ -1,4 +1,5 @@
-/* Checkpoints of the builder `samples`: which buckets are finished, and what they have handed up. Their bricks are in a stream. */
+/* Checkpoints of the builder `samples`: which buckets are finished, and what they have handed up. Their bricks are in a
+ * stream. */
 #include <math.h>
 
 #include "base/fail.h"
@@ -131,7 +132,8 @@ strl_status strl_samples_note(strl_sample_stage *stage, size_t pieces, size_t ri
 
 /* ---- reading ---- */
 
-static strl_status read_risen(const strl_sample_stage *stage, strl_saved_reader *saved, strl_risen *risen, strl_error *err)
+static strl_status read_risen(const strl_sample_stage *stage, strl_saved_reader *saved, strl_risen *risen,
+                              strl_error *err)
 {
     strl_status status = strl_saved_get(saved, RISEN_BYTES, err);
     if (status)
@@ -189,13 +191,15 @@ static strl_status read_cell(strl_saved_reader *saved, strl_octant *cell, strl_e
     cell->item_count = strl_cursor_u32(&saved->cursor);
     cell->is_leaf = flags & 1;
     cell->is_large = flags >> 1 & 1;
-    bool good = read_sums(&saved->cursor, &cell->sums) && cell->depth <= STRL_OCTREE_DEPTH && cell->prefix >> 3 * cell->depth == 0 &&
-                flags < 4 && cell->child_count <= (cell->is_leaf ? 0 : STRL_OCTANT_MAX_CHILDREN) && cell->extent >= 0 &&
+    bool good = read_sums(&saved->cursor, &cell->sums) && cell->depth <= STRL_OCTREE_DEPTH &&
+                cell->prefix >> 3 * cell->depth == 0 && flags < 4 &&
+                cell->child_count <= (cell->is_leaf ? 0 : STRL_OCTANT_MAX_CHILDREN) && cell->extent >= 0 &&
                 isfinite(cell->extent);
     return good ? STRL_OK : strl_saved_fail("a cell of a piece", err);
 }
 
-/* As they were handed up: children side by side, then what is below the first of them. False where there are not so many. */
+/* As they were handed up: children side by side, then what is below the first of them. False where there are not so
+ * many. */
 static bool find_children(strl_chunk *piece, strl_octant *above, uint32_t level, uint32_t *next)
 {
     uint32_t first = *next, count = above->child_count;
@@ -241,11 +245,14 @@ static strl_status read_root(strl_saved_reader *saved, strl_chunk *piece, strl_e
         return status;
     piece->run_count = strl_cursor_u32(&saved->cursor);
     piece->key = root->prefix << 3 * (STRL_OCTREE_DEPTH - root->depth);
-    return (piece->run_count == 0) == root->is_leaf && piece->run_count <= MOST_RUNS ? STRL_OK : strl_saved_fail("the root of a piece", err);
+    return (piece->run_count == 0) == root->is_leaf && piece->run_count <= MOST_RUNS
+               ? STRL_OK
+               : strl_saved_fail("the root of a piece", err);
 }
 
 /* And the record of the first brick, which is one alone. */
-static strl_status read_runs(const strl_sample_stage *stage, strl_saved_reader *saved, strl_chunk *piece, strl_error *err)
+static strl_status read_runs(const strl_sample_stage *stage, strl_saved_reader *saved, strl_chunk *piece,
+                             strl_error *err)
 {
     uint64_t bricks = strl_spill_bytes(stage->bricks);
     strl_stored_brick first;
@@ -260,8 +267,8 @@ static strl_status read_runs(const strl_sample_stage *stage, strl_saved_reader *
         run->at = strl_cursor_u64(&saved->cursor);
         run->bytes = strl_cursor_u64(&saved->cursor);
         run->count = strl_cursor_u32(&saved->cursor);
-        if (run->at > bricks || run->bytes > bricks - run->at || run->count == 0 || run->count > run->bytes / sizeof first ||
-            (i == 0 && run->count > 1))
+        if (run->at > bricks || run->bytes > bricks - run->at || run->count == 0 ||
+            run->count > run->bytes / sizeof first || (i == 0 && run->count > 1))
             return strl_saved_fail("the bricks of a piece", err);
     }
     status = strl_spill_read(stage->bricks, piece->run[0].at, &first, sizeof first, err);
@@ -295,7 +302,8 @@ static strl_status read_bucket(strl_sample_stage *stage, strl_saved_reader *save
 {
     strl_chunks *all = &stage->chunks;
     strl_status status = strl_saved_get(saved, 8, err);
-    uint32_t pieces = status ? 0 : strl_cursor_u32(&saved->cursor), risen = status ? 0 : strl_cursor_u32(&saved->cursor);
+    uint32_t pieces = status ? 0 : strl_cursor_u32(&saved->cursor),
+             risen = status ? 0 : strl_cursor_u32(&saved->cursor);
     for (uint32_t i = 0; i < pieces && !status; i++)
         status = read_piece(stage, saved, err);
     if (!status && risen > strl_saved_left(saved) / RISEN_BYTES)
@@ -312,13 +320,14 @@ static uint64_t last_key(const strl_chunk *piece)
     return piece->key + (((uint64_t)1 << 3 * (STRL_OCTREE_DEPTH - piece->root.depth)) - 1);
 }
 
-/* Pieces lie one after the other, but for those of one smallest cell; risen triangles in the order of the curve, and where they lie in a
- * piece's cell, it does not hold them. The top of the tree ends for no other. */
+/* Pieces lie one after the other, but for those of one smallest cell; risen triangles in the order of the curve, and
+ * where they lie in a piece's cell, it does not hold them. The top of the tree ends for no other. */
 static bool are_in_order(const strl_chunks *all)
 {
     for (size_t i = 1; i < all->count; i++) {
         const strl_chunk *before = &all->chunk[i - 1], *piece = &all->chunk[i];
-        bool is_share = piece->key == before->key && piece->root.depth == STRL_OCTREE_DEPTH && before->root.depth == STRL_OCTREE_DEPTH;
+        bool is_share = piece->key == before->key && piece->root.depth == STRL_OCTREE_DEPTH &&
+                        before->root.depth == STRL_OCTREE_DEPTH;
         if (!is_share && piece->key <= last_key(before))
             return false;
     }
@@ -362,7 +371,8 @@ strl_status strl_samples_restore(strl_sample_stage *stage, strl_ingest *ingest, 
     uint32_t finished = strl_cursor_u32(&words);
     stage->triangles = strl_cursor_u64(&words);
     stage->vertices = strl_cursor_u64(&words);
-    strl_status status = words.failed || strl_cursor_left(&words) ? strl_saved_fail("how far it had come", err) : STRL_OK;
+    strl_status status =
+        words.failed || strl_cursor_left(&words) ? strl_saved_fail("how far it had come", err) : STRL_OK;
     if (!status)
         status = strl_buckets_restore(context, finished, ingest, stage->buckets, err);
     if (status)

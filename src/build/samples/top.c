@@ -8,8 +8,8 @@
 
 typedef struct top {
     const strl_chunks *chunks;
-    strl_octree octree; /* its triangles: the items of all pieces, then those that have risen */
-    uint32_t *first;    /* [chunks] the first one of each */
+    strl_octree octree;      /* its triangles: the items of all pieces, then those that have risen */
+    uint32_t *first;         /* [chunks] the first one of each */
     uint32_t *risen, *spare; /* [risen] triangles, ascending by key within each cell */
 } top;
 
@@ -130,7 +130,8 @@ static cell_range cut_child(const top *t, cell_range *range, uint32_t depth)
     return child;
 }
 
-/* Pieces of one of the smallest cells, which nothing divides but their number: some of them, that those left may be one of `places`. */
+/* Pieces of one of the smallest cells, which nothing divides but their number: some of them, that those left may be one
+ * of `places`. */
 static cell_range cut_share(cell_range *range, uint32_t places)
 {
     cell_range share = *range;
@@ -167,7 +168,8 @@ static strl_status add_children(top *t, cell_range range, strl_octant *cell, str
     }
     if (!status && first < large) {
         strl_octant leaf = {.prefix = cell->prefix, .depth = cell->depth, .is_large = true};
-        status = strl_octree_add_leaf(&t->octree, t->risen + first, large - first, &leaf, &cell->child[cell->child_count++], err);
+        status = strl_octree_add_leaf(&t->octree, t->risen + first, large - first, &leaf,
+                                      &cell->child[cell->child_count++], err);
     }
     return status;
 }
@@ -181,7 +183,8 @@ static strl_status add_cell(top *t, cell_range range, uint32_t *octant, strl_err
     strl_octant cell = {.depth = own_depth(t, &range, low, high), .chunk = STRL_NO_CHUNK};
     cell.prefix = low >> 3 * (STRL_OCTREE_DEPTH - cell.depth);
     if (range.chunk == range.chunk_end)
-        return strl_octree_add_leaf(&t->octree, t->risen + range.risen, range.risen_end - range.risen, &cell, octant, err);
+        return strl_octree_add_leaf(&t->octree, t->risen + range.risen, range.risen_end - range.risen, &cell, octant,
+                                    err);
     strl_status status = add_children(t, range, &cell, err);
     if (!status)
         status = strl_octree_add(&t->octree, &cell, octant, err);

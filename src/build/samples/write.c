@@ -1,4 +1,5 @@
-/* The container of a sample tree: bricks breadth first, those of the top from memory, those of the pieces from scratch. */
+/* The container of a sample tree: bricks breadth first, those of the top from memory, those of the pieces from scratch.
+ */
 #include <inttypes.h>
 #include <string.h>
 
@@ -18,7 +19,8 @@ static uint32_t bricks_at(const strl_sample_stage *stage, const strl_brick *entr
     if (entry->chunk == STRL_NO_CHUNK)
         return entry->depth == depth;
     const strl_chunk *chunk = &stage->chunks.chunk[entry->chunk];
-    return depth >= entry->depth && depth - entry->depth < chunk->run_count ? chunk->run[depth - entry->depth].count : 0;
+    return depth >= entry->depth && depth - entry->depth < chunk->run_count ? chunk->run[depth - entry->depth].count
+                                                                            : 0;
 }
 
 static void number_depth(const strl_sample_stage *stage, const strl_brick_set *set, uint32_t depth, numbering *ids)
@@ -74,7 +76,8 @@ typedef struct writing {
     uint32_t next; /* id */
 } writing;
 
-static strl_status add_node(writing *w, strl_node *record, uint32_t depth, const void *payload, uint32_t bytes, strl_error *err)
+static strl_status add_node(writing *w, strl_node *record, uint32_t depth, const void *payload, uint32_t bytes,
+                            strl_error *err)
 {
     record->level = w->ids->depths - 1 - depth;
     record->group = w->next++;
@@ -94,8 +97,8 @@ static strl_status write_top(writing *w, size_t index, strl_error *err)
     return add_node(w, &record, brick->depth, w->set->bytes.data + brick->payload_at, brick->payload_bytes, err);
 }
 
-static strl_status write_head(writing *w, const strl_brick *entry, uint32_t run, const strl_stored_brick *head, const void *payload,
-                              strl_error *err)
+static strl_status write_head(writing *w, const strl_brick *entry, uint32_t run, const strl_stored_brick *head,
+                              const void *payload, strl_error *err)
 {
     const uint32_t *piece = w->ids->piece[entry->chunk];
     strl_node record = head->record;
@@ -126,9 +129,10 @@ static strl_status write_run(writing *w, const strl_brick *entry, uint32_t index
         if (bytes)
             memcpy(&head, bytes, sizeof head);
         const uint8_t *payload = strl_cursor_take(&cursor, head.payload_bytes);
-        status = payload && fits_runs(chunk, index, &head)
-                     ? write_head(w, entry, index, &head, payload, err)
-                     : strl__fail(err, STRL_ERR_INTERNAL, "a brick of %u bytes does not fit its piece", head.payload_bytes);
+        status =
+            payload && fits_runs(chunk, index, &head)
+                ? write_head(w, entry, index, &head, payload, err)
+                : strl__fail(err, STRL_ERR_INTERNAL, "a brick of %u bytes does not fit its piece", head.payload_bytes);
     }
     strl_spill_drop(w->stage->bricks, run->at, run->bytes);
     return status;
@@ -152,7 +156,8 @@ static strl_status write_bricks(writing *w, strl_error *err)
             const strl_brick *entry = &w->set->brick[i];
             if (!bricks_at(w->stage, entry, depth))
                 continue;
-            status = entry->chunk == STRL_NO_CHUNK ? write_top(w, i, err) : write_run(w, entry, depth - entry->depth, err);
+            status =
+                entry->chunk == STRL_NO_CHUNK ? write_top(w, i, err) : write_run(w, entry, depth - entry->depth, err);
         }
     return status;
 }
@@ -160,8 +165,11 @@ static strl_status write_bricks(writing *w, strl_error *err)
 static strl_status write_tree(writing *w, strl_error *err)
 {
     const strl_ingest *ingest = w->stage->ingest;
-    strl_tree tree = {.structure = STRL_STRUCTURE_SAMPLES, .step = ingest->step, .node_count = w->ids->nodes,
-                      .level_count = w->ids->depths, .leaf_geometric = ingest->leaf_error};
+    strl_tree tree = {.structure = STRL_STRUCTURE_SAMPLES,
+                      .step = ingest->step,
+                      .node_count = w->ids->nodes,
+                      .level_count = w->ids->depths,
+                      .leaf_geometric = ingest->leaf_error};
     memcpy(tree.origin, ingest->origin, sizeof tree.origin);
     w->first_child = strl__alloc(w->set->count, sizeof *w->first_child);
     strl_status status = w->first_child ? strl_container_writer_begin_tree(w->writer, &tree, err)
@@ -175,7 +183,8 @@ static strl_status write_tree(writing *w, strl_error *err)
     return status;
 }
 
-static strl_status write_into(strl_sample_stage *stage, const strl_brick_set *set, const numbering *ids, strl_error *err)
+static strl_status write_into(strl_sample_stage *stage, const strl_brick_set *set, const numbering *ids,
+                              strl_error *err)
 {
     strl_container_writer *writer = NULL;
     strl_status status = strl__model_writer(stage->context, stage->ingest, &writer, err);

@@ -1,5 +1,5 @@
-/* Child processes. Between fork and exec only calls that are safe in a copy of a process with threads: what they need is
- * made ready before. */
+/* Child processes. Between fork and exec only calls that are safe in a copy of a process with threads: what they need
+ * is made ready before. */
 #include "platform/process.h"
 
 #include <errno.h>

@@ -16,8 +16,8 @@ const char *strl__path_shown(const char *path);
 /* The folder that holds path, owned by the caller; NULL without memory. */
 char *strl__path_parent(const char *path);
 
-/* A file that nobody else has, with the rights of `mode`: the eight characters of `path` from random_at on are replaced until there is nothing of
- * that name. Its sentences name `shown`. */
+/* A file that nobody else has, with the rights of `mode`: the eight characters of `path` from random_at on are replaced
+ * until there is nothing of that name. Its sentences name `shown`. */
 strl_status strl__file_create_unique(char *path, size_t random_at, mode_t mode, const char *shown, strl_file **file,
                                      strl_error *err);
 /* strl_file_create_nameless; its sentences name `shown`. */

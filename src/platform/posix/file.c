@@ -173,7 +173,8 @@ strl_status strl__file_create_nameless(const char *folder, const char *shown, st
     char *path = strl_path_join(folder, name);
     if (!path)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a scratch file of %s", strl__path_shown(shown));
-    strl_status status = strl__file_create_unique(path, strlen(path) - strlen("XXXXXXXX.spill"), 0600, shown, file, err);
+    strl_status status =
+        strl__file_create_unique(path, strlen(path) - strlen("XXXXXXXX.spill"), 0600, shown, file, err);
     if (status == STRL_OK)
         status = strl_path_remove(path, err);
     if (status != STRL_OK) {

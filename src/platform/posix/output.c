@@ -110,9 +110,10 @@ static strl_status find_target(const char *path, char **target, struct stat *fac
     if (!*path)
         return strl__fail(err, STRL_ERR_ARGUMENT, "the output's name is empty, expected the name of a file to write");
     if (!strcmp(path, "-"))
-        return strl__fail(err, STRL_ERR_ARGUMENT,
-                          "the output's name is -, but nothing is written to standard output, expected the name of a file to write "
-                          "(./- names one of that name)");
+        return strl__fail(
+            err, STRL_ERR_ARGUMENT,
+            "the output's name is -, but nothing is written to standard output, expected the name of a file to write "
+            "(./- names one of that name)");
     char *at = strl__strdup(path);
     if (!at)
         return fail_memory(path, err);
@@ -153,8 +154,8 @@ static bool is_beside(const char *folder, const char *target_folder)
 {
     struct stat a, b;
     char *parent = strl__path_parent(folder);
-    bool same = parent && stat(parent, &a) == 0 && stat(target_folder, &b) == 0 && a.st_dev == b.st_dev &&
-                a.st_ino == b.st_ino;
+    bool same =
+        parent && stat(parent, &a) == 0 && stat(target_folder, &b) == 0 && a.st_dev == b.st_dev && a.st_ino == b.st_ino;
     strl__free(parent);
     return same;
 }

@@ -24,8 +24,8 @@ struct strl_scratch {
     char *made_parent;      /* owned; NULL = it was there before */
     const char *const *names;
     bool keep;
-    strl_lock *lock; /* NULL until the folder is ours */
-    bool held;       /* by another process */
+    strl_lock *lock;                                 /* NULL until the folder is ours */
+    bool held;                                       /* by another process */
     bool (*needed)(void *context, const char *name); /* of a sweep; NULL = nothing is */
     void *context;                                   /* its */
 };
@@ -42,8 +42,9 @@ static bool is_ours(const strl_scratch *scratch, int folder, const char *name)
 }
 
 /* Calls visit for every file but the lock, until it returns false. False where the folder cannot be read, too. */
-static bool each_file(strl_scratch *scratch, bool (*visit)(strl_scratch *scratch, int folder, const char *name,
-                                                           strl_error *err), strl_error *err)
+static bool each_file(strl_scratch *scratch,
+                      bool (*visit)(strl_scratch *scratch, int folder, const char *name, strl_error *err),
+                      strl_error *err)
 {
     int descriptor = open(scratch->path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
     DIR *folder = descriptor < 0 ? NULL : fdopendir(descriptor);
@@ -65,8 +66,10 @@ static bool each_file(strl_scratch *scratch, bool (*visit)(strl_scratch *scratch
 
 static strl_status refuse(const strl_scratch *scratch, strl_error *err, const char *why)
 {
-    return strl__fail(err, STRL_ERR_ARGUMENT, "the scratch folder %s cannot be made: %s (remove or rename it, or name "
-                      "another place by --scratch)", strl__path_shown(scratch->path), why);
+    return strl__fail(err, STRL_ERR_ARGUMENT,
+                      "the scratch folder %s cannot be made: %s (remove or rename it, or name "
+                      "another place by --scratch)",
+                      strl__path_shown(scratch->path), why);
 }
 
 static bool must_be_ours(strl_scratch *scratch, int folder, const char *name, strl_error *err)
@@ -149,8 +152,8 @@ static strl_status clear_left_over(strl_scratch *scratch, const char *parent, st
         return strl__fail(err, inner.status, "%s", inner.message);
     if (parent && found.with_parent && !scratch->made_parent)
         scratch->made_parent = strl__strdup(parent); /* without memory it stays */
-    /* Its last holder may have removed the lock file just before we made it again. What is signed is left as it is: a lock
-     * file without a word beside files would be nobody's. */
+    /* Its last holder may have removed the lock file just before we made it again. What is signed is left as it is: a
+     * lock file without a word beside files would be nobody's. */
     return found.is_signed ? STRL_OK : sign(scratch, scratch->lock_path, err);
 }
 
@@ -218,8 +221,8 @@ strl_status strl_scratch_create(const strl_scratch_desc *desc, strl_scratch **sc
     made->keep = desc->keep;
     made->path = strl__strdup(desc->path);
     made->lock_path = strl_path_join(desc->path, LOCK_NAME);
-    strl_status status = made->path && made->lock_path ? STRL_OK
-                                                       : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
+    strl_status status =
+        made->path && made->lock_path ? STRL_OK : strl__fail(err, STRL_ERR_MEMORY, "no memory for a path");
     if (status == STRL_OK && desc->parent)
         status = make_parent(made, desc->parent, err);
     if (status == STRL_OK)

@@ -42,8 +42,9 @@ strl_status strl_shelf_open(const char *path, strl_shelf **shelf, strl_error *er
         *shelf = made;
         return STRL_OK;
     }
-    strl_status status = made && copy ? strl__fail_system(err, errno, "open folder", path)
-                                      : strl__fail(err, STRL_ERR_MEMORY, "no memory to list %s", strl__path_shown(path));
+    strl_status status = made && copy
+                             ? strl__fail_system(err, errno, "open folder", path)
+                             : strl__fail(err, STRL_ERR_MEMORY, "no memory to list %s", strl__path_shown(path));
     strl__free(copy);
     strl__free(made);
     return status;
@@ -66,8 +67,8 @@ strl_status strl_shelf_next(strl_shelf *shelf, strl_shelf_entry *entry, strl_err
     const struct dirent *found = readdir(shelf->folder);
     if (!found)
         return errno ? strl__fail_system(err, errno, "list folder", shelf->path) : STRL_OK;
-    bool is_file = fstatat(dirfd(shelf->folder), found->d_name, &facts, AT_SYMLINK_NOFOLLOW) == 0 &&
-                   S_ISREG(facts.st_mode);
+    bool is_file =
+        fstatat(dirfd(shelf->folder), found->d_name, &facts, AT_SYMLINK_NOFOLLOW) == 0 && S_ISREG(facts.st_mode);
     entry->name = is_file ? found->d_name : ""; /* gone meanwhile, or no file */
     if (is_file) {
         entry->bytes = (uint64_t)facts.st_size;
@@ -106,7 +107,7 @@ static strl_status put(char *temporary, const char *target, const strl_shelf_pie
 }
 
 strl_status strl_shelf_put(const char *path, const char *name, const strl_shelf_piece *pieces, size_t count,
-                            strl_error *err)
+                           strl_error *err)
 {
     static const char ending[] = ".XXXXXXXX.part";
     char *target = strl_path_join(path, name);

@@ -1,5 +1,5 @@
-/* OpenGL 3.3 core and ES 3.0: each node has a vertex array and two buffers of its own; items are drawn one by one, so a node
- * that was drawn can make room for the next one of the same list. */
+/* OpenGL 3.3 core and ES 3.0: each node has a vertex array and two buffers of its own; items are drawn one by one, so a
+ * node that was drawn can make room for the next one of the same list. */
 #include <epoxy/gl.h>
 #include <inttypes.h>
 #include <stddef.h>
@@ -45,7 +45,8 @@ static void set_attributes(void)
     glEnableVertexAttribArray(1);
     glVertexAttribIPointer(1, 2, GL_UNSIGNED_SHORT, sizeof(strl_vertex), (const void *)offsetof(strl_vertex, normal));
     glEnableVertexAttribArray(2);
-    glVertexAttribPointer(2, 4, GL_UNSIGNED_BYTE, GL_TRUE, sizeof(strl_vertex), (const void *)offsetof(strl_vertex, rgba));
+    glVertexAttribPointer(2, 4, GL_UNSIGNED_BYTE, GL_TRUE, sizeof(strl_vertex),
+                          (const void *)offsetof(strl_vertex, rgba));
 }
 
 static strl_status make_room(gl3_draw *draw, uint64_t bytes, strl_error *err)
@@ -57,7 +58,8 @@ static strl_status make_room(gl3_draw *draw, uint64_t bytes, strl_error *err)
         draw->stats->evictions++;
     }
     if (bytes > budget)
-        return strl__fail(err, STRL_ERR_LIMIT, "a node needs %" PRIu64 " bytes of GPU memory, the budget is %" PRIu64, bytes, budget);
+        return strl__fail(err, STRL_ERR_LIMIT, "a node needs %" PRIu64 " bytes of GPU memory, the budget is %" PRIu64,
+                          bytes, budget);
     return STRL_OK;
 }
 
@@ -105,10 +107,12 @@ static strl_status add(gl3_draw *draw, const strl_draw_item *item, strl_cache_en
     return STRL_OK;
 }
 
-static strl_status upload_vertices(gl3_draw *draw, const strl_cache_entry *entry, const strl_draw_item *item, strl_error *err)
+static strl_status upload_vertices(gl3_draw *draw, const strl_cache_entry *entry, const strl_draw_item *item,
+                                   strl_error *err)
 {
     gl3_renderer *self = draw->self;
-    const strl_vertex *vertices = strl__style_vertices(entry, item, draw->options, &self->styled, &self->styled_capacity);
+    const strl_vertex *vertices =
+        strl__style_vertices(entry, item, draw->options, &self->styled, &self->styled_capacity);
     if (!vertices)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for the styled vertices of node %" PRIu32, item->node);
     glBindBuffer(GL_ARRAY_BUFFER, entry->place.names.vertices);
@@ -118,11 +122,13 @@ static strl_status upload_vertices(gl3_draw *draw, const strl_cache_entry *entry
 }
 
 /* Three lines for each triangle that the index range touches. */
-static strl_status upload_lines(gl3_draw *draw, const strl_draw_item *item, uint32_t first, uint32_t count, strl_error *err)
+static strl_status upload_lines(gl3_draw *draw, const strl_draw_item *item, uint32_t first, uint32_t count,
+                                strl_error *err)
 {
     gl3_renderer *self = draw->self;
     uint32_t first_triangle = first / 3, end_triangle = (first + count + 2) / 3, at = 0;
-    if (!strl__grow(&self->lines, &self->lines_capacity, (size_t)(end_triangle - first_triangle) * 6, sizeof *self->lines))
+    if (!strl__grow(&self->lines, &self->lines_capacity, (size_t)(end_triangle - first_triangle) * 6,
+                    sizeof *self->lines))
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for the lines of a wireframe");
     for (uint32_t t = first_triangle; t < end_triangle; t++) {
         const uint16_t *corner = item->indices + 3 * t;
@@ -131,7 +137,8 @@ static strl_status upload_lines(gl3_draw *draw, const strl_draw_item *item, uint
             self->lines[at++] = corner[(side + 1) % 3];
         }
     }
-    glBufferSubData(GL_ELEMENT_ARRAY_BUFFER, (GLintptr)(first_triangle * 6 * sizeof(uint16_t)), (GLsizeiptr)(at * sizeof(uint16_t)), self->lines);
+    glBufferSubData(GL_ELEMENT_ARRAY_BUFFER, (GLintptr)(first_triangle * 6 * sizeof(uint16_t)),
+                    (GLsizeiptr)(at * sizeof(uint16_t)), self->lines);
     return STRL_OK;
 }
 
@@ -153,7 +160,8 @@ static strl_status make_resident(gl3_draw *draw, const strl_draw_item *item, str
     strl_cache_entry *entry = strl__cache_find(&draw->self->gl.cache, item->key);
     bool lines = drawn_as_lines(draw, item);
     uint32_t needed = lines ? item->index_count * 2 : item->index_count;
-    if (entry && (entry->lines != lines || entry->vertex_count != item->vertex_count || entry->index_capacity < needed)) {
+    if (entry &&
+        (entry->lines != lines || entry->vertex_count != item->vertex_count || entry->index_capacity < needed)) {
         release(draw->self, entry);
         entry = NULL;
     }
@@ -195,7 +203,10 @@ static strl_status draw_item(gl3_draw *draw, const strl_draw_item *item, const s
     glUniform4iv(program->base, 2, record->base[0]);
     bool lines = drawn_as_lines(draw, item);
     uint32_t copies = lines ? 2 : 1;
-    glDrawElements(points ? GL_POINTS : lines ? GL_LINES : GL_TRIANGLES, (GLsizei)(copies * item->draw_count), GL_UNSIGNED_SHORT,
+    glDrawElements(points  ? GL_POINTS
+                   : lines ? GL_LINES
+                           : GL_TRIANGLES,
+                   (GLsizei)(copies * item->draw_count), GL_UNSIGNED_SHORT,
                    (const void *)(uintptr_t)(copies * item->draw_first * sizeof(uint16_t)));
     draw->stats->triangles += points ? 0 : item->draw_count / 3;
     draw->stats->items++;
@@ -250,8 +261,14 @@ static void gl3_destroy(strl_renderer *renderer)
 }
 
 static const strl_renderer_class gl3_class = {
-    .backend = STRL_BACKEND_GL3, .draw = gl3_draw_list, .finish = strl__gl_finish, .resize = strl__gl_resize,
-    .read_colour = strl__gl_read_colour, .read_depth = strl__gl_read_depth, .present = strl__gl_present, .destroy = gl3_destroy,
+    .backend = STRL_BACKEND_GL3,
+    .draw = gl3_draw_list,
+    .finish = strl__gl_finish,
+    .resize = strl__gl_resize,
+    .read_colour = strl__gl_read_colour,
+    .read_depth = strl__gl_read_depth,
+    .present = strl__gl_present,
+    .destroy = gl3_destroy,
 };
 
 strl_status strl__gl3_renderer_create(const strl_renderer_desc *desc, strl_renderer **renderer, strl_error *err)

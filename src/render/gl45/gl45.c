@@ -1,6 +1,6 @@
-/* OpenGL 4.5 core. Items of a list are collected into a batch; a flush writes their records and indirect draws through the ring and
- * issues one multi-draw for each slab. When the budget is full of nodes that the batch uses, the batch is flushed and they may go:
- * GL runs copies and draws in order, so a place can be written again at once. */
+/* OpenGL 4.5 core. Items of a list are collected into a batch; a flush writes their records and indirect draws through
+ * the ring and issues one multi-draw for each slab. When the budget is full of nodes that the batch uses, the batch is
+ * flushed and they may go: GL runs copies and draws in order, so a place can be written again at once. */
 #include <epoxy/gl.h>
 #include <inttypes.h>
 #include <string.h>
@@ -34,10 +34,10 @@ typedef struct gl45_renderer {
     strl_gl gl;
     strl_gl_ring ring;
     strl_gl_store store;
-    uint32_t batch_most;  /* items of one batch */
+    uint32_t batch_most; /* items of one batch */
     uint32_t batch_count;
-    uint64_t batch;       /* number of the batch being collected; nodes of it cannot be evicted */
-    gl45_queued *queued;  /* [batch_most] */
+    uint64_t batch;        /* number of the batch being collected; nodes of it cannot be evicted */
+    gl45_queued *queued;   /* [batch_most] */
     strl_gl_item *records; /* [batch_most] */
     strl_vertex *styled;   /* scratch */
     size_t styled_capacity;
@@ -77,7 +77,8 @@ static void draw_slab(gl45_draw *draw, gl45_piece *piece, uint32_t slab, gl45_ki
     GLuint array = self->store.slabs[slab].array;
     glVertexArrayVertexBuffer(array, 1, self->ring.buffer, (GLintptr)piece->offset, sizeof(strl_gl_item));
     glBindVertexArray(array);
-    glMultiDrawElementsIndirect(kind.points ? GL_POINTS : GL_TRIANGLES, GL_UNSIGNED_SHORT, (const void *)(piece->offset + first), (GLsizei)count, 0);
+    glMultiDrawElementsIndirect(kind.points ? GL_POINTS : GL_TRIANGLES, GL_UNSIGNED_SHORT,
+                                (const void *)(piece->offset + first), (GLsizei)count, 0);
     draw->stats->draws += count;
 }
 
@@ -88,7 +89,8 @@ static void flush(gl45_draw *draw)
         return;
     size_t record_bytes = self->batch_count * sizeof *self->records;
     gl45_piece piece = {.used = record_bytes};
-    piece.mapped = strl__gl_ring_take(&self->ring, record_bytes + self->batch_count * sizeof(gl45_command), &piece.offset);
+    piece.mapped =
+        strl__gl_ring_take(&self->ring, record_bytes + self->batch_count * sizeof(gl45_command), &piece.offset);
     memcpy(piece.mapped, self->records, record_bytes);
     glBindBuffer(GL_DRAW_INDIRECT_BUFFER, self->ring.buffer);
     for (int kind = 0; kind < (draw->mirrors ? 8 : 4); kind++) {
@@ -129,7 +131,8 @@ static strl_status add(gl45_draw *draw, const strl_draw_item *item, strl_cache_e
     uint32_t room = item->index_count + item->index_count / 4;
     while (!strl__gl_store_place(&self->store, &placed, item->vertex_count, room))
         if (!evict_one(draw))
-            return strl__fail(err, STRL_ERR_LIMIT, "a node of %" PRIu32 " vertices and %" PRIu32
+            return strl__fail(err, STRL_ERR_LIMIT,
+                              "a node of %" PRIu32 " vertices and %" PRIu32
                               " indices does not fit into GPU memory, the budget is %" PRIu64 " bytes",
                               item->vertex_count, item->index_count, self->gl.base.desc.gpu_memory_bytes);
     entry = strl__cache_add(&self->gl.cache, item->key);
@@ -144,22 +147,25 @@ static strl_status add(gl45_draw *draw, const strl_draw_item *item, strl_cache_e
     return STRL_OK;
 }
 
-static strl_status upload(gl45_draw *draw, const strl_cache_entry *entry, const strl_draw_item *item, strl_cache_upload plan,
-                          strl_error *err)
+static strl_status upload(gl45_draw *draw, const strl_cache_entry *entry, const strl_draw_item *item,
+                          strl_cache_upload plan, strl_error *err)
 {
     gl45_renderer *self = draw->self;
     uint32_t slab = entry->place.range.slab;
     if (plan.vertices) {
-        const strl_vertex *vertices = strl__style_vertices(entry, item, draw->options, &self->styled, &self->styled_capacity);
+        const strl_vertex *vertices =
+            strl__style_vertices(entry, item, draw->options, &self->styled, &self->styled_capacity);
         if (!vertices)
             return strl__fail(err, STRL_ERR_MEMORY, "no memory for the styled vertices of node %" PRIu32, item->node);
-        strl__gl_store_upload(&self->store, &self->ring, slab, (uint64_t)entry->place.range.vertex_at * STRL_GRANULE_BYTES, vertices,
+        strl__gl_store_upload(&self->store, &self->ring, slab,
+                              (uint64_t)entry->place.range.vertex_at * STRL_GRANULE_BYTES, vertices,
                               item->vertex_count * sizeof *vertices);
         draw->stats->uploaded_vertices += item->vertex_count;
     }
     if (plan.index_count > 0) {
         uint64_t at = (uint64_t)entry->place.range.index_at * STRL_GRANULE_BYTES + plan.first_index * sizeof(uint16_t);
-        strl__gl_store_upload(&self->store, &self->ring, slab, at, item->indices + plan.first_index, plan.index_count * sizeof(uint16_t));
+        strl__gl_store_upload(&self->store, &self->ring, slab, at, item->indices + plan.first_index,
+                              plan.index_count * sizeof(uint16_t));
         draw->stats->uploaded_indices += plan.index_count;
     }
     return STRL_OK;
@@ -203,7 +209,8 @@ static strl_status make_resident(gl45_draw *draw, const strl_draw_item *item, st
     return STRL_OK;
 }
 
-static strl_status queue_item(gl45_draw *draw, const strl_draw_item *item, const strl_gl_item *record, bool mirrors, strl_error *err)
+static strl_status queue_item(gl45_draw *draw, const strl_draw_item *item, const strl_gl_item *record, bool mirrors,
+                              strl_error *err)
 {
     gl45_renderer *self = draw->self;
     if (self->batch_count == self->batch_most)
@@ -215,11 +222,16 @@ static strl_status queue_item(gl45_draw *draw, const strl_draw_item *item, const
     if (entry->hidden)
         return STRL_OK;
     uint32_t at = self->batch_count++;
-    uint32_t first_index = entry->place.range.index_at * (STRL_GRANULE_BYTES / (uint32_t)sizeof(uint16_t)) + item->draw_first;
-    int32_t first_vertex = (int32_t)(entry->place.range.vertex_at * (STRL_GRANULE_BYTES / (uint32_t)sizeof(strl_vertex)));
+    uint32_t first_index =
+        entry->place.range.index_at * (STRL_GRANULE_BYTES / (uint32_t)sizeof(uint16_t)) + item->draw_first;
+    int32_t first_vertex =
+        (int32_t)(entry->place.range.vertex_at * (STRL_GRANULE_BYTES / (uint32_t)sizeof(strl_vertex)));
     self->records[at] = *record;
-    self->queued[at] = (gl45_queued){{item->draw_count, 1, first_index, first_vertex, at}, entry->place.range.slab,
-                                     entry->translucent || entry->hides, item->point_px > 0, mirrors};
+    self->queued[at] = (gl45_queued){{item->draw_count, 1, first_index, first_vertex, at},
+                                     entry->place.range.slab,
+                                     entry->translucent || entry->hides,
+                                     item->point_px > 0,
+                                     mirrors};
     draw->mirrors |= mirrors;
     entry->batch = self->batch;
     draw->stats->triangles += item->point_px > 0 ? 0 : item->draw_count / 3;
@@ -297,8 +309,14 @@ static void gl45_destroy(strl_renderer *renderer)
 }
 
 static const strl_renderer_class gl45_class = {
-    .backend = STRL_BACKEND_GL45, .draw = gl45_draw_list, .finish = strl__gl_finish, .resize = strl__gl_resize,
-    .read_colour = strl__gl_read_colour, .read_depth = strl__gl_read_depth, .present = strl__gl_present, .destroy = gl45_destroy,
+    .backend = STRL_BACKEND_GL45,
+    .draw = gl45_draw_list,
+    .finish = strl__gl_finish,
+    .resize = strl__gl_resize,
+    .read_colour = strl__gl_read_colour,
+    .read_depth = strl__gl_read_depth,
+    .present = strl__gl_present,
+    .destroy = gl45_destroy,
 };
 
 strl_status strl__gl45_renderer_create(const strl_renderer_desc *desc, strl_renderer **renderer, strl_error *err)

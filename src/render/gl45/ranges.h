@@ -15,7 +15,7 @@ typedef struct strl_range {
 typedef struct strl_ranges {
     strl_range *free; /* sorted, no two touch */
     size_t count, capacity;
-    size_t taken;     /* blocks out */
+    size_t taken; /* blocks out */
 } strl_ranges;
 
 /* One free range [0, total). False without memory. */

@@ -20,8 +20,8 @@ typedef struct strl_gl_ring {
 
 strl_status strl__gl_ring_init(strl_gl_ring *ring, size_t segment_bytes, strl_error *err);
 void strl__gl_ring_deinit(strl_gl_ring *ring);
-/* `bytes` (at most segment_bytes) of mapped memory at *offset of the buffer, a multiple of 256. What reads it must be issued
- * before the next take. */
+/* `bytes` (at most segment_bytes) of mapped memory at *offset of the buffer, a multiple of 256. What reads it must be
+ * issued before the next take. */
 void *strl__gl_ring_take(strl_gl_ring *ring, size_t bytes, size_t *offset);
 
 #endif

@@ -53,7 +53,8 @@ static void set_array(const strl_gl_slab *slab)
     for (GLuint row = 0; row < 6; row++)
         glVertexArrayAttribFormat(array, 3 + row, 4, GL_FLOAT, GL_FALSE, row * (GLuint)sizeof(float[4]));
     for (GLuint word = 0; word < 2; word++)
-        glVertexArrayAttribIFormat(array, 9 + word, 4, GL_INT, (GLuint)offsetof(strl_gl_item, base) + word * (GLuint)sizeof(int32_t[4]));
+        glVertexArrayAttribIFormat(array, 9 + word, 4, GL_INT,
+                                   (GLuint)offsetof(strl_gl_item, base) + word * (GLuint)sizeof(int32_t[4]));
     for (GLuint attribute = 0; attribute < 11; attribute++) {
         glVertexArrayAttribBinding(array, attribute, attribute >= 3);
         glEnableVertexArrayAttrib(array, attribute);
@@ -91,7 +92,8 @@ static uint32_t granules(uint64_t bytes)
     return count > 0 ? (uint32_t)count : 1;
 }
 
-static bool place_in(strl_gl_store *store, uint32_t slab, strl_cache_entry *entry, uint32_t vertex_granules, uint32_t index_granules)
+static bool place_in(strl_gl_store *store, uint32_t slab, strl_cache_entry *entry, uint32_t vertex_granules,
+                     uint32_t index_granules)
 {
     strl_ranges *ranges = &store->slabs[slab].ranges;
     uint32_t vertices = strl__ranges_take(ranges, vertex_granules);
@@ -111,7 +113,8 @@ static bool place_in(strl_gl_store *store, uint32_t slab, strl_cache_entry *entr
 
 bool strl__gl_store_place(strl_gl_store *store, strl_cache_entry *entry, uint32_t vertex_count, uint32_t index_capacity)
 {
-    uint32_t vertex_granules = granules(vertex_count * sizeof(strl_vertex)), index_granules = granules(index_capacity * sizeof(uint16_t));
+    uint32_t vertex_granules = granules(vertex_count * sizeof(strl_vertex)),
+             index_granules = granules(index_capacity * sizeof(uint16_t));
     for (uint32_t s = 0; s < store->slab_count; s++)
         if (place_in(store, s, entry, vertex_granules, index_granules))
             return true;
@@ -138,13 +141,15 @@ void strl__gl_store_release(strl_gl_store *store, strl_cache_entry *entry)
     strl__ranges_give(ranges, entry->place.range.index_at, entry->place.range.index_granules);
 }
 
-void strl__gl_store_upload(strl_gl_store *store, strl_gl_ring *ring, uint32_t slab, uint64_t at_bytes, const void *data, size_t bytes)
+void strl__gl_store_upload(strl_gl_store *store, strl_gl_ring *ring, uint32_t slab, uint64_t at_bytes, const void *data,
+                           size_t bytes)
 {
     const uint8_t *from = data;
     while (bytes > 0) {
         size_t piece = bytes < ring->segment_bytes ? bytes : ring->segment_bytes, offset;
         memcpy(strl__gl_ring_take(ring, piece, &offset), from, piece);
-        glCopyNamedBufferSubData(ring->buffer, store->slabs[slab].buffer, (GLintptr)offset, (GLintptr)at_bytes, (GLsizeiptr)piece);
+        glCopyNamedBufferSubData(ring->buffer, store->slabs[slab].buffer, (GLintptr)offset, (GLintptr)at_bytes,
+                                 (GLsizeiptr)piece);
         from += piece, at_bytes += piece, bytes -= piece;
     }
 }

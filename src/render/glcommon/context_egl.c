@@ -27,14 +27,20 @@ static EGLContext create_on(EGLDisplay display, const strl_gl_context_desc *desc
         return EGL_NO_CONTEXT;
     if (!eglBindAPI(desc->gles ? EGL_OPENGL_ES_API : EGL_OPENGL_API))
         return EGL_NO_CONTEXT;
-    const EGLint wanted[] = {EGL_SURFACE_TYPE, EGL_DONT_CARE,
-                             EGL_RENDERABLE_TYPE, desc->gles ? EGL_OPENGL_ES3_BIT : EGL_OPENGL_BIT, EGL_NONE};
+    const EGLint wanted[] = {EGL_SURFACE_TYPE, EGL_DONT_CARE, EGL_RENDERABLE_TYPE,
+                             desc->gles ? EGL_OPENGL_ES3_BIT : EGL_OPENGL_BIT, EGL_NONE};
     EGLConfig config;
     if (!eglChooseConfig(display, wanted, &config, 1, &count) || count < 1)
         return EGL_NO_CONTEXT;
-    const EGLint core[] = {EGL_CONTEXT_MAJOR_VERSION_KHR, desc->major, EGL_CONTEXT_MINOR_VERSION_KHR, desc->minor,
-                           EGL_CONTEXT_OPENGL_PROFILE_MASK_KHR, EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT_KHR, EGL_NONE};
-    const EGLint embedded[] = {EGL_CONTEXT_MAJOR_VERSION_KHR, desc->major, EGL_CONTEXT_MINOR_VERSION_KHR, desc->minor, EGL_NONE};
+    const EGLint core[] = {EGL_CONTEXT_MAJOR_VERSION_KHR,
+                           desc->major,
+                           EGL_CONTEXT_MINOR_VERSION_KHR,
+                           desc->minor,
+                           EGL_CONTEXT_OPENGL_PROFILE_MASK_KHR,
+                           EGL_CONTEXT_OPENGL_CORE_PROFILE_BIT_KHR,
+                           EGL_NONE};
+    const EGLint embedded[] = {EGL_CONTEXT_MAJOR_VERSION_KHR, desc->major, EGL_CONTEXT_MINOR_VERSION_KHR, desc->minor,
+                               EGL_NONE};
     EGLContext context = eglCreateContext(display, config, EGL_NO_CONTEXT, desc->gles ? embedded : core);
     if (context != EGL_NO_CONTEXT && !eglMakeCurrent(display, EGL_NO_SURFACE, EGL_NO_SURFACE, context)) {
         eglDestroyContext(display, context);
@@ -63,7 +69,8 @@ strl_status strl__gl_context_create(const strl_gl_context_desc *desc, strl_gl_co
 {
     *context = NULL;
     if (!has_client_extension("EGL_EXT_platform_base"))
-        return strl__fail(err, STRL_ERR_UNSUPPORTED, "this system's EGL has no platforms, so there is no context without a window");
+        return strl__fail(err, STRL_ERR_UNSUPPORTED,
+                          "this system's EGL has no platforms, so there is no context without a window");
     strl_gl_context *made = strl__alloc_zero(1, sizeof *made);
     if (!made)
         return strl__fail(err, STRL_ERR_MEMORY, "no memory for a GL context");

@@ -22,8 +22,8 @@ static strl_status open_context(strl_gl *gl, const strl_renderer_desc *desc, boo
     bool desktop = epoxy_is_desktop_gl();
     int version = epoxy_gl_version(), least = gl45 ? 45 : desktop ? 33 : 30;
     if (version < least || (gl45 && !desktop))
-        return strl__fail(err, STRL_ERR_UNSUPPORTED, "the GL context has version %d.%d, expected at least %d.%d", version / 10,
-                          version % 10, least / 10, least % 10);
+        return strl__fail(err, STRL_ERR_UNSUPPORTED, "the GL context has version %d.%d, expected at least %d.%d",
+                          version / 10, version % 10, least / 10, least % 10);
     return STRL_OK;
 }
 
@@ -46,7 +46,8 @@ static void set_clip_control(const strl_gl_dialect *dialect, bool ours)
         glClipControl(GL_LOWER_LEFT, depth);
 }
 
-strl_status strl__gl_init(strl_gl *gl, const strl_renderer_class *klass, const strl_renderer_desc *desc, strl_error *err)
+strl_status strl__gl_init(strl_gl *gl, const strl_renderer_class *klass, const strl_renderer_desc *desc,
+                          strl_error *err)
 {
     bool gl45 = klass->backend == STRL_BACKEND_GL45;
     gl->base = (strl_renderer){.klass = klass, .desc = *desc};
@@ -123,7 +124,8 @@ static void set_uniforms(strl_gl *gl, const strl_gl_program *program, const strl
     const double *axes[3] = {setup->view.right, setup->view.up, setup->view.forward};
     float sky[3], section[4];
     for (int i = 0; i < 3; i++)
-        sky[i] = (float)(axes[i][0] * options->sky_up[0] + axes[i][1] * options->sky_up[1] + axes[i][2] * options->sky_up[2]);
+        sky[i] = (float)(axes[i][0] * options->sky_up[0] + axes[i][1] * options->sky_up[1] +
+                         axes[i][2] * options->sky_up[2]);
     glUseProgram(program->name);
     glUniform4fv(program->projection, 1, gl->projection.values);
     glUniform1i(program->orthographic, gl->projection.orthographic);
@@ -188,7 +190,8 @@ strl_status strl__gl_resize(strl_renderer *renderer, strl_error *err)
     strl_gl *gl = (strl_gl *)renderer;
     strl__gl_make_current(gl);
     strl__gl_target_deinit(&gl->target);
-    return strl__gl_target_init(&gl->target, renderer->desc.width, renderer->desc.height, renderer->desc.supersample, err);
+    return strl__gl_target_init(&gl->target, renderer->desc.width, renderer->desc.height, renderer->desc.supersample,
+                                err);
 }
 
 strl_status strl__gl_read_colour(strl_renderer *renderer, uint8_t *rgba, strl_error *err)
@@ -202,7 +205,8 @@ strl_status strl__gl_read_depth(strl_renderer *renderer, float *depth, strl_erro
 {
     strl_gl *gl = (strl_gl *)renderer;
     strl__gl_make_current(gl);
-    return strl__gl_target_read_depth(&gl->target, &gl->programs[STRL_GL_DEPTH], &gl->projection, gl->dialect.es, depth, err);
+    return strl__gl_target_read_depth(&gl->target, &gl->programs[STRL_GL_DEPTH], &gl->projection, gl->dialect.es, depth,
+                                      err);
 }
 
 strl_status strl__gl_present(strl_renderer *renderer, uint32_t width, uint32_t height, strl_error *err)

@@ -20,7 +20,8 @@ typedef struct strl_gl {
 } strl_gl;
 
 /* gl is zeroed and starts the backend's struct. On failure nothing is left to release. */
-strl_status strl__gl_init(strl_gl *gl, const strl_renderer_class *klass, const strl_renderer_desc *desc, strl_error *err);
+strl_status strl__gl_init(strl_gl *gl, const strl_renderer_class *klass, const strl_renderer_desc *desc,
+                          strl_error *err);
 /* The backend has released the places of the cache's entries. */
 void strl__gl_deinit(strl_gl *gl);
 void strl__gl_make_current(strl_gl *gl);

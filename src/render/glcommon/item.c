@@ -1,7 +1,7 @@
 /* The vertex path in numbers. With c a vertex's cell and r the reference cell next to the eye,
  *     view = V (L (origin + step c) + t - eye) = V L step (c - r) + V (L (origin + step r) + t - eye).
- * c - r is exact in integers and small near the eye, where it matters; the second term is small too and the same for all vertices of a
- * placement. r depends on camera, origin, step and transform only, never on the node. */
+ * c - r is exact in integers and small near the eye, where it matters; the second term is small too and the same for
+ * all vertices of a placement. r depends on camera, origin, step and transform only, never on the node. */
 #include "render/glcommon/item.h"
 
 #include <math.h>
@@ -37,7 +37,8 @@ static void make_rows(strl_gl_placing *placing, const strl_view *view, const dou
     for (int j = 0; j < 3; j++)
         start[j] = placing->origin[j] + (lattice ? placing->step * (double)placing->reference[j] : 0);
     for (int i = 0; i < 3; i++)
-        offset[i] = m[i * 4] * start[0] + m[i * 4 + 1] * start[1] + m[i * 4 + 2] * start[2] + m[i * 4 + 3] - view->eye[i];
+        offset[i] =
+            m[i * 4] * start[0] + m[i * 4 + 1] * start[1] + m[i * 4 + 2] * start[2] + m[i * 4 + 3] - view->eye[i];
     for (int row = 0; row < 3; row++) {
         const double *axis = axes[row];
         float *to_view = placing->shared.rows[row], *normal = placing->shared.rows[3 + row];
@@ -115,7 +116,8 @@ static void tint_of(const strl_draw_setup *setup, const strl_draw_item *item, fl
         rgb[i] = -2 - strl__style_mark[i] / 255.f;
 }
 
-void strl__gl_item_make(strl_gl_placing *placing, const strl_draw_setup *setup, const strl_draw_item *item, strl_gl_item *out)
+void strl__gl_item_make(strl_gl_placing *placing, const strl_draw_setup *setup, const strl_draw_item *item,
+                        strl_gl_item *out)
 {
     place(placing, &setup->view, item);
     *out = placing->shared;

@@ -8,8 +8,9 @@
 
 /* 128 bytes, as node.vert.glsl reads them. */
 typedef struct strl_gl_item {
-    float rows[6][4];   /* 0-2: cells from the reference (or model units from the origin) to view space, w the offset;
-                           3-5: normals to view space, w a linear debug colour or -1 */
+    /* 0-2: cells from the reference (or model units from the origin) to view space, w the offset; 3-5: normals to
+     * view space, w a linear debug colour or -1 */
+    float rows[6][4];
     int32_t base[2][4]; /* anchor - reference cell, low and high words; base[0][3] flags */
 } strl_gl_item;
 
@@ -23,6 +24,7 @@ typedef struct strl_gl_placing {
     strl_gl_item shared;  /* rows, without debug colour */
 } strl_gl_placing;
 
-void strl__gl_item_make(strl_gl_placing *placing, const strl_draw_setup *setup, const strl_draw_item *item, strl_gl_item *out);
+void strl__gl_item_make(strl_gl_placing *placing, const strl_draw_setup *setup, const strl_draw_item *item,
+                        strl_gl_item *out);
 
 #endif

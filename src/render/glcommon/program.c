@@ -60,11 +60,13 @@ static const char *fragment_text(strl_gl_program_kind kind)
     return kind == STRL_GL_DEPTH ? strl__shader_depth_frag : strl__shader_node_frag;
 }
 
-strl_status strl__gl_program_init(strl_gl_program *program, strl_gl_program_kind kind, const strl_gl_dialect *dialect, strl_error *err)
+strl_status strl__gl_program_init(strl_gl_program *program, strl_gl_program_kind kind, const strl_gl_dialect *dialect,
+                                  strl_error *err)
 {
     const char *texts[] = {
-        dialect->es ? "#version 300 es\nprecision highp float;\nprecision highp int;\n"
-                    : dialect->item_attributes ? "#version 450 core\n" : "#version 330 core\n",
+        dialect->es                ? "#version 300 es\nprecision highp float;\nprecision highp int;\n"
+        : dialect->item_attributes ? "#version 450 core\n"
+                                   : "#version 330 core\n",
         dialect->item_attributes ? "#define STRL_ITEM_ATTRIBUTES\n" : "",
         dialect->symmetric_depth ? "#define STRL_SYMMETRIC_DEPTH\n" : "",
         kind == STRL_GL_NODE_ALPHA ? "#define STRL_ALPHA\n" : "",

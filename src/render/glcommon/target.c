@@ -43,12 +43,14 @@ static strl_status check_limits(uint32_t width, uint32_t height, uint32_t factor
     glGetIntegerv(GL_MAX_VIEWPORT_DIMS, viewport);
     uint64_t wide = (uint64_t)width * factor, high = (uint64_t)height * factor;
     if (wide > (uint64_t)side || high > (uint64_t)side || wide > (uint64_t)viewport[0] || high > (uint64_t)viewport[1])
-        return strl__fail(err, STRL_ERR_LIMIT, "an image of %" PRIu64 "x%" PRIu64 " samples is larger than this GL system draws (%d)",
-                          wide, high, side);
+        return strl__fail(err, STRL_ERR_LIMIT,
+                          "an image of %" PRIu64 "x%" PRIu64 " samples is larger than this GL system draws (%d)", wide,
+                          high, side);
     return STRL_OK;
 }
 
-strl_status strl__gl_target_init(strl_gl_target *target, uint32_t width, uint32_t height, uint32_t factor, strl_error *err)
+strl_status strl__gl_target_init(strl_gl_target *target, uint32_t width, uint32_t height, uint32_t factor,
+                                 strl_error *err)
 {
     *target = (strl_gl_target){.width = width, .height = height, .factor = factor};
     strl_status status = check_limits(width, height, factor, err);
@@ -70,7 +72,8 @@ strl_status strl__gl_target_init(strl_gl_target *target, uint32_t width, uint32_
     if (whole && glGetError() == GL_NO_ERROR)
         return STRL_OK;
     strl__gl_target_deinit(target);
-    return strl__fail(err, STRL_ERR_MEMORY, "the GL system cannot make a render target of %" PRIu32 "x%" PRIu32 " samples", wide, high);
+    return strl__fail(err, STRL_ERR_MEMORY,
+                      "the GL system cannot make a render target of %" PRIu32 "x%" PRIu32 " samples", wide, high);
 }
 
 void strl__gl_target_deinit(strl_gl_target *target)
@@ -131,16 +134,20 @@ static void bind_resolved(strl_gl_target *target, const strl_gl_program *resolve
 static strl_status check_read(strl_error *err, const char *what)
 {
     GLenum code = glGetError();
-    return code == GL_NO_ERROR ? STRL_OK : strl__fail(err, STRL_ERR_INTERNAL, "GL error 0x%04x while reading the %s back", code, what);
+    return code == GL_NO_ERROR
+               ? STRL_OK
+               : strl__fail(err, STRL_ERR_INTERNAL, "GL error 0x%04x while reading the %s back", code, what);
 }
 
-strl_status strl__gl_target_read_colour(strl_gl_target *target, const strl_gl_program *resolve, uint8_t *rgba, strl_error *err)
+strl_status strl__gl_target_read_colour(strl_gl_target *target, const strl_gl_program *resolve, uint8_t *rgba,
+                                        strl_error *err)
 {
     bind_resolved(target, resolve);
     glPixelStorei(GL_PACK_ALIGNMENT, 1);
     size_t row = (size_t)target->width * 4;
     for (uint32_t y = 0; y < target->height; y++)
-        glReadPixels(0, (GLint)y, (GLsizei)target->width, 1, GL_RGBA, GL_UNSIGNED_BYTE, rgba + (target->height - 1 - y) * row);
+        glReadPixels(0, (GLint)y, (GLsizei)target->width, 1, GL_RGBA, GL_UNSIGNED_BYTE,
+                     rgba + (target->height - 1 - y) * row);
     return check_read(err, "image");
 }
 
@@ -155,8 +162,8 @@ static strl_status make_bits(strl_gl_target *target, strl_error *err)
     return strl__fail(err, STRL_ERR_MEMORY, "the GL system cannot make a target to read depth from");
 }
 
-strl_status strl__gl_target_read_depth(strl_gl_target *target, const strl_gl_program *program, const strl_gl_projection *projection,
-                                       bool es, float *depth, strl_error *err)
+strl_status strl__gl_target_read_depth(strl_gl_target *target, const strl_gl_program *program,
+                                       const strl_gl_projection *projection, bool es, float *depth, strl_error *err)
 {
     strl_status status = make_bits(target, err);
     if (status != STRL_OK)
@@ -173,10 +180,12 @@ strl_status strl__gl_target_read_depth(strl_gl_target *target, const strl_gl_pro
     glPixelStorei(GL_PACK_ALIGNMENT, 1);
     for (uint32_t first = 0; first < target->height; first += READ_ROWS) {
         uint32_t count = target->height - first < READ_ROWS ? target->height - first : READ_ROWS;
-        glReadPixels(0, (GLint)first, (GLsizei)width, (GLsizei)count, es ? GL_RGBA_INTEGER : GL_RED_INTEGER, GL_UNSIGNED_INT, rows);
+        glReadPixels(0, (GLint)first, (GLsizei)width, (GLsizei)count, es ? GL_RGBA_INTEGER : GL_RED_INTEGER,
+                     GL_UNSIGNED_INT, rows);
         for (uint32_t y = 0; y < count; y++)
             for (size_t x = 0; x < width; x++)
-                memcpy(&depth[(target->height - 1 - first - y) * width + x], &rows[(y * width + x) * channels], sizeof *depth);
+                memcpy(&depth[(target->height - 1 - first - y) * width + x], &rows[(y * width + x) * channels],
+                       sizeof *depth);
     }
     strl__free(rows);
     return check_read(err, "depth");
@@ -187,7 +196,7 @@ void strl__gl_target_present(strl_gl_target *target, const strl_gl_program *reso
     bind_resolved(target, resolve);
     glBindFramebuffer(GL_READ_FRAMEBUFFER, target->factor > 1 ? target->resolved : target->samples);
     glBindFramebuffer(GL_DRAW_FRAMEBUFFER, 0);
-    glBlitFramebuffer(0, 0, (GLint)target->width, (GLint)target->height, 0, 0, (GLint)width, (GLint)height, GL_COLOR_BUFFER_BIT,
-                      width == target->width && height == target->height ? GL_NEAREST : GL_LINEAR);
+    glBlitFramebuffer(0, 0, (GLint)target->width, (GLint)target->height, 0, 0, (GLint)width, (GLint)height,
+                      GL_COLOR_BUFFER_BIT, width == target->width && height == target->height ? GL_NEAREST : GL_LINEAR);
     glBindFramebuffer(GL_FRAMEBUFFER, 0);
 }

@@ -1,5 +1,5 @@
-/* Draws nothing: checks each item, keeps a shadow of what a GPU would hold within the same budget, and counts. The shadow has
- * the indices themselves, uploaded by the same plan as on a GPU: a wrong dirty range is found at once. */
+/* Draws nothing: checks each item, keeps a shadow of what a GPU would hold within the same budget, and counts. The
+ * shadow has the indices themselves, uploaded by the same plan as on a GPU: a wrong dirty range is found at once. */
 #include <inttypes.h>
 #include <math.h>
 #include <string.h>
@@ -52,7 +52,8 @@ static strl_status make_room(null_renderer *self, uint64_t bytes, strl_render_st
         stats->evictions++;
     }
     if (self->gpu_bytes + bytes > budget)
-        return strl__fail(err, STRL_ERR_LIMIT, "a node needs %" PRIu64 " bytes of GPU memory, the budget is %" PRIu64, bytes, budget);
+        return strl__fail(err, STRL_ERR_LIMIT, "a node needs %" PRIu64 " bytes of GPU memory, the budget is %" PRIu64,
+                          bytes, budget);
     return STRL_OK;
 }
 
@@ -77,8 +78,8 @@ static uint64_t checksum_vertices(const strl_draw_item *item)
 }
 
 /* Copies what the plan says and compares the whole with the item. */
-static strl_status update(null_renderer *self, strl_cache_entry *entry, const strl_draw_item *item, strl_cache_upload upload,
-                          strl_error *err)
+static strl_status update(null_renderer *self, strl_cache_entry *entry, const strl_draw_item *item,
+                          strl_cache_upload upload, strl_error *err)
 {
     shadow *held = &self->shadows[entry->place.names.array];
     if (item->index_count > entry->index_capacity) {
@@ -91,17 +92,22 @@ static strl_status update(null_renderer *self, strl_cache_entry *entry, const st
     if (upload.vertices)
         held->vertices_checksum = checksum_vertices(item);
     else if (held->vertices_checksum != checksum_vertices(item))
-        return strl__fail(err, STRL_ERR_ARGUMENT, "node %" PRIu32 " (placement %" PRIu32 ") has other vertices under the same key",
-                          item->node, item->placement);
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "node %" PRIu32 " (placement %" PRIu32 ") has other vertices under the same key", item->node,
+                          item->placement);
     if (upload.index_count > 0)
-        memcpy(held->indices + upload.first_index, item->indices + upload.first_index, upload.index_count * sizeof(uint16_t));
+        memcpy(held->indices + upload.first_index, item->indices + upload.first_index,
+               upload.index_count * sizeof(uint16_t));
     if (item->index_count > 0 && memcmp(held->indices, item->indices, item->index_count * sizeof(uint16_t)) != 0)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "node %" PRIu32 " (placement %" PRIu32 ") differs from the list before outside its "
-                          "dirty range [%" PRIu32 ", +%" PRIu32 ")", item->node, item->placement, item->dirty_first, item->dirty_count);
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "node %" PRIu32 " (placement %" PRIu32 ") differs from the list before outside its "
+                          "dirty range [%" PRIu32 ", +%" PRIu32 ")",
+                          item->node, item->placement, item->dirty_first, item->dirty_count);
     return STRL_OK;
 }
 
-static strl_status draw_item(null_renderer *self, const strl_draw_item *item, uint64_t frame, strl_render_stats *stats, strl_error *err)
+static strl_status draw_item(null_renderer *self, const strl_draw_item *item, uint64_t frame, strl_render_stats *stats,
+                             strl_error *err)
 {
     strl_cache_entry *entry = strl__cache_find(&self->cache, item->key);
     uint64_t bytes = item->vertex_count * sizeof(strl_vertex) + item->index_count * sizeof(uint16_t);
@@ -139,12 +145,14 @@ static strl_status check_keys(null_renderer *self, const strl_draw_item *item, u
     if (!entry || entry->batch != serial)
         return STRL_OK;
     if (entry->placement == item->placement)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "node %" PRIu32 " (placement %" PRIu32 ") has a key that is in the list already",
-                          item->node, item->placement);
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "node %" PRIu32 " (placement %" PRIu32 ") has a key that is in the list already", item->node,
+                          item->placement);
     if (entry->state != item->state || entry->index_count != item->index_count)
-        return strl__fail(err, STRL_ERR_ARGUMENT, "node %" PRIu32 " (placement %" PRIu32 ") is in state %" PRIu32
-                          ", but placement %" PRIu32 " of the same key in state %" PRIu32, item->node, item->placement, item->state,
-                          entry->placement, entry->state);
+        return strl__fail(err, STRL_ERR_ARGUMENT,
+                          "node %" PRIu32 " (placement %" PRIu32 ") is in state %" PRIu32 ", but placement %" PRIu32
+                          " of the same key in state %" PRIu32,
+                          item->node, item->placement, item->state, entry->placement, entry->state);
     return STRL_OK;
 }
 
@@ -160,7 +168,8 @@ static strl_status null_draw(strl_renderer *renderer, const strl_draw_setup *set
         status = strl__check_item_counts(item, err);
         if (status == STRL_OK)
             status = strl__check_item_contents(item, err);
-        if (status != STRL_OK || !item->visible || item->draw_count == 0 || strl__item_style(item, &setup->options) == STRL_PART_HIDDEN)
+        if (status != STRL_OK || !item->visible || item->draw_count == 0 ||
+            strl__item_style(item, &setup->options) == STRL_PART_HIDDEN)
             continue;
         status = check_keys(self, item, in_this_list, err);
         if (status == STRL_OK)
@@ -228,8 +237,14 @@ static void null_destroy(strl_renderer *renderer)
 }
 
 static const strl_renderer_class null_class = {
-    .backend = STRL_BACKEND_NULL, .draw = null_draw, .finish = null_finish, .resize = null_resize,
-    .read_colour = null_read_colour, .read_depth = null_read_depth, .present = null_present, .destroy = null_destroy,
+    .backend = STRL_BACKEND_NULL,
+    .draw = null_draw,
+    .finish = null_finish,
+    .resize = null_resize,
+    .read_colour = null_read_colour,
+    .read_depth = null_read_depth,
+    .present = null_present,
+    .destroy = null_destroy,
 };
 
 strl_status strl__null_renderer_create(const strl_renderer_desc *desc, strl_renderer **renderer, strl_error *err)
