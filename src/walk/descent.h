@@ -15,8 +15,6 @@ typedef struct strl__descent {
     strl_error *err;
 } strl__descent;
 
-#define STRL__PREFETCH_SHARE 1e-3 /* what may be wanted later comes after all that is wanted now */
-
 /* What keeps a group's children away, the worst last. */
 typedef enum strl__outlook { STRL__HERE, STRL__RECORDS_ABSENT, STRL__BACKING_OFF } strl__outlook;
 

@@ -24,6 +24,8 @@ static strl_status prefetch_children(strl__descent *c, const strl__group *group,
     strl_walk *walk = c->walk;
     strl__outlook worst;
     double urgency = STRL__PREFETCH_SHARE * px / c->cut->allowed_px;
+    if (urgency < walk->prefetch_floor)
+        return STRL_OK;
     bool waits = c->cut->waits; /* no frame waits for what it does not want */
     strl_status status = strl__find_children(c, group, urgency, &walk->prefetch, &worst);
     c->cut->waits = waits;

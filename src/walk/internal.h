@@ -26,6 +26,7 @@
 /* bytes that a decoded node may take beside what its record says: splats of an empty brick */
 #define STRL__SPLAT_ROOM 2048u
 #define STRL__PREVIEW_ROOM (STRL_BRICK_SPLATS * sizeof(strl_splat)) /* the same of the first node of a tree */
+#define STRL__PREFETCH_SHARE 1e-3 /* what may be wanted later comes after all that is wanted now */
 #define STRL__LEAST_GUARD 1.25
 #define STRL__HALVINGS (STRL_BRICK_LEVELS + 1)
 #define STRL__MOST_POINT_PX 64.0 /* what every GL draws */
@@ -414,6 +415,7 @@ struct strl_walk {
     strl__runs wanted_runs;           /* of which the front has placements, or may have */
     strl__splits split, split_before; /* of this frame and the last */
     strl__candidates missing, prefetch;
+    float prefetch_floor; /* what is less urgent is not looked for: there is more than enough of what is (requests.c) */
     strl__candidates along; /* left out of the cut: they come where their page is read for others */
     strl__front front;
     strl_draw_item *items;
@@ -567,6 +569,9 @@ void strl__begin_look(strl_walk *walk); /* once a frame, after the answers */
 /* requests.c */
 void strl__requests_receive(strl_walk *walk);
 void strl__requests_submit(strl_walk *walk);
+/* Puts them partly in order: none before items[at] is less urgent than that one, and none behind it more. Hoare's
+ * selection, in a time that grows as their count. at < count. */
+void strl__candidates_select(strl__candidates *candidates, size_t at);
 uint64_t strl__jobs_pump(strl_walk *walk, uint64_t budget_ns);
 void strl__jobs_abandon(strl_walk *walk);
 

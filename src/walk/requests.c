@@ -3,12 +3,15 @@
  * the executor's, or the pump's. */
 #include "walk/internal.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 #include "platform/thread.h"
 
 #define FORGET_FRAMES 16u /* a read that nothing has wanted for this long is cancelled */
 #define ABANDON_WAIT_NS 50000u
+#define MOST_PREFETCH 4096u /* candidates of a frame: some hundred pages */
+#define FLOOR_SINKS 0.8f    /* a frame */
 
 /* ---- jobs */
 
@@ -458,6 +461,46 @@ static void ask_for_all(strl_walk *walk, strl__candidates *candidates, uint32_t 
     }
 }
 
+void strl__candidates_select(strl__candidates *candidates, size_t at)
+{
+    strl__candidate *items = candidates->items;
+    size_t first = 0, end = candidates->count;
+    while (end - first > 1) {
+        const float pivot = items[first + (end - first) / 2].urgency;
+        size_t i = first, j = end - 1;
+        for (;; i++, j--) {
+            while (items[i].urgency > pivot)
+                i++;
+            while (items[j].urgency < pivot)
+                j--;
+            if (i >= j)
+                break;
+            strl__candidate swapped = items[i];
+            items[i] = items[j];
+            items[j] = swapped;
+        }
+        size_t split = i > first ? i : first + 1; /* none of [first, split) is less urgent than any of [split, end) */
+        if (at < split)
+            end = split;
+        else
+            first = split;
+    }
+}
+
+/* Of tens of thousands that might be wanted soon a frame asks for a few: to put all in order, and to find them at all,
+ * would take longer than the rest of the frame. How urgent the last of the first MOST_PREFETCH is, is a bound for the
+ * frames behind, which sinks again where there are fewer. */
+static void bound_prefetch(strl_walk *walk)
+{
+    strl__candidates *prefetch = &walk->prefetch;
+    if (prefetch->count > MOST_PREFETCH) {
+        strl__candidates_select(prefetch, MOST_PREFETCH - 1);
+        prefetch->count = MOST_PREFETCH;
+        walk->prefetch_floor = fminf(prefetch->items[MOST_PREFETCH - 1].urgency, (float)STRL__PREFETCH_SHARE);
+    } else
+        walk->prefetch_floor *= FLOOR_SINKS;
+}
+
 static void forget_stale(strl_walk *walk)
 {
     for (uint32_t i = 0; i < walk->requests_in_flight; i++) {
@@ -477,6 +520,7 @@ void strl__requests_submit(strl_walk *walk)
     ask_for_all(walk, &walk->missing, in_flight, walk->frame + 1);
     uint64_t idle_since = strl__idle_since(walk);   /* prefetching evicts only what has been idle for longer */
     ask_for_all(walk, &walk->along, 0, idle_since); /* no slot is theirs */
+    bound_prefetch(walk);
     if (walk->missing.count == 0)
         ask_for_all(walk, &walk->prefetch, (in_flight + 1) / 2, idle_since);
     forget_stale(walk);
