@@ -1,14 +1,15 @@
 /* What is too far away to be told apart: a placement, or a run of them, whose box projects to no more than the allowed
  * error is drawn as one point, so that a frame costs what can be seen, however many copies there are. The point lies in
  * the box, so it is off by no more than the box is large; it is as opaque as the share of it that the faces of the run
- * would cover. In the same way, but as large as a point can be, a run is drawn whose placements are on their way. */
+ * would cover. In the same way a run is drawn whose placements are on their way, by as many points as its box takes. */
 #include "walk/internal.h"
 
 #include <math.h>
 
 #include "geometry/octahedral.h"
 
-#define LATTICE 0x1p30 /* cells of the far points along the longest edge of the model's box */
+#define LATTICE 0x1p30    /* cells of the far points along the longest edge of the model's box */
+#define MOST_HALVINGS 12u /* of the box of a run that is on its way */
 
 static double diagonal(const strl_box *box)
 {
@@ -38,11 +39,11 @@ double strl__far_px(double allowed_px, unsigned size)
     return fmin(size ? ldexp(1, (int)size) : fmax(1, allowed_px), STRL__MOST_POINT_PX);
 }
 
-/* Of a box that is so many pixels large in its middle. */
+/* Of a box that is so many pixels large: the least that is not smaller, as far as there is one. */
 static unsigned size_of(double px)
 {
     unsigned size = 1;
-    while (size + 1 < STRL__FAR_SIZES && px >= ldexp(1, (int)size + 1))
+    while (size + 1 < STRL__FAR_SIZES && px > ldexp(1, (int)size))
         size++;
     return size;
 }
@@ -107,14 +108,14 @@ int32_t strl__far_cell(double at)
     return (int32_t)lrint(at > 0 ? at < LATTICE ? at : LATTICE : 0);
 }
 
-strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far, double px,
-                           bool is_missing, uint32_t own_part, strl_error *err)
+static strl_status draw_point(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far,
+                              double px, bool is_missing, uint32_t own_part, strl_error *err)
 {
     double least, largest, place[3], sight[3], depth = find_place(cut->view, box, is_missing, place);
     if (!(px > 0) || !(depth > 0) || !(far->area > 0)) /* not in the image, or nothing */
         return STRL_OK;
     double scale = cut->view->focal_px / (cut->view->orthographic ? 1 : depth);
-    unsigned size = is_missing ? size_of(diagonal(box) * scale) : 0;
+    unsigned size = is_missing ? size_of(px) : 0;
     double side = strl__far_px(cut->allowed_px, size);
     strl__far_points *points = &walk->far[size];
     strl_vertex *point = strl__far_points_add(points, walk->labels, own_part);
@@ -134,6 +135,42 @@ strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box
     walk->far_far = fmax(walk->far_far, largest);
     points->px = fmax(points->px, px);
     return STRL_OK;
+}
+
+strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far, double px,
+                           uint32_t own_part, strl_error *err)
+{
+    return draw_point(walk, cut, box, far, px, false, own_part, err);
+}
+
+/* Halves of its longest edge, each with half of the faces, until a point covers what is left. */
+static strl_status fill(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far,
+                        unsigned halvings, strl_error *err)
+{
+    if (!strl_view_sees(cut->view, box))
+        return STRL_OK;
+    const strl_sight sight = strl_view_sight(cut->view, box);
+    const double px = strl_sight_error_px(&sight, diagonal(box));
+    if (px <= STRL__MOST_POINT_PX || halvings == 0 || walk->fill_work == 0)
+        return draw_point(walk, cut, box, far, px, true, 0, err);
+    walk->fill_work--;
+    unsigned longest = 0;
+    for (unsigned k = 1; k < 3; k++)
+        if (box->max[k] - box->min[k] > box->max[longest] - box->min[longest])
+            longest = k;
+    const double middle = box->min[longest] + (box->max[longest] - box->min[longest]) / 2;
+    strl_box low = *box, high = *box;
+    strl_far half = *far;
+    low.max[longest] = high.min[longest] = middle;
+    half.area /= 2;
+    strl_status status = fill(walk, cut, &low, &half, halvings - 1, err);
+    return status ? status : fill(walk, cut, &high, &half, halvings - 1, err);
+}
+
+strl_status strl__far_fill(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far,
+                           strl_error *err)
+{
+    return fill(walk, cut, box, far, MOST_HALVINGS, err);
 }
 
 /* Without placement, node or level: they stand for many. */

@@ -272,6 +272,7 @@ strl_status strl__cut_run(strl_walk *walk, strl__cut *cut, strl_error *err)
         for (unsigned size = 0; size < STRL__FAR_SIZES; size++)
             walk->far[size].count = 0, walk->far[size].px = 0;
         walk->far_far = 0;
+        walk->fill_work = STRL__FILL_WORK;
     }
     strl_status status = keep_roots(walk, cut, err);
     uint32_t i = 0;

@@ -192,7 +192,8 @@ typedef struct strl__far_points {
     double px; /* the largest box that one of them stands for, in pixels */
 } strl__far_points;
 
-#define STRL__FAR_SIZES 7u /* 0: the size of the allowed error; k: 2^k pixels, for runs that are not there yet */
+#define STRL__FILL_WORK 32768u /* of a frame */
+#define STRL__FAR_SIZES 7u     /* 0: the size of the allowed error; k: 2^k pixels, for runs that are not there yet */
 
 /* A page's bytes, shared by the decode jobs of its nodes. They have the checksum that `ref` tells. */
 typedef struct strl__page {
@@ -250,6 +251,17 @@ typedef struct strl__nodes {
     strl__node **items;
     size_t count, capacity;
 } strl__nodes;
+
+/* Of the front: the items of one placement. */
+typedef struct strl__placed_range {
+    size_t first, end;
+    double distance; /* along the view direction */
+} strl__placed_range;
+
+typedef struct strl__placed_ranges {
+    strl__placed_range *items;
+    size_t count, capacity;
+} strl__placed_ranges;
 
 typedef struct strl__runs {
     strl__run **items;
@@ -423,11 +435,13 @@ struct strl_walk {
     strl_vertex *points; /* splats of the frame */
     size_t point_count, point_capacity;
     uint64_t hole_work;                 /* of the frame: left, see points.h */
+    strl__placed_ranges ranges;         /* of the frame */
     strl__placed_points *placed_points; /* of the frame */
     size_t placed_count, placed_capacity;
     float scattered[256]; /* of a splat's coverage: 0 = the faces are a wall, 1 = there is nearly none */
     strl__far_points far[STRL__FAR_SIZES];      /* of the frame */
     strl__far_points merged[STRL__POINT_SIZES]; /* splats of placements that show few, of the frame */
+    uint32_t fill_work;                         /* of the frame: boxes of missing runs that may still be halved */
     double far_near, far_far;                   /* depths of their boxes; far_far 0: there is none */
     uint16_t *numbers;                          /* 0, 1, 2, ...; NULL where there was no splat yet */
     strl_camera camera;                         /* of the last frame */
@@ -487,10 +501,13 @@ void strl__run_evict(strl_walk *walk, strl__run *run);
 /* far.c */
 /* Whether the box projects to at most the allowed error. *px: to how much. */
 bool strl__is_far(const strl__cut *cut, const strl_box *box, double *px);
-/* A point for what the box holds, which projects to px; as large as the box where it is not there yet. own_part: of the
- * placement that it is, as of strl_draw_item; 0 = none or several. */
+/* A point for what the box holds, which projects to px. own_part: of the placement that it is, as of strl_draw_item; 0
+ * = none or several. */
 strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far, double px,
-                           bool is_missing, uint32_t own_part, strl_error *err);
+                           uint32_t own_part, strl_error *err);
+/* Points that cover what the camera sees of the box, for what it holds is not there yet. */
+strl_status strl__far_fill(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far,
+                           strl_error *err);
 /* Room for one more, its label set; NULL: no memory. */
 strl_vertex *strl__far_points_add(strl__far_points *points, bool labels, uint32_t own_part);
 void strl__far_points_deinit(strl__far_points *points);

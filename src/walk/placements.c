@@ -177,10 +177,16 @@ typedef struct looking {
     strl_error *err;
 } looking;
 
-static void draw(looking *self, const strl_box *box, const strl_far *far, double px, bool is_missing, uint32_t own_part)
+static void draw(looking *self, const strl_box *box, const strl_far *far, double px, uint32_t own_part)
 {
     if (self->cut->kind == STRL__CUT_FRONT)
-        self->status = strl__far_draw(self->walk, self->cut, box, far, px, is_missing, own_part, self->err);
+        self->status = strl__far_draw(self->walk, self->cut, box, far, px, own_part, self->err);
+}
+
+static void draw_missing(looking *self, const strl_box *box, const strl_far *far)
+{
+    if (self->cut->kind == STRL__CUT_FRONT)
+        self->status = strl__far_fill(self->walk, self->cut, box, far, self->err);
 }
 
 /* True where the camera looks past it, or sees no more of it than a point, which is drawn. Else *px is how large it is.
@@ -191,7 +197,7 @@ static bool passes_over(looking *self, const strl_box *box, const strl_far *far,
         return true;
     if (!strl__is_far(self->cut, box, px))
         return false;
-    draw(self, box, far, *px, false, 0);
+    draw(self, box, far, *px, 0);
     return true;
 }
 
@@ -243,13 +249,13 @@ static const strl__run_page *open_run(looking *self, strl__run *run, double px)
     uint64_t bytes = strl__run_bytes(strl__run_placements(walk, run));
     if (cut->bytes > cut->capacity_bytes || bytes > cut->capacity_bytes - cut->bytes) {
         cut->overflow = !cut->stop_at_capacity;
-        draw(self, &box, &run->facts.far, px, true, 0);
+        draw_missing(self, &box, &run->facts.far);
         return NULL;
     }
     cut->bytes += bytes;
     if (run->residency != STRL__RESIDENT) {
         want_run(self, run, px);
-        draw(self, &box, &run->facts.far, px, true, 0);
+        draw_missing(self, &box, &run->facts.far);
         return NULL;
     }
     if (cut->kind != STRL__CUT_FRONT)
@@ -290,7 +296,7 @@ static uint32_t pass_placement(looking *self, uint32_t at)
     if (!strl__is_far(self->cut, &box, &px))
         return 0;
     const strl_far far = strl__placement_far(self->walk, &page->items[within]);
-    draw(self, &box, &far, px, false, page->items[within].own_part);
+    draw(self, &box, &far, px, page->items[within].own_part);
     return 1;
 }
 

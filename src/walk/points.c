@@ -2,6 +2,7 @@
 #include "walk/points.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 #include "base/affine.h"
 #include "geometry/octahedral.h"
@@ -201,17 +202,40 @@ static strl_status list_far(strl_walk *walk, const strl__far_points *points, dou
     return add_items(walk, &shape, points->items, points->labels, points->count, list, err);
 }
 
+static int by_distance(const void *left, const void *right)
+{
+    const strl__placed_range *a = left, *b = right;
+    if (a->distance != b->distance)
+        return a->distance < b->distance ? -1 : 1;
+    return a->first < b->first ? -1 : a->first > b->first;
+}
+
+/* The placements of the front; while something is missing the nearest ones first, by what comes first of them, which is
+ * mostly the root: the work of closing holes may not do for all. */
+static strl_status find_ranges(strl_walk *walk, strl_error *err)
+{
+    strl__placed_ranges *ranges = &walk->ranges;
+    ranges->count = 0;
+    for (size_t i = 0, next; i < walk->front.count; i = next) {
+        next = end_of_placement(&walk->front, i);
+        if (!strl__grow(&ranges->items, &ranges->capacity, ranges->count + 1, sizeof *ranges->items))
+            return strl__fail(err, STRL_ERR_MEMORY, "no memory for the places of splats");
+        ranges->items[ranges->count++] = (strl__placed_range){i, next, walk->front.items[i].sight.nearest};
+    }
+    if (walk->stats.missing_nodes > 0 && ranges->count > 1)
+        qsort(ranges->items, ranges->count, sizeof *ranges->items, by_distance);
+    return STRL_OK;
+}
+
 strl_status strl__draw_splats(strl_walk *walk, const strl_view *view, strl_draw_list *list, strl_error *err)
 {
-    strl_status status = STRL_OK;
+    strl_status status = find_ranges(walk, err);
     walk->point_count = walk->placed_count = 0;
     walk->hole_work = STRL__HOLE_WORK;
     for (unsigned size = 0; size < STRL__POINT_SIZES; size++)
         walk->merged[size].count = 0, walk->merged[size].px = strl__points_px(walk, size);
-    for (size_t i = 0, next; i < walk->front.count && !status; i = next) {
-        next = end_of_placement(&walk->front, i);
-        status = add_points(walk, view, i, next, err);
-    }
+    for (size_t i = 0; i < walk->ranges.count && !status; i++)
+        status = add_points(walk, view, walk->ranges.items[i].first, walk->ranges.items[i].end, err);
     size_t points = walk->point_count;
     for (unsigned size = 0; size < STRL__FAR_SIZES; size++)
         points += walk->far[size].count;

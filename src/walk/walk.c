@@ -254,6 +254,7 @@ void strl_walk_close(strl_walk *walk)
                            walk->items,
                            walk->points,
                            walk->placed_points,
+                           walk->ranges.items,
                            walk->wanted_runs.items,
                            walk->numbers,
                            walk->retired,

@@ -284,6 +284,103 @@ static void copies_below_a_pixel_are_drawn_as_points(void **state)
     strl_walk_close(walk);
 }
 
+/* ---- not there yet */
+
+static bool marked[360][640];
+
+static void cross(const double a[3], const double b[3], double product[3])
+{
+    double length = 0;
+    for (int k = 0; k < 3; k++)
+        product[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+    for (int k = 0; k < 3; k++)
+        length += product[k] * product[k];
+    for (int k = 0; k < 3; k++)
+        product[k] /= sqrt(length);
+}
+
+/* In pixels from the image's upper left corner; false behind the eye. By code of the test's own. */
+static bool project(const strl_camera *camera, const strl_draw_item *item, const strl_vertex *vertex, double pixel[2])
+{
+    double forward[3], right[3], up[3], from[3], depth = 0, x = 0, y = 0;
+    const double focal = camera->height / 2.0 / tan(camera->fov_y_deg * M_PI / 360);
+    for (int k = 0; k < 3; k++)
+        forward[k] = camera->target[k] - camera->eye[k];
+    cross(forward, camera->up, right);
+    cross(right, forward, up);
+    cross(up, right, forward);
+    for (int row = 0; row < 3; row++) {
+        const double *m = item->transform + 4 * row;
+        from[row] = m[3] - camera->eye[row];
+        for (int k = 0; k < 3; k++)
+            from[row] += m[k] * (item->origin[k] + item->step * (double)(item->anchor[k] + vertex->position[k]));
+    }
+    for (int k = 0; k < 3; k++) {
+        depth += forward[k] * from[k];
+        x += right[k] * from[k];
+        y += up[k] * from[k];
+    }
+    pixel[0] = camera->width / 2.0 + focal * x / depth;
+    pixel[1] = camera->height / 2.0 - focal * y / depth;
+    return depth > 0;
+}
+
+static void mark_points(const strl_camera *camera, const strl_draw_list *list)
+{
+    memset(marked, 0, sizeof marked);
+    for (uint32_t i = 0; i < list->count; i++) {
+        const strl_draw_item *item = &list->items[i];
+        const double half = (double)item->point_px / 2;
+        double at[2];
+        for (uint32_t v = 0; v < item->vertex_count && half > 0; v++)
+            if (project(camera, item, &item->vertices[v], at))
+                for (int y = (int)fmax(0, at[1] - half); y < (int)fmin(camera->height, at[1] + half); y++)
+                    for (int x = (int)fmax(0, at[0] - half); x < (int)fmin(camera->width, at[0] + half); x++)
+                        marked[y][x] = true;
+    }
+}
+
+/* Of the vertices that are in the image, those that no point covers. */
+static double open_share(const strl_camera *camera, const strl_draw_list *list)
+{
+    uint64_t all = 0, open = 0;
+    for (uint32_t i = 0; i < list->count; i++) {
+        const strl_draw_item *item = &list->items[i];
+        double at[2];
+        for (uint32_t v = 0; v < item->vertex_count && item->visible; v++)
+            if (project(camera, item, &item->vertices[v], at) && at[0] >= 0 && at[0] < camera->width && at[1] >= 0 &&
+                at[1] < camera->height) {
+                all++;
+                open += !marked[(int)at[1]][(int)at[0]];
+            }
+    }
+    assert_true(all > 1000);
+    return (double)open / (double)all;
+}
+
+/* Before any page of placements is there: what stands for them covers the place of each, from near as well. */
+static void where_placements_are_missing_no_hole_is(void **state)
+{
+    (void)state;
+    const strl_camera cameras[] = {look(60, 300, 61, 60, 60), look(60, 20, 61, 60, 60), look(60, 3, 10, 60, 60),
+                                   look(-40, 5, -40, 60, 60)};
+    for (size_t i = 0; i < sizeof cameras / sizeof *cameras; i++) {
+        watched_source *source = watched_source_open(memory_source(shared.bytes, shared.size));
+        strl_walk *walk = open_walk(&source->base, NULL);
+        source->walking = true;
+        source->hold_percent = 100;
+        strl_draw_list list = walk_frame(walk, &cameras[i]);
+        assert_true(strl_walk_get_stats(walk)->missing_nodes > 0 && strl_walk_get_stats(walk)->splats < 100000);
+        mark_points(&cameras[i], &list);
+        source->hold_percent = 0;
+        list = settle(walk, &cameras[i], 2000);
+        const double open = open_share(&cameras[i], &list);
+        if (open > 0.001)
+            fail_msg("camera %zu: of what is to be seen %g is open at first", i, open);
+        strl_walk_close(walk);
+    }
+}
+
 int main(void)
 {
     const struct CMUnitTest tests[] = {
@@ -292,6 +389,7 @@ int main(void)
         cmocka_unit_test(what_comes_back_into_view_is_there_at_once),
         cmocka_unit_test(each_placement_is_drawn_in_a_state_of_its_own),
         cmocka_unit_test(copies_below_a_pixel_are_drawn_as_points),
+        cmocka_unit_test(where_placements_are_missing_no_hole_is),
     };
     return cmocka_run_group_tests(tests, make_model, drop_model);
 }
