@@ -157,7 +157,8 @@ strl_status strl__scene_chessboard_copies(strl__scene_run *run, strl_error *err)
 {
     const uint64_t fields = run->desc->triangles / 2, columns = columns_of(fields), rows = fields / columns;
     const strl__affine upright = {.axis = {{1, 0, 0}, {0, 0, -1}, {0, 1, 0}}}; /* glTF has y up */
-    const strl__affine unit = {.axis = {{1 / (double)columns, 0, 0}, {0, 1 / (double)rows, 0}, {0, 0, 1}}};
+    const strl__affine unit = {
+        .axis = {{1 / (double)columns, 0, 0}, {0, 1 / (double)rows, 0}, {0, 0, 1 / (double)columns}}};
     strl__parts_writer *parts = run->parts;
     board self = {
         .run = run, .columns = columns, .rows = rows, .copies = strl__alloc(columns / TILE + 1, sizeof *self.copies)};

@@ -75,7 +75,8 @@ void main()
 #endif
 
     gl_PointSize = intBitsToFloat(high.w);
-    v_shift = high.w != 0 ? hash(uvec3(in_position)) : 0u;
+    /* By place and colour: what lies in one cell and is of several trees shows through each other. */
+    v_shift = high.w != 0 ? hash(uvec3(in_position) ^ uvec3(in_colour.rgb * 255.0 + 0.5) << 23) : 0u;
     vec3 normal = decode_normal(in_normal & 1023u);
     v_spread = float(in_normal.x >> 10) / 63.0;
     v_view = view;

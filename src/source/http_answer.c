@@ -23,7 +23,9 @@ static strl__http_verdict judge_status(const strl__http_asked *asked, const strl
     unsigned status = answer->status;
     strl__http_verdict gone = asked->redirected ? STRL__HTTP_MOVED : STRL__HTTP_REFUSED;
     if (status == 200)
-        return say(STRL__HTTP_REFUSED, err, "the server does not answer byte ranges, it sends the whole file", status);
+        return say(STRL__HTTP_REFUSED, err,
+                   "the server does not answer byte ranges here, it sends the whole file: is that a model, or a page?",
+                   status);
     if (status == 404 || status == 410)
         return say(gone, err, "there is nothing at this address", status);
     if (status == 401 || status == 403 || status == 407)

@@ -66,7 +66,7 @@ static strl_status ask_for_records(strl_walk *walk, root_reads *reads, uint32_t 
     if (!strl__treelet_reserve(walk, tree, 0, &ref))
         return strl__fail(err, STRL_ERR_MEMORY,
                           "the root records of tree %" PRIu32 " do not fit into the memory for walking, %" PRIu64
-                          " bytes",
+                          " bytes: it needs more",
                           tree, walk->memory_bytes);
     return add_read(reads, tree, ref.offset, ref.bytes, ref.checksum, err);
 }
@@ -90,7 +90,7 @@ static strl_status ask_for_root(strl_walk *walk, root_reads *reads, uint32_t tre
     if (!strl__make_room(walk, bytes, 0))
         return strl__fail(err, STRL_ERR_MEMORY,
                           "the root of tree %" PRIu32 " takes %" PRIu64
-                          " bytes, more than is left of the memory for walking, %" PRIu64 " bytes",
+                          " bytes, more than is left of the memory for walking, %" PRIu64 " bytes: it needs more",
                           tree, bytes, walk->memory_bytes);
     strl__node_reserve(walk, root);
     walk->root_bytes += bytes;

@@ -74,7 +74,7 @@ static void attempts_are_bounded_and_their_failure_says_why(void **state)
         {{.stall = true, .after = 0}, "the server stalled: 0 bytes came in 300 ms", 4},
         {{.shift = -5}, "the answer is bytes 99995 to 199994, expected 100000 to 199999", 4},
         {{.no_range_field = true}, "does not say which range", 4},
-        {{.whole = true}, "the server does not answer byte ranges", 1},
+        {{.whole = true}, "the server does not answer byte ranges here", 1},
         {{.field = "Content-Encoding: gzip"}, "encoded as gzip", 1},
         {{.endless_header = true}, "the header of the answer is longer than", 1},
     };
