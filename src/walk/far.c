@@ -19,10 +19,15 @@ static double diagonal(const strl_box *box)
     return sqrt(square);
 }
 
+static double size_px(const strl_view *view, const strl_box *box)
+{
+    const strl_sight sight = strl_view_sight(view, box);
+    return strl_sight_error_px(&sight, diagonal(box));
+}
+
 bool strl__is_far(const strl__cut *cut, const strl_box *box, double *px)
 {
-    const strl_sight sight = strl_view_sight(cut->view, box);
-    *px = strl_sight_error_px(&sight, diagonal(box));
+    *px = size_px(cut->view, box);
     return *px <= cut->allowed_px;
 }
 
@@ -108,14 +113,14 @@ int32_t strl__far_cell(double at)
     return (int32_t)lrint(at > 0 ? at < LATTICE ? at : LATTICE : 0);
 }
 
+/* Of what is too far away the size is 0; `error_px` is how far what the point stands for may lie from it. */
 static strl_status draw_point(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far,
-                              double px, bool is_missing, uint32_t own_part, strl_error *err)
+                              unsigned size, double error_px, uint32_t own_part, strl_error *err)
 {
-    double least, largest, place[3], sight[3], depth = find_place(cut->view, box, is_missing, place);
-    if (!(px > 0) || !(depth > 0) || !(far->area > 0)) /* not in the image, or nothing */
+    double least, largest, place[3], sight[3], depth = find_place(cut->view, box, size > 0, place);
+    if (!(error_px > 0) || !(depth > 0) || !(far->area > 0)) /* not in the image, or nothing */
         return STRL_OK;
     double scale = cut->view->focal_px / (cut->view->orthographic ? 1 : depth);
-    unsigned size = is_missing ? size_of(px) : 0;
     double side = strl__far_px(cut->allowed_px, size);
     strl__far_points *points = &walk->far[size];
     strl_vertex *point = strl__far_points_add(points, walk->labels, own_part);
@@ -133,26 +138,26 @@ static strl_status draw_point(strl_walk *walk, const strl__cut *cut, const strl_
     strl_view_depth_range(cut->view, box, &least, &largest);
     walk->far_near = walk->far_far > 0 ? fmin(walk->far_near, least) : least;
     walk->far_far = fmax(walk->far_far, largest);
-    points->px = fmax(points->px, px);
+    points->px = fmax(points->px, error_px);
     return STRL_OK;
 }
 
 strl_status strl__far_draw(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far, double px,
                            uint32_t own_part, strl_error *err)
 {
-    return draw_point(walk, cut, box, far, px, false, own_part, err);
+    return draw_point(walk, cut, box, far, 0, px, own_part, err);
 }
 
-/* Halves of its longest edge, each with half of the faces, until a point covers what is left. */
+/* Halves of its longest edge, each with half of the faces, until a point covers what is left. The faces of the whole
+ * run may lie anywhere in its box, hence `error_px`, of the whole, at each of them. */
 static strl_status fill(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far,
-                        unsigned halvings, strl_error *err)
+                        unsigned halvings, double error_px, strl_error *err)
 {
     if (!strl_view_sees(cut->view, box))
         return STRL_OK;
-    const strl_sight sight = strl_view_sight(cut->view, box);
-    const double px = strl_sight_error_px(&sight, diagonal(box));
+    const double px = size_px(cut->view, box);
     if (px <= STRL__MOST_POINT_PX || halvings == 0 || walk->fill_work == 0)
-        return draw_point(walk, cut, box, far, px, true, 0, err);
+        return draw_point(walk, cut, box, far, size_of(px), error_px, 0, err);
     walk->fill_work--;
     unsigned longest = 0;
     for (unsigned k = 1; k < 3; k++)
@@ -163,14 +168,14 @@ static strl_status fill(strl_walk *walk, const strl__cut *cut, const strl_box *b
     strl_far half = *far;
     low.max[longest] = high.min[longest] = middle;
     half.area /= 2;
-    strl_status status = fill(walk, cut, &low, &half, halvings - 1, err);
-    return status ? status : fill(walk, cut, &high, &half, halvings - 1, err);
+    strl_status status = fill(walk, cut, &low, &half, halvings - 1, error_px, err);
+    return status ? status : fill(walk, cut, &high, &half, halvings - 1, error_px, err);
 }
 
 strl_status strl__far_fill(strl_walk *walk, const strl__cut *cut, const strl_box *box, const strl_far *far,
                            strl_error *err)
 {
-    return fill(walk, cut, box, far, MOST_HALVINGS, err);
+    return fill(walk, cut, box, far, MOST_HALVINGS, size_px(cut->view, box), err);
 }
 
 /* Without placement, node or level: they stand for many. */

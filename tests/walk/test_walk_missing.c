@@ -78,11 +78,10 @@ typedef struct pixel_place {
 
 static pixel_place project(const strl_draw_item *item, const strl_vertex *vertex, double distance)
 {
-    double at[3], focal = HEIGHT / 2.0 / tan(FOV / 2 * PI / 180);
-    for (int k = 0; k < 3; k++)
-        at[k] = item->origin[k] + (double)(item->anchor[k] + vertex->position[k]) * item->step;
-    double depth = distance - at[0];
-    return (pixel_place){WIDTH / 2.0 + focal * at[1] / depth, HEIGHT / 2.0 - focal * at[2] / depth, depth};
+    const strl_camera camera = camera_at(distance);
+    double pixel[2], depth;
+    project_vertex(&camera, item, vertex, pixel, &depth);
+    return (pixel_place){pixel[0], pixel[1], depth};
 }
 
 /* Of the half that is seen: the other one covers the same pixels and would hide what is missing. */

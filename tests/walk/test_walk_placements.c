@@ -288,52 +288,15 @@ static void copies_below_a_pixel_are_drawn_as_points(void **state)
 
 static bool marked[360][640];
 
-static void cross(const double a[3], const double b[3], double product[3])
-{
-    double length = 0;
-    for (int k = 0; k < 3; k++)
-        product[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
-    for (int k = 0; k < 3; k++)
-        length += product[k] * product[k];
-    for (int k = 0; k < 3; k++)
-        product[k] /= sqrt(length);
-}
-
-/* In pixels from the image's upper left corner; false behind the eye. By code of the test's own. */
-static bool project(const strl_camera *camera, const strl_draw_item *item, const strl_vertex *vertex, double pixel[2])
-{
-    double forward[3], right[3], up[3], from[3], depth = 0, x = 0, y = 0;
-    const double focal = camera->height / 2.0 / tan(camera->fov_y_deg * M_PI / 360);
-    for (int k = 0; k < 3; k++)
-        forward[k] = camera->target[k] - camera->eye[k];
-    cross(forward, camera->up, right);
-    cross(right, forward, up);
-    cross(up, right, forward);
-    for (int row = 0; row < 3; row++) {
-        const double *m = item->transform + 4 * row;
-        from[row] = m[3] - camera->eye[row];
-        for (int k = 0; k < 3; k++)
-            from[row] += m[k] * (item->origin[k] + item->step * (double)(item->anchor[k] + vertex->position[k]));
-    }
-    for (int k = 0; k < 3; k++) {
-        depth += forward[k] * from[k];
-        x += right[k] * from[k];
-        y += up[k] * from[k];
-    }
-    pixel[0] = camera->width / 2.0 + focal * x / depth;
-    pixel[1] = camera->height / 2.0 - focal * y / depth;
-    return depth > 0;
-}
-
 static void mark_points(const strl_camera *camera, const strl_draw_list *list)
 {
     memset(marked, 0, sizeof marked);
     for (uint32_t i = 0; i < list->count; i++) {
         const strl_draw_item *item = &list->items[i];
         const double half = (double)item->point_px / 2;
-        double at[2];
+        double at[2], depth;
         for (uint32_t v = 0; v < item->vertex_count && half > 0; v++)
-            if (project(camera, item, &item->vertices[v], at))
+            if (project_vertex(camera, item, &item->vertices[v], at, &depth))
                 for (int y = (int)fmax(0, at[1] - half); y < (int)fmin(camera->height, at[1] + half); y++)
                     for (int x = (int)fmax(0, at[0] - half); x < (int)fmin(camera->width, at[0] + half); x++)
                         marked[y][x] = true;
@@ -346,10 +309,10 @@ static double open_share(const strl_camera *camera, const strl_draw_list *list)
     uint64_t all = 0, open = 0;
     for (uint32_t i = 0; i < list->count; i++) {
         const strl_draw_item *item = &list->items[i];
-        double at[2];
+        double at[2], depth;
         for (uint32_t v = 0; v < item->vertex_count && item->visible; v++)
-            if (project(camera, item, &item->vertices[v], at) && at[0] >= 0 && at[0] < camera->width && at[1] >= 0 &&
-                at[1] < camera->height) {
+            if (project_vertex(camera, item, &item->vertices[v], at, &depth) && at[0] >= 0 && at[0] < camera->width &&
+                at[1] >= 0 && at[1] < camera->height) {
                 all++;
                 open += !marked[(int)at[1]][(int)at[0]];
             }

@@ -317,3 +317,41 @@ void free_list(strl_draw_list *list)
     strl__free((void *)(uintptr_t)list->items);
     *list = (strl_draw_list){0};
 }
+
+static void cross(const double a[3], const double b[3], double product[3])
+{
+    double length = 0;
+    for (int k = 0; k < 3; k++)
+        product[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
+    for (int k = 0; k < 3; k++)
+        length += product[k] * product[k];
+    for (int k = 0; k < 3; k++)
+        product[k] /= sqrt(length);
+}
+
+bool project_vertex(const strl_camera *camera, const strl_draw_item *item, const strl_vertex *vertex, double pixel[2],
+                    double *depth)
+{
+    double forward[3], right[3], up[3], from[3], x = 0, y = 0;
+    const double focal = camera->height / 2.0 / tan(camera->fov_y_deg * M_PI / 360);
+    for (int k = 0; k < 3; k++)
+        forward[k] = camera->target[k] - camera->eye[k];
+    cross(forward, camera->up, right);
+    cross(right, forward, up);
+    cross(up, right, forward);
+    for (int row = 0; row < 3; row++) {
+        const double *m = item->transform + 4 * row;
+        from[row] = m[3] - camera->eye[row];
+        for (int k = 0; k < 3; k++)
+            from[row] += m[k] * (item->origin[k] + item->step * (double)(item->anchor[k] + vertex->position[k]));
+    }
+    *depth = 0;
+    for (int k = 0; k < 3; k++) {
+        *depth += forward[k] * from[k];
+        x += right[k] * from[k];
+        y += up[k] * from[k];
+    }
+    pixel[0] = camera->width / 2.0 + focal * x / *depth;
+    pixel[1] = camera->height / 2.0 - focal * y / *depth;
+    return *depth > 0;
+}

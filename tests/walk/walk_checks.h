@@ -49,6 +49,10 @@ strl_draw_list walk_frame(strl_walk *walk, const strl_camera *camera);
  * memory. */
 strl_status walk_frame_without_memory(strl_walk *walk, const strl_camera *camera, uint64_t n, strl_draw_list *list);
 
+/* By code of the tests' own: in pixels from the image's upper left corner, and the depth along the line of sight in the
+ * model's unit; false behind the eye. */
+bool project_vertex(const strl_camera *camera, const strl_draw_item *item, const strl_vertex *vertex, double pixel[2],
+                    double *depth);
 /* The items of a placement cover the height field without a crack: every edge inside is run as
  * often in one direction as in the other (nodes may meet in an edge of four triangles), each open
  * one lies on the rim, and the areas add up exactly. */
