@@ -18,6 +18,7 @@ sys.path.append(str(serving.ROOT / "tests" / "support"))
 from shaped_server import ShapedServer
 
 STRUCTURES = ("clusters", "samples")
+MODELS = ("isosurface_1m", "landscape_20m_placed")
 LINKS = tuple((megabits, latency_ms) for latency_ms in (5, 80) for megabits in (500, 50, 5))
 WALK_FRAMES_A_FRAME = 5
 FINAL_FRAMES = 3
@@ -88,10 +89,12 @@ def images_of(folder):
 def link_once(bench, place, site, path, images):
     """The first image, the final one, and a walk; each anew."""
     size = ("--size", bench.options.size)
-    first, _ = walk_lines(bench, place, site, *size, "--realtime", "--path", "orbit", "--frames", 1)
+    first, _ = walk_lines(bench, place, site, *size, "--realtime", "--path", "orbit", "--frames", 1, "-o", images)
+    shutil.rmtree(images)
     final, _ = walk_lines(bench, place, site, *size, "--path", "orbit", "--frames", FINAL_FRAMES, "-o", images)
     walk, _ = walk_lines(bench, place, site, *size, "--realtime", "--path", path, "--backend", "null")
     return {"first_s": first[0]["elapsed_ms"] * 1e-3, "final_s": final[0]["elapsed_ms"] * 1e-3,
+            "first_covers": first[0]["covered_pixels"] / max(1, final[0]["covered_pixels"]),
             "final_bytes": final[0]["network"]["bytes"] if "network" in final[0] else final[0]["bytes_read"],
             "images": images_of(images), "walk": walk}
 
@@ -99,7 +102,7 @@ def link_once(bench, place, site, path, images):
 def link_figures(runs, reference):
     frames = [frame for run in runs for frame in run["walk"]]
     networks = [run["walk"][-1].get("network", {}) for run in runs]
-    return {**{name: measure.spread([run[name] for run in runs]) for name in ("first_s", "final_s", "final_bytes")},
+    return {**{name: measure.spread([run[name] for run in runs]) for name in ("first_s", "first_covers", "final_s", "final_bytes")},
             **{name: measure.spread([frame[name] for frame in frames]) for name in ("frame_ms", "select_ms")},
             "missing_frames": sum(frame["missing_nodes"] > 0 for frame in frames) / len(runs),
             "walk_frames": len(frames) / len(runs), "walk_bytes": measure.spread([network.get("bytes", 0) for network in networks]),
@@ -279,5 +282,5 @@ def part_remote_clients(bench, model):
                                  "programs": programs(bench, container_of(bench, model, structure))} for structure in STRUCTURES})
 
 
-PARTS = {"remote": (part_remote, ("isosurface_1m",)), "remote_faults": (part_remote_faults, ("isosurface_1m",)),
+PARTS = {"remote": (part_remote, MODELS), "remote_faults": (part_remote_faults, MODELS),
          "remote_clients": (part_remote_clients, ("isosurface_1m",))}

@@ -3,6 +3,7 @@
 What a log does not have stays in the document: figures that took hours outlive the folder in which they were measured."""
 import csv
 import dataclasses
+import itertools
 import re
 
 BEGIN, END = "<!-- measured: begin -->", "<!-- measured: end -->"
@@ -331,10 +332,11 @@ def chessboard_rows(records):
 
 def chessboard_lines(records):
     of = {record["model"]: record["splats"] for record in records_of(records, "chessboard")}
-    if len(of) > 2:
-        first, last = "chessboard_8m", "chessboard_320m"
+    if of:
         names = next(iter(of.values()))
-        if first in of and last in of:
+        for first, last in itertools.product(("chessboard_8m",), ("chessboard_32m", "chessboard_320m")):
+            if first not in of or last not in of:
+                continue
             growth = {splat: of[last][splat]["frame_ms"]["median"] / of[first][splat]["frame_ms"]["median"] for splat in names}
             yield (f"Time of a frame from {first} to {last}: " + ", ".join(f"x {number(ratio)} at splats of {splat}" for splat, ratio in growth.items())
                    + f" (asked: less than {CHESSBOARD_GROWTH}).")
@@ -360,7 +362,8 @@ def link_rows(records):
             for row in record[structure]:
                 over = row["frame_ms"]["p99"] / local["frame_ms"]["p99"]
                 yield (f"{record['model']} {structure}", "the file" if row is local else "{:g} Mbit/s, {:g} ms".format(*row["link"]),
-                       least_to_most(row["first_s"], 2), number(row["final_bytes"]["median"] / 2**20, 2), least_to_most(row["final_s"], 2),
+                       least_to_most(row["first_s"], 2),
+                       percent(row["first_covers"]["min"], 1) if "first_covers" in row else "not drawn", number(row["final_bytes"]["median"] / 2**20, 2), least_to_most(row["final_s"], 2),
                        number(row["same"]), number(row["walk_frames"], 0), number(row["missing_frames"], 0),
                        number(row["select_ms"]["median"], 2), number(row["frame_ms"]["median"], 2), number(row["frame_ms"]["p99"], 2),
                        f"x {number(over)}", "the base" if row is local else number(over <= FRAME_TIME_LIMIT))
@@ -618,8 +621,8 @@ TABLES = (
      ("model", "path", "splat px", "frames", "pixels that differ", "by more than 16 of 255", "PSNR median dB", "least dB",
       "median dB, 4 x 4 samples", "uncovered", "overcovered", "depth within", "triangles a frame", "splats a frame"), splat_rows),
     ("remote", "Walks over links",
-     ("model", "link", "first image, s", "MiB until the final image", "final image, s", "final image as of the file", "frames of the walk",
-      "with missing nodes", "select_ms, median", "frame_ms, median", "p99", "over the file's", "at most 10 % more"), link_rows),
+     ("model", "link", "first image, s", "it covers, least, of the final one's pixels", "MiB until the final image", "final image, s",
+      "final image as of the file", "frames of the walk", "with missing nodes", "select_ms, median", "frame_ms, median", "p99", "over the file's", "at most 10 % more"), link_rows),
     ("remote_faults", "Faults of the server under a walk",
      ("model", "the server", "for, s", "frames until whole", "with missing nodes", "pixels covered, least, of the final front's",
       "longest from frame to frame, s", "whole again after, s", "last image as of the file", "said"), fault_rows),
