@@ -32,7 +32,7 @@ replaces each part's own models. Parts:
     chessboard    time of a frame against size, splats of 1, 4 and 8 pixels                          (chessboards of 80 K to 320 M)
     large         walks through a landscape of 400 M, one of 2 G placed, and 12,000 scans       (names: MODEL samples, MODEL clusters)
     theorem       sample trees: how many fronts' cells show none of their visible triangles  (chessboard, isosurface, scans, landscape)
-    splats        sample trees with splats of 1, 3 and 5 pixels against the input as read        (landscape_2m_obj, dragon_scans)
+    splats        sample trees with splats of 1, 3 and 5 pixels against the input as read        (landscape_2m_obj, dragon_scans, landscape_20m_placed)
     remote        walks over six links against the file: first and final image, missing nodes, frame times    (isosurface_1m, landscape_20m_placed)
     remote_faults   a server that is killed, fails, truncates, stalls, sends wrong bytes, gets another file     (the same)
     remote_clients  --clients of stroll serve at once                                                         (isosurface_1m)

@@ -28,7 +28,6 @@ FAULT_LINK = (5, 80)
 FAULT_FPS, FAULT_FRAMES_A_FRAME = 4, 2  # half a minute at a rate that software keeps
 # Of the walk's time: the camera moves, the fault begins after so much of it and lasts so long.
 MOVING, BEGIN, LASTING = 0.2, 0.04, 0.15
-OPENED_REQUESTS = 5  # the walk has begun to refine
 
 CROWD_CONNECTIONS = 8  # a walk has six
 
@@ -150,15 +149,15 @@ def write_arc(bench, path, container, frames):
 
 
 class Accident(threading.Thread):
-    """What goes wrong, on time: from `begin` to `end`, by the monotonic clock."""
+    """What goes wrong some time after the first image, by the monotonic clock: from `begin` to `end`."""
 
-    def __init__(self, site, fault, other, after_s, lasting_s):
+    def __init__(self, site, fault, other, images, after_s, lasting_s):
         super().__init__(daemon=True)
-        self.site, self.fault, self.other, self.after_s, self.lasting_s = site, fault, other, after_s, lasting_s
+        self.site, self.fault, self.other, self.images, self.after_s, self.lasting_s = site, fault, other, images, after_s, lasting_s
         self.over, self.begin, self.end = threading.Event(), None, None
 
     def run(self):
-        while len(self.site.proxy.asked) < OPENED_REQUESTS and not self.over.wait(0.005):
+        while not any(self.images.glob("*")) and not self.over.wait(0.005):
             pass
         self.over.wait(self.after_s)
         with serving.on_processors(self.site.servers):
@@ -222,7 +221,7 @@ def faults_of(bench, model, structure):
                 shutil.rmtree(images)
             url = site.put(container, "model.stroll")
             site.shape(FAULT_LINK)
-            accident = Accident(site, fault, other, BEGIN * seconds, LASTING * seconds)
+            accident = Accident(site, fault, other, images, BEGIN * seconds, LASTING * seconds)
             accident.start()
             try:
                 lines, start = walk_lines(bench, url, site, "--realtime", FAULT_FPS, *options)

@@ -1,4 +1,5 @@
 """The parts of must_show.py about sample trees: Theorem 1 by a checker of its own (bench/theorem.c), and splats beside the input."""
+import json
 import math
 
 import measure
@@ -11,10 +12,11 @@ PROBABILITIES = ("0.999999", "0.99", "0.9", "0.5")  # the first is the default o
 FEWER = 10  # pairs at the others: what they allow shows in fewer
 CONFIDENCE = 0.95
 
-SPLAT_MODELS = ("landscape_2m_obj", "dragon_scans")  # a PLY file has no colours of materials
+SPLAT_MODELS = ("landscape_2m_obj", "dragon_scans", "landscape_20m_placed")  # a PLY file has no colours of materials
 SPLAT_FRAMES = 8
 SPLATS = (1, 3, 5)
-PATHS = ("orbit", "flythrough")
+PATHS = ("orbit", "far orbit", "flythrough")
+FAR_RADII = 6  # of the far orbit, from the middle of the model's box
 
 
 # ---- Theorem 1
@@ -99,16 +101,30 @@ def against(bench, model, reference, ours, size, *options):
     return bench.program("compare", reference, ours, "--error", size, "--psnr", 0, "--json", allowed=(0, 1)).json(), stats, seconds
 
 
+def write_far_orbit(bench, model, frames, path):
+    """A turn about the model from where it is a small part of the image, and its triangles smaller than a pixel."""
+    bounds = bench.program("info", bench.container_of(model, *STRUCTURE), "--json").json()["bounds"]
+    centre = [(low + high) / 2 for low, high in zip(bounds[:3], bounds[3:])]
+    distance = FAR_RADII * math.dist(bounds[:3], bounds[3:]) / 2
+    eyes = [[math.cos(turn) * distance + centre[0], math.sin(turn) * distance + centre[1], 0.5 * distance + centre[2]]
+            for turn in (2 * math.pi * frame / frames for frame in range(frames))]
+    path.write_text(json.dumps({"fov_y_deg": 60, "frames": [{"eye": eye, "target": centre, "up": [0, 0, 1]} for eye in eyes]}), encoding="utf-8")
+
+
 def compare_splats(bench, model, path, frames):
     """All sizes of splats beside one render of the input's own triangles, with one sample a pixel and with 4 x 4."""
-    reference, smooth, ours = (bench.scratch / f"{model}_{path}_{name}" for name in ("full", "smooth", "splats"))
-    rows = []
-    bench.render(bench.reference_of(model), reference, path, "--frames", frames, "--full", "--depth")
+    name = f"{model}_{path}".replace(" ", "_")
+    reference, smooth, ours = (bench.scratch / f"{name}_{kind}" for kind in ("full", "smooth", "splats"))
+    cameras, rows = (path, "--frames", frames), []
+    if path == "far orbit":
+        cameras = (bench.scratch / "far_orbit.json",)
+        write_far_orbit(bench, model, frames, *cameras)
+    bench.render(bench.reference_of(model), reference, *cameras, "--full", "--depth")
     bench.render(bench.reference_of(model), smooth, reference / "path.json", "--full", "--depth", "--supersample", 4)
     for size in SPLATS:
         compared, stats, seconds = against(bench, model, reference, ours, size)
         if frames > 1:
-            sheet = bench.scratch / "sheets" / f"{model}_{path}_splat{size}.png"
+            sheet = bench.scratch / "sheets" / f"{name}_splat{size}.png"
             sheet.parent.mkdir(exist_ok=True)
             sheets.side_by_side(reference / "contact.png", ours / "contact.png", frames, sheet)
         bench.drop(ours)
