@@ -97,7 +97,7 @@ class Test:
             self.check(f"each triangle of {model} has its cell, and no premise is broken", all(row["lost"] == 0 for row in rows) and
                        rows[0]["pairs"] == 2000 and rows[0]["premise"] > 1000 and rows[0]["broken"] == 0 and rows[0]["holds"], rows[0])
             sizes = {(row["path"], row["splat"]) for row in records["splats", model]["rows"]}
-            self.check("splats of three sizes are compared on two paths", len(sizes) == 6, sizes)
+            self.check("splats of three sizes are compared on three paths", len(sizes) == 9, sizes)
     def test_remote(self):
         """Of a model and a walk that are large enough for the network to be in the way."""
         model = "isosurface_60k"
