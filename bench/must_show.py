@@ -52,6 +52,7 @@ import shutil
 import sys
 import time
 
+import cameras
 import counts
 import file_parts
 import measure
@@ -343,17 +344,8 @@ def part_dependencies(bench, model):
 
 def write_spiral(path, bounds, frames):
     """One and a half turns round the model's centre, from three radii to its middle: smooth, and near the surface."""
-    low, high = bounds[:3], bounds[3:]
-    centre = [(a + b) / 2 for a, b in zip(low, high)]
-    radius = math.dist(low, high) / 2
-    places = []
-    for frame in range(frames):
-        share = frame / max(1, frames - 1)
-        angle, distance = 3 * math.pi * share, radius * (3 - 2.6 * share)
-        eye = [centre[0] + distance * math.cos(angle), centre[1] + distance * math.sin(angle),
-               centre[2] + distance * 0.3 * (1 - share)]
-        places.append({"eye": eye, "target": centre, "up": [0, 0, 1]})
-    path.write_text(json.dumps({"fov_y_deg": 60, "frames": places}), encoding="utf-8")
+    shares = [frame / max(1, frames - 1) for frame in range(frames)]
+    cameras.write_turns(path, bounds, [(3 * math.pi * share, 3 - 2.6 * share, (3 - 2.6 * share) * 0.3 * (1 - share)) for share in shares])
 
 
 def part_walk(bench, models):

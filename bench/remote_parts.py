@@ -10,6 +10,7 @@ import sys
 import threading
 import time
 
+import cameras
 import crowd
 import measure
 import serving
@@ -138,14 +139,7 @@ def part_remote(bench, model):
 def write_arc(bench, path, container, frames):
     """A quarter of a turn at 1.5 radii, then standing still."""
     bounds = bench.program("info", container, "--json").json()["bounds"]
-    low, high = bounds[:3], bounds[3:]
-    centre, radius = [(a + b) / 2 for a, b in zip(low, high)], math.dist(low, high) / 2
-    places = []
-    for frame in range(frames):
-        angle = math.pi / 2 * min(1, frame / (MOVING * frames))
-        eye = [centre[0] + 1.5 * radius * math.cos(angle), centre[1] + 1.5 * radius * math.sin(angle), centre[2] + 0.4 * radius]
-        places.append({"eye": eye, "target": centre, "up": [0, 0, 1]})
-    path.write_text(json.dumps({"fov_y_deg": 60, "frames": places}), encoding="utf-8")
+    cameras.write_turns(path, bounds, [(math.pi / 2 * min(1, frame / (MOVING * frames)), 1.5, 0.4) for frame in range(frames)])
 
 
 class Accident(threading.Thread):

@@ -1,7 +1,7 @@
 """The parts of must_show.py about sample trees: Theorem 1 by a checker of its own (bench/theorem.c), and splats beside the input."""
-import json
 import math
 
+import cameras
 import measure
 import sheets
 
@@ -104,22 +104,18 @@ def against(bench, model, reference, ours, size, *options):
 def write_far_orbit(bench, model, frames, path):
     """A turn about the model from where it is a small part of the image, and its triangles smaller than a pixel."""
     bounds = bench.program("info", bench.container_of(model, *STRUCTURE), "--json").json()["bounds"]
-    centre = [(low + high) / 2 for low, high in zip(bounds[:3], bounds[3:])]
-    distance = FAR_RADII * math.dist(bounds[:3], bounds[3:]) / 2
-    eyes = [[math.cos(turn) * distance + centre[0], math.sin(turn) * distance + centre[1], 0.5 * distance + centre[2]]
-            for turn in (2 * math.pi * frame / frames for frame in range(frames))]
-    path.write_text(json.dumps({"fov_y_deg": 60, "frames": [{"eye": eye, "target": centre, "up": [0, 0, 1]} for eye in eyes]}), encoding="utf-8")
+    cameras.write_turns(path, bounds, [(2 * math.pi * frame / frames, FAR_RADII, FAR_RADII / 2) for frame in range(frames)])
 
 
 def compare_splats(bench, model, path, frames):
     """All sizes of splats beside one render of the input's own triangles, with one sample a pixel and with 4 x 4."""
     name = f"{model}_{path}".replace(" ", "_")
     reference, smooth, ours = (bench.scratch / f"{name}_{kind}" for kind in ("full", "smooth", "splats"))
-    cameras, rows = (path, "--frames", frames), []
+    path_options, rows = (path, "--frames", frames), []
     if path == "far orbit":
-        cameras = (bench.scratch / "far_orbit.json",)
-        write_far_orbit(bench, model, frames, *cameras)
-    bench.render(bench.reference_of(model), reference, *cameras, "--full", "--depth")
+        path_options = (bench.scratch / "far_orbit.json",)
+        write_far_orbit(bench, model, frames, *path_options)
+    bench.render(bench.reference_of(model), reference, *path_options, "--full", "--depth")
     bench.render(bench.reference_of(model), smooth, reference / "path.json", "--full", "--depth", "--supersample", 4)
     for size in SPLATS:
         compared, stats, seconds = against(bench, model, reference, ours, size)
