@@ -47,7 +47,7 @@ vec3 exact_sum(ivec3 base_low, ivec3 base_high, ivec3 offset)
 
 vec3 decode_normal(uvec2 coordinates)
 {
-    vec2 p = vec2(ivec2(coordinates) - 511 - ivec2(greaterThan(coordinates, uvec2(511u)))) / 511.0;
+    vec2 p = vec2(coordinates) * (2.0 / 1023.0) - 1.0;
     float z = 1.0 - abs(p.x) - abs(p.y);
     float fold = max(-z, 0.0);
     p.x += p.x >= 0.0 ? -fold : fold;

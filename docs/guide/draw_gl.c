@@ -46,8 +46,7 @@ static const char vertex_shader[] =
     "}\n"
     "vec3 decoded(uvec2 octahedral)\n"
     "{\n"
-    "    ivec2 code = ivec2(octahedral & 1023u);\n" /* the spread of splats lies above; 511 and 512 are both 0 */
-    "    vec2 p = vec2(code - 511 - ivec2(greaterThan(code, ivec2(511)))) / 511.0;\n"
+    "    vec2 p = vec2(octahedral & 1023u) * (2.0 / 1023.0) - 1.0;\n" /* the spread of splats lies above */
     "    float z = 1.0 - abs(p.x) - abs(p.y), fold = max(-z, 0.0);\n"
     "    p += vec2(p.x >= 0.0 ? -fold : fold, p.y >= 0.0 ? -fold : fold);\n"
     "    return normalize(vec3(p, z));\n"

@@ -27,8 +27,7 @@ typedef struct strl_camera {
 /* A vertex as the GPU reads it: 20 bytes. */
 typedef struct strl_vertex {
     int32_t position[3]; /* lattice units from the item's anchor; see strl_positions */
-    /* octahedral, 0..1023 each, 0..511 from -1 to 0, 512..1023 from 0 to 1; of splats the bits of normal[0] above these
-     * ten are their spread */
+    /* octahedral, 0..1023 each; of splats the bits of normal[0] above these ten are their spread */
     uint16_t normal[2];
     uint8_t rgba[4]; /* vertex colour x material colour, sRGB-encoded */
 } strl_vertex;

@@ -1,6 +1,4 @@
-/* Unit normals as points of an octahedron unfolded into a square (Meyer et al. 2010), 10 bits a coordinate: 0 to 511
- * are -1 to 0, and 512 to 1023 are 0 to 1. With both zeros exact, so are the axes, which most of what is built has as
- * normals: a hundredth of a degree off, a cube placed as a plate shows. */
+/* Unit normals as points of an octahedron unfolded into a square (Meyer et al. 2010), 10 bits a coordinate. */
 #ifndef STRL_GEOMETRY_OCTAHEDRAL_H
 #define STRL_GEOMETRY_OCTAHEDRAL_H
 
@@ -8,18 +6,6 @@
 #include <stdint.h>
 
 #define STRL_OCT_MAX 1023
-#define STRL_OCT_HALF 511 /* steps from 0 to 1 */
-
-/* at: -1 to 1. */
-static inline uint16_t strl_oct_code(float at)
-{
-    long steps = lrintf(fabsf(at) * STRL_OCT_HALF);
-    return (uint16_t)(at < 0 ? STRL_OCT_HALF - steps : STRL_OCT_HALF + 1 + steps);
-}
-static inline float strl_oct_value(uint16_t code)
-{
-    return (float)(code - STRL_OCT_HALF - (code > STRL_OCT_HALF)) / STRL_OCT_HALF;
-}
 
 /* normal need not have unit length; a zero vector becomes +z. */
 static inline void strl_oct_encode(const float normal[3], uint16_t out[2])
@@ -31,28 +17,20 @@ static inline void strl_oct_encode(const float normal[3], uint16_t out[2])
         float fold_y = (1 - fabsf(x)) * (y >= 0 ? 1.f : -1.f);
         x = fold_x, y = fold_y;
     }
-    out[0] = strl_oct_code(x);
-    out[1] = strl_oct_code(y);
+    out[0] = (uint16_t)lrintf((x * 0.5f + 0.5f) * STRL_OCT_MAX);
+    out[1] = (uint16_t)lrintf((y * 0.5f + 0.5f) * STRL_OCT_MAX);
 }
 
-/* A coordinate in 8 bits and back: each half on its own, so that zeros stay zeros. */
-static inline uint32_t strl_oct_narrow(uint32_t coordinate)
-{
-    return (coordinate >> 9 << 7) + ((coordinate & 511) * 127 + 255) / 511;
-}
-static inline uint32_t strl_oct_widen(uint32_t narrow)
-{
-    return (narrow >> 7 << 9) + ((narrow & 127) * 511 + 63) / 127;
-}
 /* The nearest coordinate that a payload can hold in 8 bits. */
 static inline uint16_t strl_oct_coarsen(uint16_t coordinate)
 {
-    return (uint16_t)strl_oct_widen(strl_oct_narrow(coordinate));
+    uint32_t coarse = (coordinate * 255u + STRL_OCT_MAX / 2) / STRL_OCT_MAX;
+    return (uint16_t)((coarse * STRL_OCT_MAX + 127) / 255);
 }
 
 static inline void strl_oct_decode(const uint16_t in[2], float normal[3])
 {
-    float x = strl_oct_value(in[0]), y = strl_oct_value(in[1]);
+    float x = (float)in[0] * (2.f / STRL_OCT_MAX) - 1, y = (float)in[1] * (2.f / STRL_OCT_MAX) - 1;
     float z = 1 - fabsf(x) - fabsf(y);
     float fold = z < 0 ? -z : 0;
     x += x >= 0 ? -fold : fold;

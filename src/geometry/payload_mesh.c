@@ -100,12 +100,11 @@ void strl__normal_predict(const uint64_t sum[4], uint32_t most, uint32_t predict
     int32_t folded_x = length - y, folded_y = length - x; /* the lower half is folded outward */
     x ^= (x ^ folded_x) & lower;
     y ^= (y ^ folded_y) & lower;
+    x = (x ^ west) - west;
+    y = (y ^ south) - south;
     /* One division for both. The quotients are below 2^11 and a multiple of 1 / 2^22 away from the next integer, so
      * that with half a unit added to the dividend no rounding reaches it. */
     double inverse = 0.5 / length;
-    uint32_t half = (most + 1) / 2, steps = most - 1;
-    predicted[0] = (uint32_t)(((uint32_t)x * steps + (uint32_t)length + 0.5) * inverse) + half;
-    predicted[1] = (uint32_t)(((uint32_t)y * steps + (uint32_t)length + 0.5) * inverse) + half;
-    predicted[0] = (predicted[0] ^ (uint32_t)west) & most;
-    predicted[1] = (predicted[1] ^ (uint32_t)south) & most;
+    predicted[0] = (uint32_t)(((uint32_t)(x + length) * most + (uint32_t)length + 0.5) * inverse);
+    predicted[1] = (uint32_t)(((uint32_t)(y + length) * most + (uint32_t)length + 0.5) * inverse);
 }

@@ -7,7 +7,6 @@
 #include <stdint.h>
 
 #include "base/memory.h"
-#include "geometry/octahedral.h"
 #include "geometry/payload_streams.h"
 #include "geometry/progressive.h"
 
@@ -239,11 +238,11 @@ void strl__normal_predict(const uint64_t sum[4], uint32_t most, uint32_t predict
 /* A normal's coordinate, 0 to 1023, in a payload whose coordinates go up to `most`, and back. */
 static inline uint32_t strl__normal_narrow(uint32_t coordinate, uint32_t most)
 {
-    return most == STRL_OCT_MAX ? coordinate : strl_oct_narrow(coordinate);
+    return most == 1023 ? coordinate : (coordinate * most + 511) / 1023;
 }
 static inline uint32_t strl__normal_widen(uint32_t narrow, uint32_t most)
 {
-    return most == STRL_OCT_MAX ? narrow : strl_oct_widen(narrow);
+    return most == 1023 ? narrow : (narrow * 1023 + most / 2) / most;
 }
 
 #endif

@@ -45,7 +45,7 @@ static inline int32_t strl_splat_place(int32_t centre, unsigned side)
 static inline void strl_splat_normal(const strl_splat *splat, uint16_t code[2])
 {
     for (int k = 0; k < 2; k++)
-        code[k] = (uint16_t)strl_oct_widen(splat->normal[k]);
+        code[k] = (uint16_t)(splat->normal[k] * STRL_OCT_MAX / 255u);
 }
 static inline void strl_splat_line(const strl_splat *splat, float line[3])
 {

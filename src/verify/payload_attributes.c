@@ -43,18 +43,10 @@ static void predict_normal(const uint64_t sum[3], int64_t most, uint32_t predict
         y = l - x;
         x = folded;
     }
-    int64_t from_zero[2] = {(x * (most - 1) + l) / (2 * l), (y * (most - 1) + l) / (2 * l)};
-    for (unsigned i = 0; i < 2; i++)
-        predicted[i] = (uint32_t)(sum[i] >> 63 ? most / 2 - from_zero[i] : most / 2 + 1 + from_zero[i]);
-}
-
-/* Of a coordinate that goes up to `most` to one up to `other`; the two zeros in the middle stay. */
-static uint32_t rescale(uint32_t value, uint32_t most, uint32_t other)
-{
-    uint32_t steps = most / 2, other_steps = other / 2;
-    if (value <= steps)
-        return other_steps - ((steps - value) * other_steps + steps / 2) / steps;
-    return other_steps + 1 + ((value - steps - 1) * other_steps + steps / 2) / steps;
+    x = sum[0] >> 63 ? -x : x;
+    y = sum[1] >> 63 ? -y : y;
+    predicted[0] = (uint32_t)(((x + l) * most + l) / (2 * l));
+    predicted[1] = (uint32_t)(((y + l) * most + l) / (2 * l));
 }
 
 static strl_status read_normals(strl__v_payload *self)
@@ -71,9 +63,9 @@ static strl_status read_normals(strl__v_payload *self)
         predict_normal(sum[v], most, predicted);
         for (unsigned i = 0; i < 2; i++) {
             if (v < self->copied)
-                predicted[i] = rescale(self->told_by->normal[self->copied_from[v]][i], 1023, most);
+                predicted[i] = (self->told_by->normal[self->copied_from[v]][i] * most + 511) / 1023;
             uint32_t value = (predicted[i] + strl__v_residual(self, stream + i)) % (most + 1);
-            mesh->normal[v][i] = (uint16_t)rescale(value, most, 1023);
+            mesh->normal[v][i] = (uint16_t)((value * 1023 + most / 2) / most);
         }
     }
     return STRL_OK;

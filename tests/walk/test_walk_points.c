@@ -40,11 +40,8 @@ static void tell_splats(uint32_t id)
     assert_non_null(told);
     for (uint32_t i = 0; i < brick.splat_count; i++) {
         told_splat *splat = &told[told_count++];
-        uint16_t code[2];
-        for (int k = 0; k < 2; k++) { /* 127 and 128 are both 0 */
-            int narrow = brick.splat[i].normal[k], sign = narrow < 128 ? -1 : 1, zero = narrow < 128 ? 511 : 512;
-            code[k] = (uint16_t)(zero + sign * lround((narrow < 128 ? 127 - narrow : narrow - 128) * 511 / 127.0));
-        }
+        const uint16_t code[2] = {(uint16_t)(brick.splat[i].normal[0] * 1023u / 255u),
+                                  (uint16_t)(brick.splat[i].normal[1] * 1023u / 255u)};
         strl_oct_decode(code, splat->line);
         splat->rgba = brick.splat[i].rgba;
         for (int k = 0; k < 3; k++)

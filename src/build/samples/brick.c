@@ -192,7 +192,7 @@ static int encode_line(const double normal[3], float sign, const uint8_t near[2]
     int distance = 0;
     strl_oct_encode((const float[3]){sign * (float)normal[0], sign * (float)normal[1], sign * (float)normal[2]}, code);
     for (int k = 0; k < 2; k++) {
-        line[k] = (uint8_t)strl_oct_narrow(code[k]);
+        line[k] = (uint8_t)((code[k] * 255u + STRL_OCT_MAX / 2) / STRL_OCT_MAX);
         distance += abs((int8_t)(uint8_t)(line[k] - near[k]));
     }
     return distance;
