@@ -44,7 +44,6 @@ Each record goes at once to --log (JSON lines). What is there of the same progra
 run that was stopped goes on; --again measures anew. --write-docs rewrites the tables of docs/benchmarks.md from the log,
 the rows of bench/results.csv and bench/errors.csv, so that parts may be measured one after another."""
 import argparse
-import json
 import math
 import pathlib
 import re

@@ -2,7 +2,6 @@
 
 What serves has the last processor for itself and what walks has the others, where there are two: so the walk that reads the
 file and those that read the network have the same processors."""
-import json
 import math
 import os
 import shutil
